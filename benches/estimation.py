@@ -14,6 +14,11 @@ with its intervals.
 
 Run ``python benches/estimation.py [--runs N] [--coverage-runs N] [--case TEXT] [--method TEXT]
 [--quick]``. It uses as many processes as there are processors.
+
+Run ``python benches/estimation.py --reality [--runs N] [--rows NAME,NAME] [--free delay,gain]
+[--json FILE] [--quick]`` for another table: estimates with the default method on recordings with
+air, lost rows, wrong clocks and other properties of real flights, from a generator that does not
+use the package (`reality`).
 """
 
 from __future__ import annotations
@@ -28,12 +33,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import deadtime as dtm
 import numpy as np
 from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Waveform
 from deadtime.estimation._estimate import METHODS
+from reality.table import chosen, free_of, print_table
 
 SAMPLE = 0.065
 REST = 16 * SAMPLE
@@ -441,7 +448,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--runs", type=int, default=200, help="runs of each case and method; 0: none"
+        "--runs", type=int, help="runs of each case and method, 200, or of each row, 1000; 0: none"
     )
     parser.add_argument(
         "--coverage-runs", type=int, default=2000, help="runs of each coverage; 0: none"
@@ -449,18 +456,39 @@ def main() -> None:
     parser.add_argument("--case", default="", help="only cases whose name contains this text")
     parser.add_argument("--method", default="", help="only methods whose name contains this text")
     parser.add_argument("--quick", action="store_true", help="one run of some cases")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    reality = parser.add_argument_group("recordings like those of real flights")
+    reality.add_argument("--reality", action="store_true", help="print their table alone")
+    reality.add_argument("--rows", default="", help="only the rows of these names")
+    reality.add_argument("--free", help="fit in every row: delay,gain or delay,gain,lag")
+    reality.add_argument("--json", type=Path, help="write the numbers of the rows to this file")
     given = parser.parse_args()
-    chosen = [case for case in cases() if given.case in case.name]
-    columns = [c for c in COLUMNS if given.method in f"{c.method.name} {c.name}"]
-    runs, covering, repetitions = given.runs, given.coverage_runs, 11
-    if given.quick:
-        runs, covering, repetitions, chosen = 1, 2, 1, chosen[4:5] + chosen[-3:]
     # Each worker simulates its own runs; threads of NumPy's libraries would compete with them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+    if given.reality:
+        runs = given.runs or (2 if given.quick else 1000)
+        try:
+            conditions = chosen(given.rows.split(",") if given.rows else [])
+            free = free_of(given.free) if given.free else None
+        except ValueError as error:
+            parser.error(str(error))
+        print_table(conditions, runs, free, given.processes, given.json)
+        return
+    compare_methods(given)
+
+
+def compare_methods(given: argparse.Namespace) -> None:
+    """Print the tables of all methods."""
+    picked = [case for case in cases() if given.case in case.name]
+    columns = [c for c in COLUMNS if given.method in f"{c.method.name} {c.name}"]
+    runs = 200 if given.runs is None else given.runs
+    covering, repetitions = given.coverage_runs, 11
+    if given.quick:
+        runs, covering, repetitions, picked = 1, 2, 1, picked[4:5] + picked[-3:]
+    with ProcessPoolExecutor(given.processes, get_context("spawn")) as pool:
         begin = time.perf_counter()
         if runs:
-            errors_of_methods(pool, chosen, columns, runs)
+            errors_of_methods(pool, picked, columns, runs)
             print(f"{runs} runs a cell, {time.perf_counter() - begin:.0f} s")
         if not given.case:
             error_of_the_map()

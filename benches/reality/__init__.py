@@ -1,0 +1,5 @@
+"""Delay estimation on recordings with the disturbances, faults and clocks of real flights.
+
+`conditions` lists what is measured, `generator` makes the recordings, `bound` computes their
+Cramér-Rao bound, and `table` estimates and prints. Only `table` uses `deadtime`.
+"""
