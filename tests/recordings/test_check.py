@@ -176,6 +176,24 @@ def test_another_unit_of_time_is_refused_by_name(factor, unit, loop):
     assert f"sample_time is in {unit}" in codes["time_unit"].message
 
 
+def test_a_slow_log_or_controller_is_not_another_unit_of_time():
+    # One row a second of a slow loop that is sampled every millisecond.
+    time = np.arange(200.0)
+    reference = np.where(time < 20.0, 0.0, 1.0)
+    slow = KNOWN.replace(Kp=0.05, sample_time=None, delay=2.0)
+    run = slow.simulate(time, reference, reference_time=time)
+    flight = dtm.Recording(time, reference, run.outputs, run.inputs)
+    assert found(flight, slow.replace(sample_time=1e-3))[1].keys() == {"lower_rate"}
+    # A thousand rows for each sample of a slow controller.
+    slow = slow.replace(sample_time=1.0)
+    time = np.arange(60_000) * 1e-3
+    reference = np.where(time < 20.0, 0.0, 1.0)
+    run = slow.simulate(time, reference, reference_time=time)
+    flight = dtm.Recording(time, reference, run.outputs, run.inputs)
+    _, codes = found(flight, slow)
+    assert codes["other_rate"].severity == "note"
+
+
 def test_another_unit_of_time_is_seen_from_the_gains():
     loop = KNOWN.replace(sample_time=None)
     assert "time_unit" in found(changed(FLOWN, time=1e3 * FLOWN.time), loop)[1]

@@ -15,6 +15,9 @@ from deadtime.recordings._findings import Columns, Finding, Severity, seconds
 #: Units of time that are mistaken for seconds, by their number in a second.
 UNITS = {1e3: "milliseconds", 1e6: "microseconds"}
 
+#: A recording of more than so many samples may be that of a slow controller.
+SAMPLES = 20.0
+
 #: Largest relative difference of two clocks, and those above which it is a warning or refused.
 CLOCKS, CLOCK_WARNING, CLOCK_REFUSED = 0.05, 1e-3, 5e-3
 
@@ -60,7 +63,7 @@ def clock_findings(
     if loop.sample_time is None:
         yield from _without_sample_time(columns, rows, loop, clock)
         return
-    unit = _unit(rows.mean_time, loop.sample_time)
+    unit = _unit(columns, rows.mean_time, loop, loop.sample_time)
     if unit is not None:
         yield unit
     elif clock.rate_ratio is None or clock.clock_ratio is None:
@@ -69,14 +72,30 @@ def clock_findings(
         yield from _near_samples(rows, loop.sample_time, clock.rate_ratio, clock.clock_ratio)
 
 
-def _unit(row_time: float, sample_time: float) -> Finding | None:
-    """A factor of 1000 or a million between rows and sample time."""
+def _own_time(loop: ControlLoop) -> float | None:
+    """Time in which a loop without its delay follows its reference, s, if it is known."""
+    if isinstance(loop.controller, P) and isinstance(loop.plant, Integrator):
+        return 1.0 / abs(loop.controller.Kp * loop.plant.gain)
+    return None
+
+
+def _unit(
+    columns: Columns, row_time: float, loop: ControlLoop, sample_time: float
+) -> Finding | None:
+    """A factor of 1000 or a million between rows and sample time.
+
+    It may also be that of a slow log of a fast controller, or of a fast log of a slow one, where
+    the loop is slow enough for these rows, or the recording long enough for these samples.
+    """
+    own = _own_time(loop)
+    slow_log = own is not None and row_time < own
+    slow_controller = columns.time[-1] - columns.time[0] > SAMPLES * sample_time
     apart = (
         f"the rows are {row_time:g} apart in the unit of the time stamps, and sample_time is "
         f"{sample_time:g} s"
     )
     for factor, unit in UNITS.items():
-        if 0.45 < row_time / sample_time / factor < 2.2:
+        if not slow_log and 0.45 < row_time / sample_time / factor < 2.2:
             return Finding(
                 "time_unit",
                 "refused",
@@ -84,7 +103,7 @@ def _unit(row_time: float, sample_time: float) -> Finding | None:
                 f"{factor:.0f}",
                 f"delays would come out {factor:.0f} times too long, and gains as much too small",
             )
-        if 0.45 < row_time / sample_time * factor < 2.2:
+        if not slow_controller and 0.45 < row_time / sample_time * factor < 2.2:
             return Finding(
                 "time_unit",
                 "refused",
@@ -180,8 +199,8 @@ def _other_spacing(
 def _without_sample_time(
     columns: Columns, rows: Rows, loop: ControlLoop, clock: Clock
 ) -> Iterator[Finding]:
-    if isinstance(loop.controller, P) and isinstance(loop.plant, Integrator):
-        own = 1.0 / abs(loop.controller.Kp * loop.plant.gain)
+    own = _own_time(loop)
+    if own is not None:
         span = float(columns.time[-1] - columns.time[0])
         if rows.row_time > COARSE * own or span < BRIEF * own:
             yield Finding(

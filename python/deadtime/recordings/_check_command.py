@@ -200,8 +200,8 @@ def command_findings(
             "note",
             "the command is that of the controller but for small differences: the controller saw "
             "another output than the recorded one, or noise was added to the recording",
-            "none on a fit to the logged command; a fit of the loop takes the noise as not fed "
-            "back",
+            "none on a fit to the logged command; for a fit of the loop the noise is that of the "
+            "recording: Waveform(noise='recording')",
         )
     elif command.law == "differs" and _is_relay(columns.command):
         yield Finding(
