@@ -1,5 +1,7 @@
 """``deadtime estimate``: every method by name, its options, several files, and what is refused."""
 
+import json
+
 import deadtime as dtm
 import numpy as np
 import pytest
@@ -103,6 +105,44 @@ def test_two_real_flights_together():
     )
     assert out["delay"] == pytest.approx(0.424, abs=0.006)
     assert out["gain"] == pytest.approx(0.734, abs=0.005)
+
+
+def test_a_check_prints_what_it_finds_and_fails_where_it_refuses(files):
+    flown = ["estimate", files["quick"], "--kp", 2, "--check", *LOGGED]
+    clean = run(*flown, *FLOWN)
+    assert clean.returncode == 0
+    assert clean.stdout.startswith("quick.csv: 124 rows 65 ms apart, none missing")
+    assert "warning" not in clean.stdout
+    assert found(*flown, *FLOWN)["recordings"][0]["law"] == "exact"
+    refused = run(*flown, "--sample-time", 65, "--limit", 1)
+    assert refused.returncode == 1
+    assert "• refused: the rows are 0.065 apart" in refused.stdout
+    assert refused.stderr == ""
+    told = json.loads(run(*flown, "--sample-time", 65, "--json").stdout)
+    assert told["refused"] is True
+    assert told["recordings"][0]["findings"][0]["code"] == "time_unit"
+
+
+def test_a_check_of_several_files_is_one_of_each(files):
+    both = ["estimate", files["quick"], files["slow"], *LOGGED, *FLOWN, "--check"]
+    told = found(*both, "--kp", 2, "--kp", 0.6)
+    assert [one["law"] for one in told["recordings"]] == ["exact", "exact"]
+    told = found(*both, "--kp", 2)  # one gain for all
+    assert [one["law"] for one in told["recordings"]] == ["exact", "differs"]
+    assert "slow.csv: 124 rows" in run(*both, "--kp", 2).stdout
+
+
+def test_warnings_stand_above_the_estimates(files):
+    unlimited = ["estimate", files["quick"], "--kp", 2, "--sample-time", 0.065, *LOGGED]
+    for method, rest in (("output_error", "output_error: least squares"), ("all", "method")):
+        printed = run(*unlimited, "--method", method)
+        assert printed.returncode == 0
+        assert printed.stdout.startswith("quick.csv, warning: the command stops at 1")
+        assert rest in printed.stdout
+        (finding,) = found(*unlimited, "--method", method)["findings"]
+        assert (finding["code"], finding["severity"]) == ("limit_seen", "warning")
+        assert found(*unlimited, "--limit", 1, "--method", method)["findings"] == []
+    assert "warning" not in run(*unlimited, "--limit", 1, "--method", "output_error").stdout
 
 
 @pytest.mark.parametrize(

@@ -106,8 +106,8 @@ ABORTS = {
     "tilted": lambda state: replace(state, roll=math.radians(16.0)),
     "pitch is no number": lambda state: replace(state, pitch=math.nan),
     "battery is at 19 %": lambda state: replace(state, battery=19.0),
-    "reports that its ultrasound is deaf": lambda state: replace(
-        state, fault="its ultrasound is deaf"
+    "reports that its ultrasound receives no echo": lambda state: replace(
+        state, fault="its ultrasound receives no echo"
     ),
     "s old, more than 0.3 s": lambda state: None,
     "messages in a row were lost": lambda state: replace(state, missing=21),

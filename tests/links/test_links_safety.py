@@ -84,7 +84,7 @@ def test_the_largest_gain_is_half_of_that_of_instability():
 
 BROKEN = {
     "emergency": ({"emergency": True}, {}),
-    "deaf": ({"fault": "its ultrasound is deaf"}, {}),
+    "receives no echo": ({"fault": "its ultrasound receives no echo"}, {}),
     "0.31 s old": ({}, {"now": 10.31}),
     "nan s old": ({}, {"now": math.nan}),
     "21 messages": ({"missing": 21}, {}),

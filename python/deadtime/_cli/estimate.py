@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import cycle
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
+from deadtime._cli.checks import grave_findings, print_grave_findings, show_checks
 from deadtime._cli.comparisons import estimates_table
 from deadtime._cli.show import print_json, print_points, print_table, print_text, save_figure
 from deadtime.estimation import Comparison, Method, compare_methods, estimate_delay
@@ -60,6 +62,14 @@ def command(
             help="True output at the start, if known; for output_error, waveform, grid, cta."
         ),
     ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check",
+            help="Estimate nothing: print what a check of the files finds. The exit code is 1 if "
+            "it refuses one.",
+        ),
+    ] = False,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
@@ -80,8 +90,15 @@ def command(
         read_recording(file, time=time, reference=reference, output=output, command=command)
         for file in files
     ]
+    checks = [
+        flight.check(loop, window) for flight, loop in zip(flights, cycle(loops), strict=False)
+    ]
+    if check:
+        show_checks(files, checks, as_json)
+        raise typer.Exit(1 if any(one.refused for one in checks) else 0)
+    findings = grave_findings(files, checks)
     if name == "all":
-        _show_all(compare_methods(flights[0], loops[0], window), plot, as_json)
+        _show_all(compare_methods(flights[0], loops[0], window), findings, plot, as_json)
         return
     fit = estimate_delay(
         flights,
@@ -95,8 +112,9 @@ def command(
         plot_estimate(fit, estimate_axes(fit, figure))
         save_figure(figure, plot)
     if as_json:
-        print_json(fit.to_dict())
+        print_json(fit.to_dict() | {"findings": findings})
     else:
+        print_grave_findings(findings)
         print_text(fit.summary(), wrapped=False)
 
 
@@ -126,7 +144,9 @@ def _with_options(name: str, options: dict[str, Any]) -> Method:
     return METHODS[name](**options)
 
 
-def _show_all(comparison: Comparison, plot: Path | None, as_json: bool) -> None:
+def _show_all(
+    comparison: Comparison, findings: list[dict[str, Any]], plot: Path | None, as_json: bool
+) -> None:
     if plot is not None:
         figure, axes = new_figure(7.5, 4.0)
         plot_fits(axes, comparison.best.recording, comparison.pictured())
@@ -137,9 +157,11 @@ def _show_all(comparison: Comparison, plot: Path | None, as_json: bool) -> None:
                 "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
                 "refusals": comparison.refusals,
                 "explanation": comparison.explanation(),
+                "findings": findings,
             }
         )
         return
+    print_grave_findings(findings)
     print_table(estimates_table(comparison))
     print_text("in brackets: taken as given; sum: delay and lag", "dim")
     print_points(comparison.explanation())

@@ -1,6 +1,9 @@
-"""Recordings of control loops, and their readers, one file for each format."""
+"""Recordings of control loops, their checks, and their readers, one file for each format."""
 
+from deadtime.recordings._check import RecordingCheck
+from deadtime.recordings._check_rows import Hole
 from deadtime.recordings._csv import read_recording
+from deadtime.recordings._findings import Finding
 from deadtime.recordings._recording import Recording, Step
 
-__all__ = ["Recording", "Step", "read_recording"]
+__all__ = ["Finding", "Hole", "Recording", "RecordingCheck", "Step", "read_recording"]

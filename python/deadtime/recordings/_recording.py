@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
-from deadtime._base.validation import unmasked
+from deadtime._base.validation import OpenRange, open_interval, unmasked
+
+if TYPE_CHECKING:
+    from deadtime.loops import ControlLoop
+    from deadtime.recordings._check import RecordingCheck
 
 #: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
 #: them.
@@ -166,6 +170,62 @@ class Recording(ReadOnlyArrays):
                 f"{self.time[-1]:g} s"
             )
         return slice(first, last)
+
+    def check(self, loop: ControlLoop, window: OpenRange | None = None) -> RecordingCheck:
+        """Check the recording against the loop that made it, before anything is fitted.
+
+        Parameters
+        ----------
+        loop : ControlLoop
+            What is known of the loop: plant, controller, sample time and limit.
+        window : (low, high), optional
+            The part to check, s; None leaves an end open.
+
+        Returns
+        -------
+        RecordingCheck
+            The findings, each with what it would do to an estimate of the delay, and the facts
+            that a fit needs.
+
+        Raises
+        ------
+        RecordingError
+            When fewer than 8 samples lie in the window.
+        TypeError
+            If `loop` is no `ControlLoop`.
+
+        Notes
+        -----
+        Checked are: the time between rows against the sample time and its unit; missing and
+        repeated rows; jitter; whether the command is that of a P controller on these rows, or one
+        row earlier or later, in another unit, or of another sign; whether its limit is seen;
+        whether anything excites the loop.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), delay=0.3, sample_time=0.065)
+        >>> flight = dtm.Experiment.step(8.0).run(loop, noise=0.005)
+        >>> in_ms = dtm.Recording(1e3 * flight.time, flight.reference, flight.output)
+        >>> check = in_ms.check(loop)
+        >>> check.refused, check.findings[0].code
+        (True, 'time_unit')
+        >>> print(check.findings[0].effect)
+        delays would come out 1000 times too long, and gains as much too small
+        """
+        from deadtime.loops import ControlLoop
+        from deadtime.recordings._check import check_columns
+        from deadtime.recordings._findings import Columns
+
+        if not isinstance(loop, ControlLoop):
+            raise TypeError(f"loop must be a ControlLoop, got {type(loop).__name__}")
+        open_interval("window", window)
+        low, high = (None, None) if window is None else window
+        rows = self.rows(low, high)
+        command = None if self.command is None else self.command[rows]
+        columns = Columns(self.time[rows], self.reference[rows], self.output[rows], command)
+        return check_columns(columns, loop, in_motion=rows.start > 0)
 
     def steps(self) -> list[Step]:
         """Every change of the reference, in order of time."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,8 +9,8 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.loops import ControlLoop, Integrator
-from deadtime.recordings import Recording
-from deadtime.recordings._recording import MINIMUM_SAMPLES
+from deadtime.recordings import Finding, Recording
+from deadtime.recordings._check_excitation import copied_setpoint, no_excitation, no_motion
 
 Array = NDArray[np.float64]
 
@@ -33,10 +32,6 @@ F_TEST_LEVEL = 1e-4
 #: Largest unexplained share of the variance at which residuals count as independent samples in that
 #: test. Above it, autocorrelation reduces the number of samples.
 MOSTLY_EXPLAINED = 0.5
-
-#: A constant reference excites the loop if it differs from the initial output by at least so many
-#: standard deviations of the noise.
-AWAY = 5.0
 
 #: A fitted gain below so many standard errors is indistinguishable from zero.
 LEAST_GAIN = 3.0
@@ -110,14 +105,13 @@ def excited(recording: Recording) -> float:
 
 def check_setpoint_active(recording: Recording) -> None:
     """Refuse a reference that equals the output, as loggers write it while a mode is inactive."""
-    moving = np.flatnonzero(np.diff(recording.output)) + 1
-    copied = int(np.sum(recording.reference[moving] == recording.output[moving]))
-    if moving.size >= MINIMUM_SAMPLES and copied > 0.5 * moving.size:
-        raise NotIdentifiableError(
-            f"the reference equals the output in {copied} of the {moving.size} rows in which the "
-            "output moves: the setpoint is inactive there, or one column was read twice; choose a "
-            "window in which the controller follows a setpoint of its own"
-        )
+    _refuse(copied_setpoint(recording.reference, recording.output))
+
+
+def _refuse(finding: Finding | None) -> None:
+    """Raise what a check of the recording found, if anything."""
+    if finding is not None:
+        raise NotIdentifiableError(finding.message)
 
 
 def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: float) -> None:
@@ -173,16 +167,7 @@ def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
 
 def check_moves(output: Array, command: Array | None = None) -> None:
     """Refuse a constant command, and a constant output."""
-    if command is not None and float(np.ptp(command)) == 0.0:
-        raise NotIdentifiableError(
-            f"the command is {command[0]:g} throughout the window: it does not excite the vehicle; "
-            "choose a window in which the command changes"
-        )
-    if float(np.ptp(output)) == 0.0:
-        raise NotIdentifiableError(
-            f"the output is {output[0]:g} throughout the window: the vehicle did not move; choose "
-            "another window, and check the column"
-        )
+    _refuse(no_motion(output, command))
 
 
 def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) -> None:
@@ -191,15 +176,8 @@ def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) 
     A window with rows before it (`in_motion`) has to contain a step; a whole recording may begin
     with one.
     """
+    _refuse(no_excitation(data.reference, data.output, in_motion=in_motion))
     steps = data.steps()
-    noise = float(np.median(np.abs(np.diff(data.output)))) / 0.6745 / math.sqrt(2.0)
-    away = abs(float(data.reference[0] - data.output[0]))
-    at_rest = away <= max(AWAY * noise, ROUNDING * float(np.ptp(data.output)))
-    if not steps and (in_motion or at_rest):
-        raise NotIdentifiableError(
-            f"the reference is {data.reference[0]:g} throughout the window: it does not excite the "
-            "loop; choose a window with a step"
-        )
     left = len(data) - (steps[0].index if steps else 0)
     if left < 2 * (numbers + 1):
         raise NotIdentifiableError(

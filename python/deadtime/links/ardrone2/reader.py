@@ -36,7 +36,7 @@ TAKING_OFF, CLIMBING, LANDING = 6, 7, 8
 
 #: Bits of the drone's state that end a flight, in the words of `VehicleState.fault`.
 FAULTS = {
-    State.ULTRASOUND_DEAF: "its ultrasound is deaf",
+    State.ULTRASOUND_DEAF: "its ultrasound receives no echo",
     State.MOTORS_PROBLEM: "a motor does not turn as it should",
     State.CUTOUT: "its motors have been stopped",
     State.ANGLES_OUT_OF_RANGE: "it is tilted too far",

@@ -1,0 +1,232 @@
+"""The clock of the rows against the sample time of the controller, and the unit of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from deadtime.loops import ControlLoop, Integrator, P
+from deadtime.recordings._check_command import Command
+from deadtime.recordings._check_rows import Rows
+from deadtime.recordings._findings import Columns, Finding, Severity, seconds
+
+#: Units of time that are mistaken for seconds, by their number in a second.
+UNITS = {1e3: "milliseconds", 1e6: "microseconds"}
+
+#: A recording of more than so many samples may be that of a slow controller.
+SAMPLES = 20.0
+
+#: Largest relative difference of two clocks, and those above which it is a warning or refused.
+CLOCKS, CLOCK_WARNING, CLOCK_REFUSED = 0.05, 1e-3, 5e-3
+
+#: Share of changes of the command that may come sooner than a sample time after the last one.
+HASTE = 0.2
+
+#: A continuous loop whose rows are so many times 1/(Kp gain) apart shows no response between them,
+#: and one that lasts less than this many of them has none.
+COARSE, BRIEF = 20.0, 0.02
+
+#: Sign changes of the second differences of an output, as a share, above which it holds noise from
+#: sample to sample: 0.73 for white noise, next to none for a smooth curve.
+ROUGH = 0.5
+
+
+class Clock(NamedTuple):
+    """Rows against samples: whole samples a row, ratio of the clocks, a sample time not told."""
+
+    rate_ratio: int | None = None
+    clock_ratio: float | None = None
+    sample_time_seen: float | None = None
+
+
+def read_clock(columns: Columns, rows: Rows, command: Command, loop: ControlLoop) -> Clock:
+    """Compare the time between rows with the sample time."""
+    if loop.sample_time is None:
+        on_rows = command.law in ("exact", "late", "early") and rows.stamps != "jittered"
+        return Clock(sample_time_seen=rows.mean_time if on_rows else None)
+    ratio = rows.mean_time / loop.sample_time
+    whole = max(1, round(ratio))
+    error = 3.0 * rows.jitter / rows.row_time / np.sqrt(columns.time.size)
+    relative = ratio / whole
+    if abs(relative - 1.0) > CLOCKS + error:
+        return Clock()
+    beyond_rounding = abs(relative - 1.0) > max(CLOCK_WARNING, error)
+    return Clock(whole, relative if beyond_rounding else 1.0)
+
+
+def clock_findings(
+    columns: Columns, rows: Rows, command: Command, loop: ControlLoop, clock: Clock
+) -> Iterator[Finding]:
+    """What the clock of the rows does to an estimate."""
+    if loop.sample_time is None:
+        yield from _without_sample_time(columns, rows, loop, clock)
+        return
+    unit = _unit(columns, rows.mean_time, loop, loop.sample_time)
+    if unit is not None:
+        yield unit
+    elif clock.rate_ratio is None or clock.clock_ratio is None:
+        yield from _other_spacing(columns, rows, command, loop.sample_time)
+    else:
+        yield from _near_samples(rows, loop.sample_time, clock.rate_ratio, clock.clock_ratio)
+
+
+def _own_time(loop: ControlLoop) -> float | None:
+    """Time in which a loop without its delay follows its reference, s, if it is known."""
+    if isinstance(loop.controller, P) and isinstance(loop.plant, Integrator):
+        return 1.0 / abs(loop.controller.Kp * loop.plant.gain)
+    return None
+
+
+def _unit(
+    columns: Columns, row_time: float, loop: ControlLoop, sample_time: float
+) -> Finding | None:
+    """A factor of 1000 or a million between rows and sample time.
+
+    It may also be that of a slow log of a fast controller, or of a fast log of a slow one, where
+    the loop is slow enough for these rows, or the recording long enough for these samples.
+    """
+    own = _own_time(loop)
+    slow_log = own is not None and row_time < own
+    slow_controller = columns.time[-1] - columns.time[0] > SAMPLES * sample_time
+    apart = (
+        f"the rows are {row_time:g} apart in the unit of the time stamps, and sample_time is "
+        f"{sample_time:g} s"
+    )
+    for factor, unit in UNITS.items():
+        if not slow_log and 0.45 < row_time / sample_time / factor < 2.2:
+            return Finding(
+                "time_unit",
+                "refused",
+                f"{apart}, a factor of {factor:.0f}: the time stamps are {unit}; divide them by "
+                f"{factor:.0f}",
+                f"delays would come out {factor:.0f} times too long, and gains as much too small",
+            )
+        if not slow_controller and 0.45 < row_time / sample_time * factor < 2.2:
+            return Finding(
+                "time_unit",
+                "refused",
+                f"{apart}, a factor of {factor:.0f}: sample_time is in {unit}, or the time stamps "
+                f"were divided by {factor:.0f} too much; give both in seconds",
+                f"delays would come out up to {factor:.0f} times too short",
+            )
+    return None
+
+
+def _near_samples(rows: Rows, sample_time: float, whole: int, ratio: float) -> Iterator[Finding]:
+    if ratio != 1.0:
+        off = abs(ratio - 1.0)
+        severity: Severity = "refused" if off > CLOCK_REFUSED else "warning"
+        yield Finding(
+            "two_clocks",
+            severity,
+            f"the rows are {seconds(rows.mean_time)} apart, {100.0 * off:.2g} % "
+            f"{'more' if ratio > 1.0 else 'less'} than "
+            + ("the sample_time" if whole == 1 else f"{whole} times the sample_time")
+            + f" of {seconds(sample_time)}: if the time stamps are right, give sample_time="
+            f"{rows.mean_time / whole:.6g}; if the controller is, scale the time stamps",
+            f"with the wrong one of two clocks, gain and delay are {100.0 * off:.2g} % off",
+        )
+    if whole > 1:
+        late = 0.5 * (whole - 1) * sample_time
+        yield Finding(
+            "lower_rate",
+            "warning",
+            f"the recording holds one row for {whole} samples of the controller, which are "
+            f"{seconds(sample_time)} apart: "
+            + ("every other command is" if whole == 2 else f"{whole - 1} of {whole} commands are")
+            + " missing; log at the rate of the controller",
+            "if each command is held until the next row, the delay comes out up to "
+            f"{seconds(late)} too short",
+        )
+
+
+def _other_spacing(
+    columns: Columns, rows: Rows, command: Command, sample_time: float
+) -> Iterator[Finding]:
+    """Rows that are neither at the samples nor at every so many of them."""
+    apart = (
+        f"the rows are {seconds(rows.mean_time)} apart and sample_time is {seconds(sample_time)}"
+    )
+    shift = f"the delay is uncertain by up to half a sample time, {seconds(0.5 * sample_time)}"
+    if command.law in ("exact", "late", "early"):
+        yield Finding(
+            "sample_time",
+            "refused",
+            f"{apart}, but the command is computed anew on each row: give sample_time="
+            f"{rows.mean_time:.6g}",
+            "a wrong hold is attributed to the delay: half the difference of the two, "
+            f"{seconds(0.5 * abs(rows.mean_time - sample_time))}",
+        )
+    elif rows.mean_time > sample_time:
+        yield Finding(
+            "other_rate",
+            "warning",
+            f"{apart}, so the rows are not the samples of the controller: commands between them "
+            "are missing; log at its rate",
+            f"{shift} and by half a row, {seconds(0.5 * rows.mean_time)}",
+        )
+    elif columns.command is None:
+        yield Finding(
+            "other_rate",
+            "warning",
+            f"{apart}, so the rows are not the samples of the controller, and without the command "
+            "their times are unknown; log the command",
+            shift,
+        )
+    else:
+        changes = columns.time[1:][np.diff(columns.command) != 0.0]
+        soon = np.mean(np.diff(changes) < 0.75 * sample_time) if changes.size > 1 else 0.0
+        if soon > HASTE:
+            yield Finding(
+                "sample_time",
+                "refused",
+                f"{apart}, but {100.0 * soon:.0f} % of the changes of the command come sooner than "
+                "that after the last one: check sample_time, or leave it out",
+                f"a hold that is not there counts as {seconds(0.5 * sample_time)} of delay",
+            )
+        else:
+            yield Finding(
+                "other_rate",
+                "note",
+                f"{apart}, and the command holds over several rows: the controller samples where "
+                "it changes",
+                "none, if a fit takes the commands from where they change",
+            )
+
+
+def _without_sample_time(
+    columns: Columns, rows: Rows, loop: ControlLoop, clock: Clock
+) -> Iterator[Finding]:
+    own = _own_time(loop)
+    if own is not None:
+        span = float(columns.time[-1] - columns.time[0])
+        if rows.row_time > COARSE * own or span < BRIEF * own:
+            yield Finding(
+                "time_unit",
+                "warning",
+                f"the rows are {rows.row_time:g} s apart and last {span:g} s, and a loop with "
+                f"these gains takes about {own:.3g} s: check that the time stamps are seconds",
+                "a delay comes out wrong by the same factor as the times",
+            )
+            return
+    if clock.sample_time_seen is not None:
+        held = _is_rough(columns)
+        yield Finding(
+            "sample_time_seen",
+            "warning" if held else "note",
+            f"the command is that of the controller on rows {seconds(clock.sample_time_seen)} "
+            "apart: "
+            + ("the rows are its samples" if held else "the rows may be its samples")
+            + f"; give sample_time={clock.sample_time_seen:.6g}",
+            "a hold that is left out adds up to half a row, "
+            f"{seconds(0.5 * clock.sample_time_seen)}, to the delay",
+        )
+
+
+def _is_rough(columns: Columns) -> bool:
+    """Whether the output holds noise from row to row, which a continuous loop cannot follow."""
+    bends = np.diff(columns.output, 2)
+    bends = bends[np.abs(bends) > 1e-9 * np.ptp(columns.output)]
+    return bool(bends.size > 8 and np.mean(bends[1:] * bends[:-1] < 0.0) > ROUGH)
