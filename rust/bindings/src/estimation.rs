@@ -49,7 +49,6 @@ impl RecordedRows<'_> {
 pub(crate) struct RowNoise {
     air_time: f64,
     air: f64,
-    behind: bool,
     sensor_time: f64,
     sensor: f64,
 }
@@ -57,19 +56,18 @@ pub(crate) struct RowNoise {
 #[pymethods]
 impl RowNoise {
     #[new]
-    #[pyo3(signature = (air_time=1.0, air=0.0, behind=false, sensor_time=1.0, sensor=0.0))]
-    fn new(air_time: f64, air: f64, behind: bool, sensor_time: f64, sensor: f64) -> Self {
+    #[pyo3(signature = (air_time=1.0, air=0.0, sensor_time=1.0, sensor=0.0))]
+    fn new(air_time: f64, air: f64, sensor_time: f64, sensor: f64) -> Self {
         Self {
             air_time,
             air,
-            behind,
             sensor_time,
             sensor,
         }
     }
 
-    fn __getnewargs__(&self) -> (f64, f64, bool, f64, f64) {
-        (self.air_time, self.air, self.behind, self.sensor_time, self.sensor)
+    fn __getnewargs__(&self) -> (f64, f64, f64, f64) {
+        (self.air_time, self.air, self.sensor_time, self.sensor)
     }
 }
 
@@ -124,7 +122,6 @@ impl PlantNumbers {
         let noise = self.noise.iter().map(|one| Noise {
             air_time: one.air_time,
             air: one.air,
-            behind: one.behind,
             sensor_time: one.sensor_time,
             sensor: one.sensor,
         });
@@ -144,7 +141,6 @@ impl PlantNumbers {
         let noise = fit.point.noise.iter().map(|one| RowNoise {
             air_time: one.air_time,
             air: one.air,
-            behind: one.behind,
             sensor_time: one.sensor_time,
             sensor: one.sensor,
         });
@@ -244,12 +240,18 @@ impl FlightLikelihood {
     }
 
     /// The maximum from a starting point.
-    fn fit(&self, py: Python<'_>, start: &PlantNumbers) -> PyResult<PlantNumbers> {
+    #[pyo3(signature = (start, tolerance=1e-6))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        start: &PlantNumbers,
+        tolerance: f64,
+    ) -> PyResult<PlantNumbers> {
         let mut start = start.fit().point;
         if !self.model.free.delay {
             start.timing = Timing::Delay(start.delay());
         }
-        let found = run_here(py, |task| self.model.fit(&start, None, task))?;
+        let found = run_here(py, |task| self.model.fit(&start, None, tolerance, task))?;
         Ok(PlantNumbers::from_fit(&found))
     }
 

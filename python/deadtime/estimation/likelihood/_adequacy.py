@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from deadtime._deadtime import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._search import NoiseFit
+from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
 
 Array = NDArray[np.float64]
 
@@ -126,7 +126,7 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
             moved = PlantNumbers(
                 max(one.delay - lag * between, 0.0), [*one.lags, lag * between], noise, fit.gain
             )
-            best = min(best, likelihood.fit(moved), key=lambda found: found.objective)
+            best = min(best, likelihood.fit(moved, ROUGH), key=lambda found: found.objective)
     ratio = max(0.0, without.objective - best.objective)
     return best, 0.5 * float(special.chdtrc(1, ratio)) if ratio > 0.0 else 1.0
 

@@ -31,7 +31,7 @@ LEAST_CURVATURE = 0.25
 LEAST_FREEDOM = 4.0
 
 #: The numbers of the noise of one recording.
-PARTS = ("air_time", "air", "behind", "sensor_time", "sensor")
+PARTS = ("air_time", "air", "sensor_time", "sensor")
 
 #: A held fit that is lower than the best by this much is another, better minimum.
 BETTER = 0.02

@@ -39,11 +39,14 @@ STRONG_INPUT, WEAK_INPUT = 3.0, 0.3
 #: Local minima of the grid that are refined, for each noise.
 REFINED = 2
 
+#: Accuracy of −2 ln L where fits are compared.
+ROUGH = 0.02
+
 #: Start of the coloured sensor noise: white deviations, and rows.
 SENSOR, SENSOR_TIME = 1.0, 2.0
 
-#: Price of a number of the noise (Akaike 1974); that of the air counts as one, because none at all
-#: is at its bound. Trim is dearer: on a calm flight it would cost accuracy.
+#: Price of a number of the coloured sensor noise (Akaike 1974), and of the trim, which would cost
+#: accuracy on a calm flight. Air has none: no air is the lower bound of its deviation.
 PRICE, PRICE_OF_TRIM = 2.0, 4.0
 
 
@@ -143,8 +146,7 @@ class NoiseFit:
         for rows, part, noise in zip(self.runs, self.parts, self.numbers.noise, strict=True):
             count = int(np.sum(rows.used))
             total += count * np.log(part.variance * part.freedom / count) + part.log_det
-            total += PRICE * ((noise.air > 0.0) + 2 * (noise.sensor > 0.0))
-            total += PRICE_OF_TRIM * self.trim
+            total += 2.0 * PRICE * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
         return float(total)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -174,22 +176,16 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
     starts = _grid(model, runs, first, (quiet, strong))
     for trim in (False, True) if model.integrates else (False,):
         likelihood = model.likelihood(runs, trim)
-        calm = likelihood.fit(with_noise(first, quiet))
-        for start in starts[0]:
-            calm = min(calm, likelihood.fit(start), key=_objective)
-        found.append(NoiseFit(model, runs, trim, calm))
-        airy = [with_noise(calm, weak), *starts[1]]
-        for behind in (False, True) if any(model.free_lags) or any(model.lags) else (False,):
-            tried = [likelihood.fit(_entering(start, behind)) for start in airy]
-            found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
+        calm = min(
+            (likelihood.fit(one, ROUGH) for one in (with_noise(first, quiet), *starts[0])),
+            key=_objective,
+        )
+        airy = (with_noise(calm, weak), *starts[1])
+        tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
+        found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
-    return min([best, *_with_sensor(best)], key=_criterion)
-
-
-def _entering(numbers: PlantNumbers, behind: bool) -> PlantNumbers:
-    """The same with air that enters behind the lags, or before."""
-    noise = [RowNoise(one.air_time, one.air, behind) for one in numbers.noise]
-    return with_noise(numbers, noise)
+    best = min([best, *_with_sensor(best)], key=_criterion)
+    return best.moved(best.likelihood.fit(best.numbers))
 
 
 def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
@@ -200,7 +196,6 @@ def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
             RowNoise(
                 one.air_time,
                 one.air if keeps_air else 0.0,
-                one.behind,
                 SENSOR_TIME * float(np.median(np.diff(rows.time))),
                 SENSOR,
             )
@@ -208,7 +203,7 @@ def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
         ]
         if keeps_air and not any(one.air > 0.0 for one in best.numbers.noise):
             continue
-        found.append(best.moved(best.likelihood.fit(with_noise(best.numbers, noise))))
+        found.append(best.moved(best.likelihood.fit(with_noise(best.numbers, noise), ROUGH)))
     return found
 
 

@@ -11,8 +11,6 @@ use crate::Error;
 pub enum Entry {
     /// At the input of the plant, as moving air does.
     Input,
-    /// Behind the lags of the plant, as air does that moves the vehicle itself.
-    BehindLags,
     /// At the measurement.
     Output,
 }
@@ -63,7 +61,6 @@ impl Joint {
             let variance = one.deviation * one.deviation;
             let (drive, direct) = match one.entry {
                 Entry::Input => (Some(&plant.b), plant.d),
-                Entry::BehindLags => (Some(&plant.behind), plant.behind_direct),
                 Entry::Output => (None, 1.0),
             };
             for (row, b) in a.chunks_exact_mut(n).zip(drive.into_iter().flatten()) {

@@ -23,9 +23,6 @@ const TIME_STEP: f64 = 2e-3;
 const LOG_STEP: f64 = 0.02;
 const GAIN_STEP: f64 = 1e-4;
 
-/// Decrease below which a search ends.
-const TOLERANCE: f64 = 1e-6;
-
 /// Rise of the objective by a row of negative delay.
 const PENALTY: f64 = 1e4;
 
@@ -192,10 +189,18 @@ impl Model {
 
     /// The maximum of the likelihood from a starting point, with one quantity held if given.
     ///
+    /// The search ends where a step promises less than `tolerance` of −2 ln L.
+    ///
     /// # Errors
     ///
     /// As for `at`.
-    pub fn fit(&self, start: &Point, held: Option<Quantity>, task: &Task) -> Result<Fit, Error> {
+    pub fn fit(
+        &self,
+        start: &Point,
+        held: Option<Quantity>,
+        tolerance: f64,
+        task: &Task,
+    ) -> Result<Fit, Error> {
         let row_time = self.row_time();
         let slots = self.slots(start, held);
         let variables: Vec<Variable> = slots
@@ -209,7 +214,7 @@ impl Model {
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
         let mut kept: Vec<Option<(Point, f64)>> = vec![None; self.runs.len()];
-        let found = minimise(&variables, TOLERANCE, |z| {
+        let found = minimise(&variables, tolerance, |z| {
             for (slot, value) in slots.iter().zip(z) {
                 put(&mut trial, *slot, *value);
             }
@@ -329,7 +334,6 @@ impl Model {
 const QUIET: Noise = Noise {
     air_time: 1.0,
     air: 0.0,
-    behind: false,
     sensor_time: 1.0,
     sensor: 0.0,
 };

@@ -114,8 +114,6 @@ pub struct Noise {
     pub air_time: f64,
     /// Standard deviation of the air, at the input of the plant.
     pub air: f64,
-    /// Does the air enter behind the lags of the plant?
-    pub behind: bool,
     /// Time constant of the coloured sensor noise, s.
     pub sensor_time: f64,
     /// Its standard deviation.
@@ -124,13 +122,8 @@ pub struct Noise {
 
 impl Noise {
     fn disturbances(&self) -> Vec<Disturbance> {
-        let air = if self.behind {
-            Entry::BehindLags
-        } else {
-            Entry::Input
-        };
         [
-            (air, self.air_time, self.air),
+            (Entry::Input, self.air_time, self.air),
             (Entry::Output, self.sensor_time, self.sensor),
         ]
         .into_iter()

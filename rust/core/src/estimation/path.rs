@@ -83,6 +83,17 @@ pub(super) fn respond(
     }
 }
 
+/// Sums that a dot product is split into, so that they are computed side by side.
+const SUMS: usize = 8;
+
 pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
+    let mut sums = [0.0; SUMS];
+    let (left, right) = (x.chunks_exact(SUMS), y.chunks_exact(SUMS));
+    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in left.zip(right) {
+        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *sum += x * y;
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }

@@ -16,10 +16,6 @@ pub struct PlantSpace {
     pub c: Vec<f64>,
     /// Direct part.
     pub d: f64,
-    /// As B, for an input behind the lags.
-    pub behind: Vec<f64>,
-    /// The direct part of such an input.
-    pub behind_direct: f64,
 }
 
 /// The given part of a plant, of unit gain: num(s)/den(s), proper.
@@ -101,17 +97,11 @@ impl Plant {
             }
             c[count + i] += self.num[i] - last * self.den[i];
         }
-        let mut behind = vec![0.0; n];
-        if order > 0 {
-            behind[n - 1] = 1.0;
-        }
         PlantSpace {
             a,
             b,
             c,
             d: last * direct,
-            behind,
-            behind_direct: last,
         }
     }
 }

@@ -22,6 +22,9 @@ const FARTHEST: f64 = 64.0;
 /// Accuracy of an end, as a share of the half width.
 const TOLERANCE: f64 = 2e-3;
 
+/// Accuracy of −2 ln L where a quantity is held.
+const RISE_TOLERANCE: f64 = 1e-3;
+
 /// Most refinements of an end.
 const REFINEMENTS: usize = 12;
 
@@ -86,7 +89,7 @@ impl Model {
         value: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
-        self.fit(&quantity.held(&near.point, value, self), Some(quantity), task)
+        self.fit(&quantity.held(&near.point, value, self), Some(quantity), RISE_TOLERANCE, task)
     }
 
     /// The end of the interval of a quantity: where −2 ln L has risen by `rise`.

@@ -23,14 +23,6 @@ pub(super) struct Propagation {
 }
 
 impl Propagation {
-    /// Not a step: no states.
-    pub(super) fn none() -> Self {
-        Self {
-            phi: Vec::new(),
-            q: Vec::new(),
-        }
-    }
-
     /// For A (n × n, row-major), the intensity G Gᵀ of the noise, and a step `h` above zero.
     pub(super) fn new(a: &[f64], noise: &[f64], h: f64) -> Self {
         let n = side(a);

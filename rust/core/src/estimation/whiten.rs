@@ -57,6 +57,9 @@ pub fn whiten(
     Ok(Whitened { columns, log_det })
 }
 
+/// Columns that are whitened together.
+const LANES: usize = 8;
+
 /// Whiten the columns in place; rows that are not `used` become zero. Returns ln det V.
 pub(super) fn whiten_in_place(
     time: &[f64],
@@ -65,19 +68,57 @@ pub(super) fn whiten_in_place(
     joint: &Joint,
     task: &Task,
 ) -> Result<f64, Error> {
-    let rows = time.len();
-    let n = joint.c.len();
-    let mut states = vec![0.0; n * (columns.len() / rows)];
-    let mut p = joint.start.clone();
     let mut log_det = 0.0;
-    let mut gain = vec![0.0; n];
-    let mut pc = vec![0.0; n];
-    let mut moved = vec![0.0; n];
+    for group in columns.chunks_mut(LANES * time.len()) {
+        log_det = match joint.c.len() {
+            1 => pass::<1>(time, used, group, joint, task)?,
+            2 => pass::<2>(time, used, group, joint, task)?,
+            3 => pass::<3>(time, used, group, joint, task)?,
+            4 => pass::<4>(time, used, group, joint, task)?,
+            5 => pass::<5>(time, used, group, joint, task)?,
+            6 => pass::<6>(time, used, group, joint, task)?,
+            7 => pass::<7>(time, used, group, joint, task)?,
+            8 => pass::<8>(time, used, group, joint, task)?,
+            n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
+        };
+    }
+    Ok(log_det)
+}
+
+type Square<const N: usize> = [[f64; N]; N];
+
+fn square<const N: usize>(flat: &[f64]) -> Square<N> {
+    std::array::from_fn(|i| std::array::from_fn(|j| flat[i * N + j]))
+}
+
+/// Φ P Φᵀ + Q.
+fn predicted<const N: usize>(phi: &Square<N>, p: &Square<N>, q: &Square<N>) -> Square<N> {
+    let left: Square<N> = std::array::from_fn(|i| {
+        std::array::from_fn(|j| (0..N).map(|k| phi[i][k] * p[k][j]).sum())
+    });
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| q[i][j] + (0..N).map(|k| left[i][k] * phi[j][k]).sum::<f64>())
+    })
+}
+
+/// One pass over up to `LANES` columns with N states.
+fn pass<const N: usize>(
+    time: &[f64],
+    used: &[bool],
+    columns: &mut [f64],
+    joint: &Joint,
+    task: &Task,
+) -> Result<f64, Error> {
+    let rows = time.len();
+    let count = columns.len() / rows;
+    let c: [f64; N] = std::array::from_fn(|i| joint.c[i]);
+    let mut states = [[0.0; LANES]; N];
+    let mut p = square::<N>(&joint.start);
+    let (mut phi, mut q) = ([[0.0; N]; N], [[0.0; N]; N]);
+    let mut gain = [0.0; N];
     let (mut step, mut steady) = (f64::NAN, false);
-    let mut propagation = Propagation::none();
     let mut variance = f64::INFINITY;
-    let mut factor = 0.0;
-    let mut log_variance = 0.0;
+    let (mut factor, mut log_variance, mut log_det) = (0.0, 0.0, 0.0);
     for row in 0..rows {
         if row % CHECKED == CHECKED - 1 {
             task.check()?;
@@ -85,51 +126,60 @@ pub(super) fn whiten_in_place(
         if row > 0 {
             let between = time[row] - time[row - 1];
             if !((between - step).abs() <= SAME * time[row].abs() + SAME_STEP * between) {
-                propagation = Propagation::new(&joint.a, &joint.noise, between);
+                let made = Propagation::new(&joint.a, &joint.noise, between);
+                (phi, q) = (square(&made.phi), square(&made.q));
                 (step, steady) = (between, false);
             }
             if !steady {
-                p = propagation.moved(&p);
-                for (p, q) in p.iter_mut().zip(&propagation.q) {
-                    *p += q;
+                p = predicted(&phi, &p, &q);
+            }
+            let mut moved = [[0.0; LANES]; N];
+            for (moved, phi) in moved.iter_mut().zip(&phi) {
+                for (phi, state) in phi.iter().zip(&states) {
+                    for (moved, state) in moved.iter_mut().zip(state) {
+                        *moved += phi * state;
+                    }
                 }
             }
-            for state in states.chunks_exact_mut(n.max(1)) {
-                for (moved, phi) in moved.iter_mut().zip(propagation.phi.chunks_exact(n)) {
-                    *moved = dot(phi, state);
-                }
-                state.copy_from_slice(&moved);
-            }
+            states = moved;
         }
         if !used[row] {
             steady = false;
-            columns.iter_mut().skip(row).step_by(rows).for_each(|entry| *entry = 0.0);
+            for column in 0..count {
+                columns[column * rows + row] = 0.0;
+            }
             continue;
         }
         if !steady {
-            for (pc, p) in pc.iter_mut().zip(p.chunks_exact(n.max(1))) {
-                *pc = dot(p, &joint.c);
-            }
-            let now = 1.0 + dot(&pc, &joint.c);
+            let pc: [f64; N] = std::array::from_fn(|i| dot(&p[i], &c));
+            let now = 1.0 + dot(&pc, &c);
             steady = (now - variance).abs() <= CONVERGED * now;
             variance = now;
             (factor, log_variance) = (1.0 / now.sqrt(), now.ln());
-            for (gain, pc) in gain.iter_mut().zip(&pc) {
-                *gain = pc / now;
-            }
-            for (p, left) in p.chunks_exact_mut(n.max(1)).zip(&pc) {
+            gain = pc.map(|pc| pc / now);
+            for (p, left) in p.iter_mut().zip(&pc) {
                 for (p, right) in p.iter_mut().zip(&gain) {
                     *p -= left * right;
                 }
             }
         }
         log_det += log_variance;
-        for (state, column) in states.chunks_exact_mut(n.max(1)).zip(columns.chunks_exact_mut(rows)) {
-            let innovation = column[row] - dot(&joint.c, state);
-            for (state, gain) in state.iter_mut().zip(&gain) {
+        let mut innovation = [0.0; LANES];
+        for (column, innovation) in innovation.iter_mut().enumerate().take(count) {
+            *innovation = columns[column * rows + row];
+        }
+        for (c, state) in c.iter().zip(&states) {
+            for (innovation, state) in innovation.iter_mut().zip(state) {
+                *innovation -= c * state;
+            }
+        }
+        for (gain, state) in gain.iter().zip(&mut states) {
+            for (state, innovation) in state.iter_mut().zip(&innovation) {
                 *state += gain * innovation;
             }
-            column[row] = innovation * factor;
+        }
+        for (column, innovation) in innovation.iter().enumerate().take(count) {
+            columns[column * rows + row] = innovation * factor;
         }
     }
     Ok(log_det)
