@@ -79,8 +79,16 @@ def test_a_logged_command_is_used_and_compared(files, tmp_path):
     assert out["estimates"]["output_error"]["delay"] == pytest.approx(0.36, abs=0.005)
     assert "the fit to the logged command" in out["explanation"][0]
     assert picture.stat().st_size > 5000
+    gcc = out["differences"]["gcc"]
+    assert (gcc["rows"], gcc["interval"]) == (124, None)
+    assert "correlation" in gcc["limits"]
+    assert gcc["seconds"] == pytest.approx(
+        out["estimates"]["gcc"]["delay"] - out["estimates"]["output_error"]["delay"]
+    )
     assert "output_error" not in found(*step)["estimates"]
-    assert "output error" in run(*step, *LOGGED).stdout
+    printed = " ".join(run(*step, *LOGGED).stdout.split())
+    assert "output error" in printed
+    assert "Gcc, on 124 rows from 0 to 7.995 s: " in printed
 
 
 def test_the_decay_method_is_used_where_nothing_overshoots(files):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -222,6 +222,9 @@ def _show_all(
             {
                 "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
                 "refusals": comparison.refusals,
+                "differences": {
+                    name: asdict(one) for name, one in comparison.differences().items()
+                },
                 "explanation": comparison.explanation(),
                 "findings": findings,
             }
@@ -230,5 +233,9 @@ def _show_all(
     print_headline(comparison.best)
     print_grave_findings(findings)
     print_table(estimates_table(comparison))
-    print_text("in brackets: taken as given; sum: delay and lag", "dim")
-    print_points(comparison.explanation())
+    print_text(
+        f"in brackets: taken as given; sum: delay and lag; off: sum less that of "
+        f"{comparison.best.method}, in s and in its standard errors",
+        "dim",
+    )
+    print_points([*comparison.explanation(), *comparison.limitations()])
