@@ -140,7 +140,7 @@ def estimate_from_commands(
     ]
     fit = fitted_flight(names, fitted[0].loop, rows, first)
     doubts: tuple[str, ...] = ()
-    if any(one.commands.filled for one in models):
+    if any(one.commands.computed for one in models):
         fit, doubts = _with_predicted_commands(names, fit, models, runs)
     profile = profile_for(fit, names)
     longest = min(LONGEST * one.span for one in models)
@@ -182,7 +182,7 @@ def _with_predicted_commands(
         for _ in range(REFILLS):
             values = values_of(again, names, models[0].known)
             rows = [
-                one.refilled(run.recording, run.loop.replace(**values), step, kept)
+                one.refilled(run.recording, run.loop.replace(**values), step, kept, again.gain)
                 for one, run, kept in zip(models, runs, again.runs, strict=True)
             ]
             again = fitted_flight(
@@ -209,14 +209,24 @@ class _Model(ModelOfOne):
     commands: HeldCommands
 
     def refilled(
-        self, recording: Recording, loop: ControlLoop, step: int | None, rows: FlightRows
+        self,
+        recording: Recording,
+        loop: ControlLoop,
+        step: int | None,
+        rows: FlightRows,
+        gain: float,
     ) -> FlightRows:
         """The rows with the commands between them from the output that `loop` predicts."""
-        if not self.commands.filled:
+        if not self.commands.computed:
             return rows
         commands = predicted_commands(recording, loop, self.logged, self.commands, step)
         return rows._replace(
-            command_time=commands.time, command=commands.command, unknown=commands.unknown
+            command_time=commands.time,
+            command=commands.command,
+            unknown=commands.unknown,
+            uncertain=tuple(
+                (a, b, abs(gain) * slope) for a, b, slope in commands.computed if slope
+            ),
         )
 
     def rows(
