@@ -133,7 +133,7 @@ def with_missing(
             free = at[slopes > 0.0]
             if free.size:
                 computed.append((float(free[0]), ends[1], SHARED * float(slopes.max())))
-        if not known or (count >= HOLE and predicted is None):
+        if not known or count >= HOLE:
             ambiguous.append((count, ends))
     ambiguous.sort(key=lambda pair: -pair[0])
     most = max(1, int(MOST_UNKNOWN * time.size))
