@@ -134,7 +134,7 @@ def test_a_check_of_several_files_is_one_of_each(files):
 
 def test_warnings_stand_above_the_estimates(files):
     unlimited = ["estimate", files["quick"], "--kp", 2, "--sample-time", 0.065, *LOGGED]
-    for method, rest in (("output_error", "output_error: least squares"), ("all", "method")):
+    for method, rest in (("output_error", "output_error: maximum likelihood"), ("all", "method")):
         printed = run(*unlimited, "--method", method)
         assert printed.returncode == 0
         assert printed.stdout.startswith("quick.csv, warning: the command stops at 1")

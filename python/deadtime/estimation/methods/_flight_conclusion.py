@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun, FlightNoise
 from deadtime.estimation.data._checks import LEAST_GAIN
-from deadtime.estimation.likelihood._adequacy import Adequacy, adequacy_of
+from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -90,13 +90,11 @@ def concluded_flight(
     known: Mapping[str, float],
     message: str,
     details: Mapping[str, Any],
-    doubts: Sequence[str] = (),
+    adequacy: Adequacy,
 ) -> DelayEstimate:
-    """Make the estimate of a fit; it is not adequate where there are `doubts`."""
+    """Make the estimate of a fit."""
     fit = profile.fit
     values = values_of(fit, names, known)
-    adequacy = adequacy_of(profile, len(names))
-    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
     cov = common_covariance(fit)
     order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
     place = [order.index(name) for name in names]
@@ -168,6 +166,18 @@ def gain_is_certain(profile: LikelihoodProfile) -> bool:
     if "gain" not in profile.names:
         return False
     return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * profile.stderr["gain"]
+
+
+def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate:
+    """The estimate of least squares for a plant that lacks something.
+
+    The likelihood takes what the plant lacks for air, and weighs the rows that show it least. Least
+    squares weighs all alike, and finds the plant that comes closest to the recording.
+    """
+    reasons = [reason for reason in adequacy.reasons if reason not in plain.message]
+    return replace(
+        plain, adequate=False, message=f"{plain.message}; not adequate: {'; '.join(reasons)}"
+    )
 
 
 def _message(
