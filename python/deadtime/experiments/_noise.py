@@ -90,7 +90,7 @@ class FlightNoise:
     >>> calm = dtm.Experiment.step(7.8).run(loop, noise=0.005, seed=1)
     >>> windy = dtm.Experiment.step(7.8).run(loop, noise=gusts, seed=1)
     >>> [round(float(run.output[-60:].std()), 3) for run in (calm, windy)]
-    [0.007, 0.052]
+    [0.004, 0.04]
     """
 
     white: float = 0.0

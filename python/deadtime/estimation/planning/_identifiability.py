@@ -305,6 +305,14 @@ def identifiability(
     ...     print({name: round(1e3 * plan.stderr[name], 1) for name in ("delay", "delay+lag")})
     {'delay': 18.3, 'delay+lag': 2.8}
     {'delay': 4.2, 'delay+lag': 1.1}
+
+    Gusts of 0.1 m/s that last a second make both worse:
+
+    >>> from deadtime.experiments import FlightNoise
+    >>> wind = FlightNoise(white=0.01, air=0.1, air_time=1.0)
+    >>> plan = dtm.identifiability(loop, experiment, noise=wind, initial_output=0.0)
+    >>> {name: round(1e3 * plan.stderr[name], 1) for name in ("delay", "delay+lag")}
+    {'delay': 7.2, 'delay+lag': 3.1}
     """
     if not isinstance(loop, ControlLoop):
         raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
