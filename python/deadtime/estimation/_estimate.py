@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import check_setpoint_active
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
@@ -14,7 +14,14 @@ from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
-from deadtime.estimation.methods._method import Loops, Method, Recordings, Windows, paired_runs
+from deadtime.estimation.methods._method import (
+    Loops,
+    Method,
+    Recordings,
+    Run,
+    Windows,
+    paired_runs,
+)
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
@@ -147,8 +154,7 @@ def estimate_delay(
     0.4
     """
     runs = paired_runs(recording, loop, window)
-    for run in runs:
-        check_setpoint_active(run.recording.window(*run.window))
+    runs = [_checked(run) for run in runs]
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:
         raise ValueError(
@@ -156,6 +162,23 @@ def estimate_delay(
             f"{' or '.join(map(repr, JOINT))}"
         )
     return chosen.estimate(runs, free)
+
+
+#: Findings that the methods refuse themselves, or that some of them can do without.
+OWN_REFUSALS = ("no_step", "command_constant", "output_constant")
+
+
+def _checked(run: Run) -> Run:
+    """The run with what a check finds; refused by name where no estimate would be right."""
+    check = run.recording.check(run.loop, run.window)
+    for finding in check.findings:
+        if finding.severity == "refused" and finding.code not in OWN_REFUSALS:
+            raise NotIdentifiableError(str(finding))
+    loop = run.loop
+    seen = next((one for one in check.findings if one.code == "sample_time_seen"), None)
+    if seen is not None and seen.severity == "warning":
+        loop = loop.replace(sample_time=check.sample_time_seen)
+    return run._replace(loop=loop, check=check)
 
 
 def automatic_method(recordings: Iterable[Recording]) -> str:

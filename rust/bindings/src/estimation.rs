@@ -22,6 +22,7 @@ struct RecordedRows<'py> {
     command_time: Floats<'py>,
     command: Floats<'py>,
     unknown: Vec<(f64, f64)>,
+    uncertain: Vec<(f64, f64, f64)>,
     offset: bool,
     trim: bool,
 }
@@ -36,6 +37,7 @@ impl RecordedRows<'_> {
                 time: owned(&self.command_time)?,
                 value: owned(&self.command)?,
                 unknown: self.unknown.clone(),
+                uncertain: self.uncertain.clone(),
             },
             offset: self.offset,
             trim: self.trim,

@@ -58,7 +58,7 @@ class Adequacy:
     reasons: tuple[str, ...]
 
 
-def tested(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -> Adequacy:
+def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -> Adequacy:
     """Test a fit of so many `numbers`."""
     fit = profile.fit
     used = [rows.used for rows in fit.runs]

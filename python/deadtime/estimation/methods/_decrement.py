@@ -55,7 +55,7 @@ class Decrement(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window),) = runs
+        ((recording, loop, window, _),) = runs
         names = checked_names(free, loop)
         if "lag" in names:
             raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
-from deadtime.estimation.likelihood._adequacy import Adequacy, tested
+from deadtime.estimation.likelihood._adequacy import Adequacy, adequacy_of
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -22,6 +23,7 @@ from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
+from deadtime.loops import ControlLoop
 
 Array = NDArray[np.float64]
 
@@ -34,14 +36,13 @@ ROUNDS = 3
 
 def fitted_flight(
     names: tuple[str, ...],
-    runs: Sequence[Run],
+    loop: ControlLoop,
     rows: Sequence[FlightRows],
     first: Mapping[str, float],
-) -> LikelihoodProfile:
-    """The likeliest plant and noise, without outliers, and the profile of it."""
-    model = PlantModel.of(runs[0].loop.plant, names)
-    start = _start(model, first, rows)
-    fit = fit_noise(model, rows, start)
+) -> NoiseFit:
+    """The likeliest plant and noise, without outliers."""
+    model = PlantModel.of(loop.plant, names)
+    fit = fit_noise(model, rows, _start(model, first, rows))
     for _ in range(ROUNDS):
         found = [
             is_outlier(part.whitened, one.used)
@@ -54,8 +55,13 @@ def fitted_flight(
             for one, outliers in zip(fit.runs, found, strict=True)
         )
         fit = fit_noise(model, kept, fit.numbers)
+    return fit
+
+
+def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
+    """The profile over the names, and over the sum of delay and lag."""
     kernel = {"delay": "delay", "gain": "gain"}
-    kernel |= {name: f"lag {i}" for i, name in enumerate(model.lag_names)}
+    kernel |= {name: f"lag {i}" for i, name in enumerate(fit.model.lag_names)}
     wanted = {name: kernel[name] for name in names}
     if "delay" in names:
         slow = "time_constant" if "time_constant" in names else "lag"
@@ -85,11 +91,13 @@ def concluded_flight(
     known: Mapping[str, float],
     message: str,
     details: Mapping[str, Any],
+    doubts: Sequence[str] = (),
 ) -> DelayEstimate:
-    """Make the estimate of a fit."""
+    """Make the estimate of a fit; it is not adequate where there are `doubts`."""
     fit = profile.fit
-    values = _values(fit, names, known)
-    adequacy = tested(profile, len(names))
+    values = values_of(fit, names, known)
+    adequacy = adequacy_of(profile, len(names))
+    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
     cov = common_covariance(fit)
     order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
     place = [order.index(name) for name in names]
@@ -122,7 +130,9 @@ def concluded_flight(
     )
 
 
-def _values(fit: NoiseFit, names: tuple[str, ...], known: Mapping[str, float]) -> dict[str, float]:
+def values_of(
+    fit: NoiseFit, names: tuple[str, ...], known: Mapping[str, float]
+) -> dict[str, float]:
     """The fitted parameters of the loop; a lag at its lower bound is none."""
     numbers = fit.numbers
     least = NO_LAG * 1e-3 * float(np.median(np.diff(fit.runs[0].time)))

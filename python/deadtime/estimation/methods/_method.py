@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 from deadtime._base.validation import OpenRange, finite, is_range, open_interval
 from deadtime.estimation._result import DelayEstimate
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
+from deadtime.recordings import Recording, RecordingCheck
 
 #: One recording, or several of the same vehicle.
 Recordings: TypeAlias = Recording | Sequence[Recording]
@@ -23,11 +23,12 @@ Windows: TypeAlias = OpenRange | list[OpenRange | None] | None
 
 
 class Run(NamedTuple):
-    """One recording, the loop that made it, and the part to use."""
+    """One recording, the loop that made it, the part to use, and what was found there."""
 
     recording: Recording
     loop: ControlLoop
     window: OpenRange = (None, None)
+    check: RecordingCheck | None = None
 
 
 def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> list[Run]:

@@ -29,13 +29,13 @@ from deadtime.estimation.data._simulated import (
     moves_between_rows,
 )
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
-from deadtime.estimation.likelihood._rows import (
-    FlightRows,
+from deadtime.estimation.likelihood._missing import (
     HeldCommands,
-    repeated,
-    spikes,
+    predicted_commands,
     with_missing,
 )
+from deadtime.estimation.likelihood._rows import FlightRows, spikes
+from deadtime.estimation.likelihood._search import NoiseFit
 from deadtime.estimation.methods._conclusion import (
     check_fit,
     concluded,
@@ -46,13 +46,20 @@ from deadtime.estimation.methods._flight_conclusion import (
     concluded_flight,
     fitted_flight,
     gain_is_certain,
+    profile_for,
+    values_of,
 )
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.models._held import Path, path_of
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
+from deadtime.recordings import Recording, RecordingCheck
 
 Array = NDArray[np.float64]
+
+#: Rounds of predicting the commands between rows and fitting again, the most samples at which a
+#: reference may have changed that are tried, and by how much of Akaike's criterion one of them has
+#: to be the best.
+REFILLS, MOST_STEPS, CLEARLY = 2, 5, 6.0
 
 #: Longest delay of the search, as a share of the window.
 LONGEST = 0.6
@@ -128,10 +135,14 @@ def estimate_from_commands(
     first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
     pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
     rows = [
-        one.rows(initial_output, -piece / weight)
-        for one, piece, weight in zip(models, pieces, model.weights, strict=True)
+        one.rows(initial_output, -piece / weight, run.check)
+        for one, piece, weight, run in zip(models, pieces, model.weights, runs, strict=True)
     ]
-    profile = fitted_flight(names, fitted, rows, first)
+    fit = fitted_flight(names, fitted[0].loop, rows, first)
+    doubts: tuple[str, ...] = ()
+    if any(one.commands.computed for one in models):
+        fit, doubts = _with_predicted_commands(names, fit, models, runs)
+    profile = profile_for(fit, names)
     longest = min(LONGEST * one.span for one in models)
     if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
@@ -144,8 +155,47 @@ def estimate_from_commands(
         initial_output if initial_output is not None else profile.initial_output
     )
     return concluded_flight(
-        method, names, fitted, profile, models[0].known, f"maximum likelihood {message}", details
+        method,
+        names,
+        fitted,
+        profile,
+        models[0].known,
+        f"maximum likelihood {message}",
+        details,
+        doubts,
     )
+
+
+def _with_predicted_commands(
+    names: tuple[str, ...], fit: NoiseFit, models: Sequence[_Model], runs: Sequence[Run]
+) -> tuple[NoiseFit, tuple[str, ...]]:
+    """The fit with the commands between rows that its plant predicts, and doubts about them.
+
+    Where the reference changes between rows that are further apart than samples, each sample at
+    which it may have changed is tried.
+    """
+    steps = [one.commands.steps for one in models]
+    unclear = max(steps) > 1 and sum(step > 1 for step in steps) == 1
+    tried: list[NoiseFit] = []
+    for step in range(max(steps)) if unclear and max(steps) <= MOST_STEPS else (None,):
+        again = fit
+        for _ in range(REFILLS):
+            values = values_of(again, names, models[0].known)
+            rows = [
+                one.refilled(run.recording, run.loop.replace(**values), step, kept, again.gain)
+                for one, run, kept in zip(models, runs, again.runs, strict=True)
+            ]
+            again = fitted_flight(
+                names, runs[0].loop, rows, {**models[0].known, **values, "gain": again.gain}
+            )
+        tried.append(again)
+    tried.sort(key=lambda one: one.criterion)
+    if len(tried) > 1 and tried[1].criterion - tried[0].criterion < CLEARLY:
+        return tried[0], (
+            "the reference changes between rows that are further apart than samples, and the "
+            "recording does not tell when",
+        )
+    return tried[0], ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +205,37 @@ class _Model(ModelOfOne):
     path: Path
     known: Mapping[str, float]
     source: str
+    logged: Array
     commands: HeldCommands
 
-    def rows(self, initial_output: float | None, residuals: Array) -> FlightRows:
-        """The rows for the likelihood, without those that `residuals` show to be of no use."""
-        useless = spikes(residuals) | repeated(self.recording.output, residuals)
+    def refilled(
+        self,
+        recording: Recording,
+        loop: ControlLoop,
+        step: int | None,
+        rows: FlightRows,
+        gain: float,
+    ) -> FlightRows:
+        """The rows with the commands between them from the output that `loop` predicts."""
+        if not self.commands.computed:
+            return rows
+        commands = predicted_commands(recording, loop, self.logged, self.commands, step)
+        return rows._replace(
+            command_time=commands.time,
+            command=commands.command,
+            unknown=commands.unknown,
+            uncertain=tuple(
+                (a, b, abs(gain) * slope) for a, b, slope in commands.computed if slope
+            ),
+        )
+
+    def rows(
+        self, initial_output: float | None, residuals: Array, check: RecordingCheck | None
+    ) -> FlightRows:
+        """The rows for the likelihood, without outliers and repeated rows."""
+        useless = spikes(residuals)
+        if check is not None:
+            useless[check.repeated] = True
         return FlightRows(
             time=self.recording.time,
             output=self.recording.output - (initial_output or 0.0),
@@ -266,7 +342,7 @@ def _model(
     run: Run, names: tuple[str, ...], initial_output: float | None, computed: bool
 ) -> _Model:
     """Commands up to the end of the window, including those before its start where known."""
-    recording, loop, window = run
+    recording, loop, window, _ = run
     rows = recording.rows(*window)
     data = recording.window(*window)
     command, source = _commands(recording, loop, computed)
@@ -281,6 +357,7 @@ def _model(
     return _Model(
         recording=data,
         path=path_of(loop.plant, commands.time, commands.command),
+        logged=command,
         commands=commands,
         names=names,
         known={"delay": 0.0, "gain": 1.0, **loop.parameters},

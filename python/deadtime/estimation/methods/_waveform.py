@@ -224,7 +224,7 @@ class _Model(SimulatedModel):
 
 
 def _model(run: Run, names: tuple[str, ...], offset: float | None = None) -> _Model:
-    simulated = SimulatedRecording(*run)
+    simulated = SimulatedRecording(*run[:3])
     in_motion = simulated.recording.time[0] > run.recording.time[0]
     check_excitation(simulated.recording, len(names), in_motion=in_motion)
     return _Model(simulated.recording, names, offset, simulated)

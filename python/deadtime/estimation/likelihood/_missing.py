@@ -1,0 +1,212 @@
+"""Commands between rows that are further apart than the samples of the controller.
+
+A sampled controller sends a command at each of its samples, logged or not. Where rows are further
+apart than its samples, the commands between them are those of the controller, computed from the
+reference and a straight line between the outputs, if that controller is known and its law holds
+on the rows; else the mean of the commands before and after. Where the reference changes between
+two such rows, or many rows are missing, the mean command between them is an unknown of a first fit.
+With its plant, the output in between is predicted, and the commands are computed from that; each
+time at which the reference may have changed is tried.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.estimation.models._held import Path, path_of
+from deadtime.loops import ControlLoop, P
+from deadtime.recordings import Recording
+
+Array = NDArray[np.float64]
+
+#: Rows are that many samples apart, give or take this share of a sample.
+NEAR_WHOLE = 0.25
+
+#: Missing samples in a row from which their mean command is unknown.
+HOLE = 3
+
+#: Error of the output that is predicted in such a hole, in deviations of the white noise.
+SHARED = 2.0
+
+#: Lengths in rows over which neighbours are averaged, and the farthest neighbour.
+LENGTHS, REACH = (0.3, 0.7, 1.5, 3.0, 6.0), 20
+
+#: Most unknown commands, as a share of the rows; the longest gaps come first.
+MOST_UNKNOWN = 0.1
+
+#: A command is the controller's where the two differ by less than this share of its deviation.
+ALIKE = 0.2
+
+#: Change of the commands, as a share of their range, at which that has settled.
+SETTLED = 1e-6
+
+#: Rounds of predicting the output of a plant and computing the commands from it.
+ROUNDS = 6
+
+
+class HeldCommands(NamedTuple):
+    """Commands that hold from their times on.
+
+    Attributes
+    ----------
+    time, command : ndarray, shape (m,)
+    unknown : tuple of (float, float)
+        Times between which the mean command is unknown.
+    computed : tuple of (float, float, float)
+        Times between which a command was computed from an output, and its change by a unit of the
+        error of that output; zero at its limit.
+    steps : int
+        In how many ways the reference may have changed between rows.
+    """
+
+    time: Array
+    command: Array
+    unknown: tuple[tuple[float, float], ...] = ()
+    computed: tuple[tuple[float, float, float], ...] = ()
+    steps: int = 1
+
+
+#: The output of the plant at some times, for a better guess than a straight line between rows.
+Predicted: TypeAlias = Callable[[Array], Array]
+
+
+def with_missing(
+    recording: Recording,
+    loop: ControlLoop,
+    command: Array,
+    predicted: Predicted | None = None,
+    step: int | None = None,
+) -> HeldCommands:
+    """The commands of all samples of the controller, from those of the first rows.
+
+    Parameters
+    ----------
+    recording, loop
+    command : ndarray, shape (m,)
+        Commands of the first rows.
+    predicted : callable, optional
+        The output between rows; a straight line by default.
+    step : int, optional
+        After how many missing samples the reference changes, where it changes between rows that
+        are further apart than samples. If not given, the mean command there is unknown.
+    """
+    time = recording.time[: command.size]
+    plain = HeldCommands(time, command)
+    if loop.sample_time is None or time.size < 2:
+        return plain
+    apart = np.diff(time) / loop.sample_time
+    whole = np.rint(apart)
+    gaps = np.flatnonzero((whole > 1.0) & (np.abs(apart - whole) < NEAR_WHOLE * whole))
+    if not gaps.size:
+        return plain
+    law = _law(recording, loop, command)
+    times, commands, ambiguous, steps = [], [], [], 1
+    computed: list[tuple[float, float, float]] = []
+    for gap in gaps:
+        count = int(whole[gap]) - 1
+        share = np.arange(1, count + 1) / (count + 1)
+        at = time[gap] + share * (time[gap + 1] - time[gap])
+        before, after = recording.reference[gap], recording.reference[gap + 1]
+        ends = (float(at[0]), float(time[gap + 1]))
+        known = law is not None and (before == after or step is not None)
+        if law is None:
+            sent = np.full(count, 0.5 * (command[gap] + command[gap + 1]))
+        else:
+            reference = np.where(np.arange(count) < (step or 0), before, after)
+            outputs = recording.output[gap : gap + 2]
+            line = outputs[0] + share * (outputs[1] - outputs[0])
+            sent = law(reference, line if predicted is None else predicted(at))
+            if before != after:
+                steps = max(steps, count + 1)
+        times.append(at)
+        commands.append(sent)
+        until = np.append(at[1:], time[gap + 1])
+        slopes = _slopes(loop, sent)
+        computed += zip(at.tolist(), until.tolist(), slopes.tolist(), strict=True)
+        if count >= HOLE:
+            # The plant that predicts the output has errors too, which all these commands share.
+            free = at[slopes > 0.0]
+            if free.size:
+                computed.append((float(free[0]), ends[1], SHARED * float(slopes.max())))
+        if not known or count >= HOLE:
+            ambiguous.append((count, ends))
+    ambiguous.sort(key=lambda pair: -pair[0])
+    most = max(1, int(MOST_UNKNOWN * time.size))
+    unknown = tuple(sorted(ends for _, ends in ambiguous[:most]))
+    every = np.concatenate([time, *times])
+    order = np.argsort(every, kind="stable")
+    values = np.concatenate([command, *commands])
+    return HeldCommands(every[order], values[order], unknown, tuple(computed), steps)
+
+
+def _slopes(loop: ControlLoop, sent: Array) -> Array:
+    """Change of computed commands by a unit of the output: none at the limit."""
+    gain = abs(loop.controller.gains.get("Kp", 0.0))
+    limit = math.inf if loop.limit is None else loop.limit
+    return np.where(np.abs(sent) < limit, gain, 0.0)
+
+
+def smoothed(values: Array) -> Array:
+    """Weighted means of neighbours, over the length that predicts each value best from the rest."""
+    best, least = values, math.inf
+    offsets = np.arange(-REACH, REACH + 1)
+    inside = np.ones(values.size)
+    for length in LENGTHS:
+        weights = np.exp(-np.abs(offsets) / length)
+        weights[REACH] = 0.0
+        sums = np.convolve(values, weights, mode="same")[: values.size]
+        shares = np.convolve(inside, weights, mode="same")[: values.size]
+        error = float(np.median(np.abs(values - sums / shares)))
+        if error < least:
+            least, best = error, (sums + values) / (shares + 1.0)
+    return np.asarray(best)
+
+
+def _law(
+    recording: Recording, loop: ControlLoop, command: Array
+) -> Callable[[Array, Array], Array] | None:
+    """The command of a P controller, if the rows show that it is in charge."""
+    if not isinstance(loop.controller, P):
+        return None
+    Kp, limit = loop.controller.Kp, math.inf if loop.limit is None else loop.limit
+
+    def law(reference: Array, output: Array) -> Array:
+        return np.asarray(np.clip(Kp * (reference - output), -limit, limit))
+
+    computed = law(recording.reference[: command.size], recording.output[: command.size])
+    differs = float(np.std(computed - command)) > ALIKE * float(np.std(command))
+    return None if differs else law
+
+
+def predicted_commands(
+    recording: Recording, loop: ControlLoop, command: Array, first: HeldCommands, step: int | None
+) -> HeldCommands:
+    """Commands between rows from the output that `loop` predicts there, starting from `first`."""
+    commands = first
+    known = {"gain": 1.0, **loop.parameters}
+    rows = slice(0, command.size)
+    time, output = recording.time[rows], recording.output[rows]
+    for _ in range(ROUNDS):
+        path = path_of(loop.plant, commands.time, commands.command)
+
+        def modelled(times: Array, path: Path = path) -> Array:
+            return np.asarray(known["gain"] * path.value(times - known["delay"], known))
+
+        left = smoothed(output - modelled(time))
+
+        def predicted(
+            times: Array, left: Array = left, modelled: Predicted = modelled
+        ) -> Array:
+            return modelled(times) + np.interp(times, time, left)
+
+        again = with_missing(recording, loop, command, predicted, step)
+        moved = float(np.max(np.abs(again.command - commands.command)))
+        commands = again
+        if moved <= SETTLED * float(np.ptp(command)):
+            break
+    return commands
