@@ -330,6 +330,26 @@ def test_the_bound_in_wind_is_that_of_the_dense_matrices(name, lag):
     assert ("trim" in plan.bound.free) == bool(noise.trim or noise.air_walk)
 
 
+@pytest.mark.parametrize("name", ["walk", "all"])
+@pytest.mark.parametrize(
+    "plant",
+    [dtm.FirstOrder(1.4, 0.7), dtm.RationalPlant([0.3, 2.0], [1.0, 3.0, 0.0])],
+)
+def test_the_air_goes_through_any_plant(plant, name):
+    noise, _ = NOISES[name]
+    loop = dtm.ControlLoop(plant, dtm.P(1.2), delay=0.2, sample_time=0.05)
+    plan = dtm.identifiability(
+        loop, dtm.Experiment.square(6.0, 1.0, 1.1, sample_time=0.05), noise=noise
+    )
+    time = plan.recording.time
+    V = noise.process(plant).covariance(time) + covariances(noise, None, 0.0, time)[1]
+    columns = np.array(list(plan.bound.sensitivities.values()))
+    assert plan.bound.free == (*plan.free, "initial output", "trim")
+    expected = smallest_errors(columns, V, plan.free)
+    for key in plan.free:
+        assert plan.stderr[key] == pytest.approx(expected[key], rel=1e-3)
+
+
 @pytest.mark.parametrize(("lag", "limit"), [(0.0, None), (0.2, 1.0)])
 @pytest.mark.parametrize("name", NOISES)
 def test_the_bound_without_the_command_has_the_air_in_the_loop(name, lag, limit):
