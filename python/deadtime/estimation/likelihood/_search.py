@@ -30,8 +30,8 @@ GRID_STEP, GRID_GROWTH, GRID_ROWS = 1.0, 0.1, 5000
 LAGS = (0.5, 3.0, 8.0)
 
 #: Deviations of the air in the grid, and where it is added to a fit without: white deviations a
-#: row. Its time constant there, as a share of the window.
-STRONG_AIR, WEAK_AIR, AIR_TIME = 0.65, 0.02, 0.13
+#: row. Its time constant there, as a share of the window, and by how much slow air is slower.
+STRONG_AIR, WEAK_AIR, AIR_TIME, SLOW = 0.65, 0.02, 0.13, 10.0
 
 #: The same for plants that do not integrate, in white deviations.
 STRONG_INPUT, WEAK_INPUT = 3.0, 0.3
@@ -180,7 +180,8 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
             (likelihood.fit(one, ROUGH) for one in (with_noise(first, quiet), *starts[0])),
             key=_objective,
         )
-        airy = (with_noise(calm, weak), *starts[1])
+        slow = [RowNoise(SLOW * one.air_time, one.air) for one in weak]
+        airy = (with_noise(calm, weak), with_noise(calm, slow), *starts[1])
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)

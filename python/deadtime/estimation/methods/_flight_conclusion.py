@@ -65,7 +65,7 @@ def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
     wanted = {name: kernel[name] for name in names}
     if "delay" in names:
         slow = "time_constant" if "time_constant" in names else "lag"
-        wanted[f"delay+{slow}"] = "total" if slow in names else "delay"
+        wanted[f"delay+{slow}"] = "total"
     return profile_of(fit, wanted)
 
 
