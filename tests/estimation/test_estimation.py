@@ -286,7 +286,7 @@ def test_the_standard_error_is_the_cramer_rao_bound_when_residuals_are_white():
         initial_output=fit.details["initial_output"] + step,
     ).outputs
     columns.append((shifted - output()) / step)
-    information = np.array(columns) @ np.array(columns).T / fit.crb.noise**2
+    information = np.array(columns) @ np.array(columns).T / fit.crb.noise.white**2
     bound = np.sqrt(np.linalg.inv(information)[0, 0])
     assert fit.crb.stderr["delay"] == pytest.approx(bound, rel=1e-3)
 

@@ -122,7 +122,7 @@ def test_the_bound_of_a_pure_delay_is_the_closed_form():
     flight, known = record_step(noise=0.01, seed=3)
     fit = dtm.estimate_delay(flight, known, method=OutputError(initial_output=0.0), free=("delay",))
     arriving = HeldResponse(flight.time, flight.command).at(flight.time - fit.delay).rate
-    bound = fit.crb.noise / np.sqrt(np.sum(arriving**2))
+    bound = fit.crb.noise.white / np.sqrt(np.sum(arriving**2))
     assert fit.crb.stderr["delay"] == pytest.approx(bound, rel=1e-9)
     assert fit.crb.free == ("delay",)
 

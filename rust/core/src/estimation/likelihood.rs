@@ -316,6 +316,15 @@ pub(super) fn evaluate(
             found.gain = found.linear.first().copied().unwrap_or(0.0);
         }
         found.inverse = orthogonal.inverse();
+        // The derivatives above are those of a plant of unit gain.
+        let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
+        for (place, entry) in found.inverse.iter_mut().enumerate() {
+            for index in [place / count, place % count] {
+                if index >= first {
+                    *entry /= found.gain;
+                }
+            }
+        }
         if by.delay {
             let place = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
             found.score = x[place * n..(place + 1) * n].to_vec();
