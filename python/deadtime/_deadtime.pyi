@@ -454,6 +454,21 @@ class LoopSensitivities:
     outputs: Final[_Reals]
     inputs: Final[_Reals]
 
+class _Disturbance(Protocol):
+    @property
+    def at_input(self) -> bool: ...
+    @property
+    def time_constant(self) -> float: ...
+    @property
+    def deviation(self) -> float: ...
+
+def whitened_columns(
+    num: Sequence[float],
+    den: Sequence[float],
+    disturbances: Sequence[_Disturbance],
+    time: _Reals,
+    columns: _Reals,
+) -> _Reals: ...
 def loop_sensitivities(
     slopes: _LoopSlopes,
     run: _LoopRun,

@@ -1,7 +1,8 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Commands, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity, Rows, Timing,
+    Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity,
+    Rows, Timing, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -21,6 +22,7 @@ struct RecordedRows<'py> {
     command_time: Floats<'py>,
     command: Floats<'py>,
     unknown: Vec<(f64, f64)>,
+    uncertain: Vec<(f64, f64, f64)>,
     offset: bool,
     trim: bool,
 }
@@ -35,6 +37,7 @@ impl RecordedRows<'_> {
                 time: owned(&self.command_time)?,
                 value: owned(&self.command)?,
                 unknown: self.unknown.clone(),
+                uncertain: self.uncertain.clone(),
             },
             offset: self.offset,
             trim: self.trim,
@@ -306,4 +309,43 @@ fn read(quantity: &str) -> PyResult<Quantity> {
             None => return Err(PyValueError::new_err(format!("quantity {quantity:?}"))),
         },
     })
+}
+
+/// What moves the output besides the command, in deviations of the white noise.
+#[derive(FromPyObject)]
+pub(crate) struct GivenDisturbance {
+    at_input: bool,
+    time_constant: f64,
+    deviation: f64,
+}
+
+/// Columns, one after the other, whitened by the covariance of their rows: that of disturbances of
+/// the plant num/den, and of white noise of variance one.
+#[pyfunction]
+pub(crate) fn whitened_columns<'py>(
+    py: Python<'py>,
+    num: Vec<f64>,
+    den: Vec<f64>,
+    disturbances: Vec<GivenDisturbance>,
+    time: Floats<'py>,
+    columns: Floats<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let space = converted(Plant::new(&num, &den))?.space(&[], 0.0);
+    let disturbances: Vec<Disturbance> = disturbances
+        .iter()
+        .map(|one| Disturbance {
+            entry: if one.at_input {
+                Entry::Input
+            } else {
+                Entry::Output
+            },
+            time_constant: one.time_constant,
+            deviation: one.deviation,
+        })
+        .collect();
+    let (time, columns) = (owned(&time)?, owned(&columns)?);
+    let found = run_here(py, |task| {
+        whiten(&time, &columns, &space, &disturbances, task)
+    })?;
+    Ok(found.columns.into_pyarray(py))
 }

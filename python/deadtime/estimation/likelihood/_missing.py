@@ -18,7 +18,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.estimation.models._held import path_of
+from deadtime.estimation.models._held import Path, path_of
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 
@@ -29,6 +29,12 @@ NEAR_WHOLE = 0.25
 
 #: Missing samples in a row from which their mean command is unknown.
 HOLE = 3
+
+#: Error of the output that is predicted in such a hole, in deviations of the white noise.
+SHARED = 2.0
+
+#: Lengths in rows over which neighbours are averaged, and the farthest neighbour.
+LENGTHS, REACH = (0.3, 0.7, 1.5, 3.0, 6.0), 20
 
 #: Most unknown commands, as a share of the rows; the longest gaps come first.
 MOST_UNKNOWN = 0.1
@@ -51,8 +57,9 @@ class HeldCommands(NamedTuple):
     time, command : ndarray, shape (m,)
     unknown : tuple of (float, float)
         Times between which the mean command is unknown.
-    filled : int
-        Commands that were not in the log.
+    computed : tuple of (float, float, float)
+        Times between which a command was computed from an output, and its change by a unit of the
+        error of that output; zero at its limit.
     steps : int
         In how many ways the reference may have changed between rows.
     """
@@ -60,7 +67,7 @@ class HeldCommands(NamedTuple):
     time: Array
     command: Array
     unknown: tuple[tuple[float, float], ...] = ()
-    filled: int = 0
+    computed: tuple[tuple[float, float, float], ...] = ()
     steps: int = 1
 
 
@@ -99,6 +106,7 @@ def with_missing(
         return plain
     law = _law(recording, loop, command)
     times, commands, ambiguous, steps = [], [], [], 1
+    computed: list[tuple[float, float, float]] = []
     for gap in gaps:
         count = int(whole[gap]) - 1
         share = np.arange(1, count + 1) / (count + 1)
@@ -112,15 +120,20 @@ def with_missing(
             reference = np.where(np.arange(count) < (step or 0), before, after)
             outputs = recording.output[gap : gap + 2]
             line = outputs[0] + share * (outputs[1] - outputs[0])
-            if predicted is not None:
-                middle, both = predicted(at), predicted(time[gap : gap + 2])
-                line = line + middle - (both[0] + share * (both[1] - both[0]))
-            sent = law(reference, line)
+            sent = law(reference, line if predicted is None else predicted(at))
             if before != after:
                 steps = max(steps, count + 1)
         times.append(at)
         commands.append(sent)
-        if not known or (count >= HOLE and predicted is None):
+        until = np.append(at[1:], time[gap + 1])
+        slopes = _slopes(loop, sent)
+        computed += zip(at.tolist(), until.tolist(), slopes.tolist(), strict=True)
+        if count >= HOLE:
+            # The plant that predicts the output has errors too, which all these commands share.
+            free = at[slopes > 0.0]
+            if free.size:
+                computed.append((float(free[0]), ends[1], SHARED * float(slopes.max())))
+        if not known or count >= HOLE:
             ambiguous.append((count, ends))
     ambiguous.sort(key=lambda pair: -pair[0])
     most = max(1, int(MOST_UNKNOWN * time.size))
@@ -128,7 +141,30 @@ def with_missing(
     every = np.concatenate([time, *times])
     order = np.argsort(every, kind="stable")
     values = np.concatenate([command, *commands])
-    return HeldCommands(every[order], values[order], unknown, every.size - time.size, steps)
+    return HeldCommands(every[order], values[order], unknown, tuple(computed), steps)
+
+
+def _slopes(loop: ControlLoop, sent: Array) -> Array:
+    """Change of computed commands by a unit of the output: none at the limit."""
+    gain = abs(loop.controller.gains.get("Kp", 0.0))
+    limit = math.inf if loop.limit is None else loop.limit
+    return np.where(np.abs(sent) < limit, gain, 0.0)
+
+
+def smoothed(values: Array) -> Array:
+    """Weighted means of neighbours, over the length that predicts each value best from the rest."""
+    best, least = values, math.inf
+    offsets = np.arange(-REACH, REACH + 1)
+    inside = np.ones(values.size)
+    for length in LENGTHS:
+        weights = np.exp(-np.abs(offsets) / length)
+        weights[REACH] = 0.0
+        sums = np.convolve(values, weights, mode="same")[: values.size]
+        shares = np.convolve(inside, weights, mode="same")[: values.size]
+        error = float(np.median(np.abs(values - sums / shares)))
+        if error < least:
+            least, best = error, (sums + values) / (shares + 1.0)
+    return np.asarray(best)
 
 
 def _law(
@@ -151,13 +187,20 @@ def predicted_commands(
     recording: Recording, loop: ControlLoop, command: Array, first: HeldCommands, step: int | None
 ) -> HeldCommands:
     """Commands between rows from the output that `loop` predicts there, starting from `first`."""
-    commands, values = first, loop.parameters
+    commands = first
+    known = {"gain": 1.0, **loop.parameters}
+    rows = slice(0, command.size)
+    time, output = recording.time[rows], recording.output[rows]
     for _ in range(ROUNDS):
         path = path_of(loop.plant, commands.time, commands.command)
 
-        def predicted(times: Array) -> Array:
-            known = {"gain": 1.0, **values}
-            return np.asarray(known["gain"] * path.value(times - known["delay"], known))  # noqa: B023
+        def modelled(times: Array, path: Path = path) -> Array:
+            return np.asarray(known["gain"] * path.value(times - known["delay"], known))
+
+        left = smoothed(output - modelled(time))
+
+        def predicted(times: Array, left: Array = left, modelled: Predicted = modelled) -> Array:
+            return modelled(times) + np.interp(times, time, left)
 
         again = with_missing(recording, loop, command, predicted, step)
         moved = float(np.max(np.abs(again.command - commands.command)))

@@ -27,6 +27,7 @@ class FlightRows(NamedTuple):
     command: Array
     unknown: tuple[tuple[float, float], ...]
     offset: bool
+    uncertain: tuple[tuple[float, float, float], ...] = ()
     trim: bool = False
 
 

@@ -29,6 +29,7 @@ from deadtime.estimation.data._simulated import (
     moves_between_rows,
 )
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
+from deadtime.estimation.likelihood._adequacy import adequacy_of
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
     predicted_commands,
@@ -48,6 +49,7 @@ from deadtime.estimation.methods._flight_conclusion import (
     gain_is_certain,
     profile_for,
     values_of,
+    without_the_plant,
 )
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.models._held import Path, path_of
@@ -126,12 +128,20 @@ def estimate_from_commands(
         **({"noise": "loop"} if computed else {}),
     }
     fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
-    if is_exact(model, found, fitted):
+
+    def plain() -> DelayEstimate:
         start = found.point[len(names) :] if initial_output is None else [initial_output]
-        details["initial_output"] = float(start[0])
         return concluded(
-            method, model, found, fitted, message=f"least squares {message}", details=details
+            method,
+            model,
+            found,
+            fitted,
+            message=f"least squares {message}",
+            details={**details, "initial_output": float(start[0])},
         )
+
+    if is_exact(model, found, fitted):
+        return plain()
     first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
     pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
     rows = [
@@ -140,7 +150,7 @@ def estimate_from_commands(
     ]
     fit = fitted_flight(names, fitted[0].loop, rows, first)
     doubts: tuple[str, ...] = ()
-    if any(one.commands.filled for one in models):
+    if any(one.commands.computed for one in models):
         fit, doubts = _with_predicted_commands(names, fit, models, runs)
     profile = profile_for(fit, names)
     longest = min(LONGEST * one.span for one in models)
@@ -151,6 +161,10 @@ def estimate_from_commands(
         )
     if not gain_is_certain(profile):
         check_fit(model, found, fitted)
+    adequacy = adequacy_of(profile, len(names))
+    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
+    if adequacy.lacks_lag:
+        return without_the_plant(plain(), adequacy)
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
@@ -162,7 +176,7 @@ def estimate_from_commands(
         models[0].known,
         f"maximum likelihood {message}",
         details,
-        doubts,
+        adequacy,
     )
 
 
@@ -182,7 +196,7 @@ def _with_predicted_commands(
         for _ in range(REFILLS):
             values = values_of(again, names, models[0].known)
             rows = [
-                one.refilled(run.recording, run.loop.replace(**values), step, kept)
+                one.refilled(run.recording, run.loop.replace(**values), step, kept, again.gain)
                 for one, run, kept in zip(models, runs, again.runs, strict=True)
             ]
             again = fitted_flight(
@@ -209,14 +223,24 @@ class _Model(ModelOfOne):
     commands: HeldCommands
 
     def refilled(
-        self, recording: Recording, loop: ControlLoop, step: int | None, rows: FlightRows
+        self,
+        recording: Recording,
+        loop: ControlLoop,
+        step: int | None,
+        rows: FlightRows,
+        gain: float,
     ) -> FlightRows:
         """The rows with the commands between them from the output that `loop` predicts."""
-        if not self.commands.filled:
+        if not self.commands.computed:
             return rows
         commands = predicted_commands(recording, loop, self.logged, self.commands, step)
         return rows._replace(
-            command_time=commands.time, command=commands.command, unknown=commands.unknown
+            command_time=commands.time,
+            command=commands.command,
+            unknown=commands.unknown,
+            uncertain=tuple(
+                (a, b, abs(gain) * slope) for a, b, slope in commands.computed if slope
+            ),
         )
 
     def rows(

@@ -16,7 +16,8 @@ use super::disturbance::{Disturbance, Entry, Joint};
 use super::orthogonal::Orthogonal;
 use super::path::{Held, respond};
 use super::plant::{Plant, PlantSpace};
-use super::whiten::whiten_in_place;
+use super::whiten::{Kick, whiten_in_place};
+use crate::dde::propagator::Propagator;
 use crate::{Error, Task};
 
 /// Relative step of the difference quotient by a lag.
@@ -34,6 +35,9 @@ pub struct Commands {
     pub value: Vec<f64>,
     /// Times between which the command is unknown: a linear unknown for each.
     pub unknown: Vec<(f64, f64)>,
+    /// Times between which the command was computed, and its error: the standard deviation of the
+    /// response it causes, as a factor on that of a unit command, in white deviations.
+    pub uncertain: Vec<(f64, f64, f64)>,
 }
 
 /// The rows of one recording.
@@ -262,12 +266,14 @@ pub(super) fn evaluate(
         }
     }
     let disturbances = noise.disturbances();
+    let kicks = kicks(rows, &space, values.delay);
+    let is_white = disturbances.is_empty() && kicks.is_empty();
     let (mut log_det, mut raw_log_det) = (0.0, 0.0);
-    if !disturbances.is_empty() {
+    if !is_white {
         let mut copy = columns[..count * n].to_vec();
         raw_log_det = Orthogonal::new(&mut copy, n, count).log_det();
         let joint = Joint::new(&space, &disturbances)?;
-        log_det = whiten_in_place(&rows.time, &rows.used, &mut columns, &joint, task)?;
+        log_det = whiten_in_place(&rows.time, &rows.used, &mut columns, &joint, &kicks, task)?;
     }
     let (x, target) = columns.split_at_mut(count * n);
     let mut orthogonal = Orthogonal::new(&mut x[..linear * n], n, linear);
@@ -285,7 +291,7 @@ pub(super) fn evaluate(
     let freedom = used - count;
     let m = freedom as f64;
     let variance = (squares / m).max(f64::MIN_POSITIVE);
-    let log_gram = if disturbances.is_empty() {
+    let log_gram = if is_white {
         0.0
     } else {
         orthogonal.log_det() - raw_log_det
@@ -310,6 +316,15 @@ pub(super) fn evaluate(
             found.gain = found.linear.first().copied().unwrap_or(0.0);
         }
         found.inverse = orthogonal.inverse();
+        // The derivatives above are those of a plant of unit gain.
+        let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
+        for (place, entry) in found.inverse.iter_mut().enumerate() {
+            for index in [place / count, place % count] {
+                if index >= first {
+                    *entry /= found.gain;
+                }
+            }
+        }
         if by.delay {
             let place = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
             found.score = x[place * n..(place + 1) * n].to_vec();
@@ -324,6 +339,31 @@ pub(super) fn evaluate(
         found.rate = rate.iter().map(|rate| found.gain * rate).collect();
     }
     Ok(found)
+}
+
+/// What the errors of computed commands do to the states of the plant by the next row.
+fn kicks(rows: &Rows, space: &PlantSpace, delay: f64) -> Vec<Kick> {
+    let n = space.b.len();
+    if n == 0 {
+        return Vec::new();
+    }
+    let mut found = Vec::with_capacity(rows.commands.uncertain.len());
+    for (start, end, deviation) in &rows.commands.uncertain {
+        let arrival = end + delay;
+        let row = rows.time.partition_point(|time| *time < arrival);
+        let Some(time) = rows.time.get(row).filter(|_| row > 0) else {
+            continue;
+        };
+        let mut state = vec![0.0; n];
+        let mut moved = vec![0.0; n];
+        Propagator::new(&space.a, &[&space.b], end - start).apply(&state, &[*deviation], &mut moved);
+        if *time > arrival {
+            std::mem::swap(&mut state, &mut moved);
+            Propagator::new(&space.a, &[], time - arrival).apply(&state, &[], &mut moved);
+        }
+        found.push(Kick { row, state: moved });
+    }
+    found
 }
 
 /// The response to an input of one between two times, `delay` later.

@@ -53,8 +53,16 @@ pub fn whiten(
     let mut columns = crate::memory::copied("the whitened columns", columns)?;
     let joint = Joint::new(plant, disturbances)?;
     let used = vec![true; time.len()];
-    let log_det = whiten_in_place(time, &used, &mut columns, &joint, task)?;
+    let log_det = whiten_in_place(time, &used, &mut columns, &joint, &[], task)?;
     Ok(Whitened { columns, log_det })
+}
+
+/// A random change of the states of the plant just before a row.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Kick {
+    pub(super) row: usize,
+    /// Its standard deviation, state by state: one random number moves all.
+    pub(super) state: Vec<f64>,
 }
 
 /// Columns that are whitened together.
@@ -66,19 +74,20 @@ pub(super) fn whiten_in_place(
     used: &[bool],
     columns: &mut [f64],
     joint: &Joint,
+    kicks: &[Kick],
     task: &Task,
 ) -> Result<f64, Error> {
     let mut log_det = 0.0;
     for group in columns.chunks_mut(LANES * time.len()) {
         log_det = match joint.c.len() {
-            1 => pass::<1>(time, used, group, joint, task)?,
-            2 => pass::<2>(time, used, group, joint, task)?,
-            3 => pass::<3>(time, used, group, joint, task)?,
-            4 => pass::<4>(time, used, group, joint, task)?,
-            5 => pass::<5>(time, used, group, joint, task)?,
-            6 => pass::<6>(time, used, group, joint, task)?,
-            7 => pass::<7>(time, used, group, joint, task)?,
-            8 => pass::<8>(time, used, group, joint, task)?,
+            1 => pass::<1>(time, used, group, joint, kicks, task)?,
+            2 => pass::<2>(time, used, group, joint, kicks, task)?,
+            3 => pass::<3>(time, used, group, joint, kicks, task)?,
+            4 => pass::<4>(time, used, group, joint, kicks, task)?,
+            5 => pass::<5>(time, used, group, joint, kicks, task)?,
+            6 => pass::<6>(time, used, group, joint, kicks, task)?,
+            7 => pass::<7>(time, used, group, joint, kicks, task)?,
+            8 => pass::<8>(time, used, group, joint, kicks, task)?,
             n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
         };
     }
@@ -107,6 +116,7 @@ fn pass<const N: usize>(
     used: &[bool],
     columns: &mut [f64],
     joint: &Joint,
+    kicks: &[Kick],
     task: &Task,
 ) -> Result<f64, Error> {
     let rows = time.len();
@@ -119,6 +129,7 @@ fn pass<const N: usize>(
     let (mut step, mut steady) = (f64::NAN, false);
     let mut variance = f64::INFINITY;
     let (mut factor, mut log_variance, mut log_det) = (0.0, 0.0, 0.0);
+    let mut kicks = kicks.iter().peekable();
     for row in 0..rows {
         if row % CHECKED == CHECKED - 1 {
             task.check()?;
@@ -132,6 +143,17 @@ fn pass<const N: usize>(
             }
             if !steady {
                 p = predicted(&phi, &p, &q);
+            }
+            while let Some(kick) = kicks.next_if(|kick| kick.row <= row) {
+                if steady {
+                    p = predicted(&phi, &p, &q);
+                    steady = false;
+                }
+                for (p, left) in p.iter_mut().zip(&kick.state) {
+                    for (p, right) in p.iter_mut().zip(&kick.state) {
+                        *p += left * right;
+                    }
+                }
             }
             let mut moved = [[0.0; LANES]; N];
             for (moved, phi) in moved.iter_mut().zip(&phi) {
