@@ -21,6 +21,7 @@ CORE_ARROWS = {
     "stability": {"elementary", "lambertw", "quasipoly", "roots"},
     "frequency": {"elementary", "quasipoly", "roots", "stability"},
     "dde": {"elementary", "quasipoly"},
+    "estimation": {"dde"},
 }
 
 # Files and folders of a room in order: each uses only those before it.
@@ -52,6 +53,19 @@ ORDER = {
         "delays",
         "crossings",
         "ranges",
+    ],
+    "estimation": [
+        "plant",
+        "path",
+        "propagation",
+        "disturbance",
+        "orthogonal",
+        "whiten",
+        "likelihood",
+        "search",
+        "quantity",
+        "fit",
+        "profile",
     ],
     "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
 }

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,7 +123,7 @@ def estimate_from_commands(
         message += " computed from the recorded output, on whose noise the controller acts"
     elif sources != {"logged"}:
         message += ", which was not logged but computed from reference and output"
-    details = {
+    details: dict[str, Any] = {
         "command": " or ".join(sorted(sources)),
         **({"noise": "loop"} if computed else {}),
     }

@@ -2,7 +2,7 @@
 
 use super::likelihood::{Derivatives, Evaluation, Gain, Noise, Rows, Values, Wanted, evaluate};
 use super::plant::Plant;
-use super::profile::Quantity;
+use super::quantity::Quantity;
 use super::search::{Variable, minimise};
 use crate::{Error, Task};
 
@@ -207,10 +207,6 @@ impl Model {
             .iter()
             .map(|slot| self.variable(*slot, start, row_time))
             .collect();
-        let mut penalty_row = row_time;
-        if !(penalty_row > 0.0) {
-            penalty_row = 1.0;
-        }
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
         let mut kept: Vec<Option<(Point, f64)>> = vec![None; self.runs.len()];
@@ -218,7 +214,7 @@ impl Model {
             for (slot, value) in slots.iter().zip(z) {
                 put(&mut trial, *slot, *value);
             }
-            let mut sum = PENALTY * (-trial.delay() / penalty_row).max(0.0);
+            let mut sum = PENALTY * (-trial.delay() / row_time).max(0.0);
             for run in 0..self.runs.len() {
                 let mut own = trial.clone();
                 if self.runs.len() > 1 {

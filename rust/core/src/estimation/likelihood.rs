@@ -79,7 +79,7 @@ impl Rows {
             commands.value.len()
         );
         for time in [&self.time, &commands.time] {
-            if let Some(pair) = time.windows(2).find(|pair| !(pair[1] > pair[0])) {
+            if let Some(pair) = time.windows(2).find(|pair| !increases(pair)) {
                 refuse!(
                     "the time {} follows {}: give increasing times",
                     pair[1],
@@ -89,6 +89,11 @@ impl Rows {
         }
         Ok(self)
     }
+}
+
+/// Is the second of two times after the first? Not where one of them is NaN.
+pub(super) fn increases(pair: &[f64]) -> bool {
+    pair[1] > pair[0]
 }
 
 /// The gain of the plant.

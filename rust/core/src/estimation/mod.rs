@@ -18,6 +18,7 @@ mod path;
 mod plant;
 mod profile;
 mod propagation;
+mod quantity;
 mod search;
 mod whiten;
 
@@ -25,5 +26,5 @@ pub use disturbance::{Disturbance, Entry};
 pub use fit::{Fit, Free, Model, Point, Timing};
 pub use likelihood::{Commands, Evaluation, Gain, Noise, Rows, Values};
 pub use plant::{Plant, PlantSpace};
-pub use profile::Quantity;
+pub use quantity::Quantity;
 pub use whiten::{Whitened, whiten};

@@ -52,7 +52,8 @@ impl Orthogonal {
         let size = dot(column, column).sqrt();
         let mut parts = self.project(before, column);
         let left = dot(column, column).sqrt();
-        self.dependent |= !(left > DEPENDENT * size);
+        let stands_out = left > DEPENDENT * size;
+        self.dependent |= !stands_out;
         let inverse = if left > 0.0 { 1.0 / left } else { 0.0 };
         column.iter_mut().for_each(|entry| *entry *= inverse);
         parts.push(left);

@@ -131,9 +131,9 @@ mod tests {
             for k in 0..n {
                 if k != i {
                     let factor = m[k][i] / m[i][i];
-                    for j in i..=n {
-                        let take = factor * m[i][j];
-                        m[k][j] -= take;
+                    let own = m[i].clone();
+                    for (entry, own) in m[k].iter_mut().zip(own) {
+                        *entry -= factor * own;
                     }
                 }
             }

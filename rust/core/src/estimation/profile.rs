@@ -1,20 +1,8 @@
 //! The profile of the likelihood over one quantity, and the ends of an interval.
 
 use super::fit::{Fit, Model, Point, SHORTEST_LAG, Timing};
+use super::quantity::Quantity;
 use crate::{Error, Task};
-
-/// A quantity that a profile holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// The delay.
-    Delay,
-    /// Delay and lags together.
-    Total,
-    /// The gain.
-    Gain,
-    /// A lag.
-    Lag(usize),
-}
 
 /// Farthest end of an interval, in Gaussian half widths.
 const FARTHEST: f64 = 64.0;

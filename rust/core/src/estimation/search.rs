@@ -65,7 +65,8 @@ pub(super) fn minimise(
             .collect();
         let direction = direction(variables, &inverse, &gradient, &moving);
         let slope = product(&direction, &gradient);
-        if !(-0.5 * slope > tolerance) {
+        let promises = -0.5 * slope > tolerance;
+        if !promises {
             if fresh {
                 break;
             }
@@ -180,7 +181,8 @@ fn product(x: &[f64], y: &[f64]) -> f64 {
 fn update(inverse: &mut [f64], moved: &[f64], change: &[f64]) {
     let n = moved.len();
     let along = product(moved, change);
-    if !(along > 0.0) {
+    let bends = along > 0.0;
+    if !bends {
         return;
     }
     let turned: Vec<f64> = inverse

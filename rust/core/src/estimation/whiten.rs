@@ -7,6 +7,8 @@
 //! are computed once. The work is linear in the rows; on rows of equal spacing the gain converges
 //! and is kept.
 
+use std::cmp::Ordering;
+
 use super::disturbance::{Disturbance, Joint};
 use super::path::{SAME, SAME_STEP, dot};
 use super::plant::PlantSpace;
@@ -41,12 +43,14 @@ pub fn whiten(
     task: &Task,
 ) -> Result<Whitened, Error> {
     refuse_if!(
-        time.is_empty() || columns.len() % time.len() != 0,
+        time.is_empty() || !columns.len().is_multiple_of(time.len()),
         "{} times and columns of {} values in all: give each column as many values as times",
         time.len(),
         columns.len()
     );
-    let wrong = time.windows(2).find(|pair| !(pair[1] > pair[0]));
+    let wrong = time
+        .windows(2)
+        .find(|pair| pair[1].partial_cmp(&pair[0]) != Some(Ordering::Greater));
     if let Some(pair) = wrong {
         refuse!(
             "the time {} follows {}: give increasing times",
@@ -139,7 +143,9 @@ fn pass<const N: usize>(
         }
         if row > 0 {
             let between = time[row] - time[row - 1];
-            if !((between - step).abs() <= SAME * time[row].abs() + SAME_STEP * between) {
+            // The first step length, NaN, is the same as none.
+            let same = (between - step).abs() <= SAME * time[row].abs() + SAME_STEP * between;
+            if !same {
                 let made = Propagation::new(&joint.a, &joint.noise, between);
                 (phi, q) = (square(&made.phi), square(&made.q));
                 (step, steady) = (between, false);
