@@ -12,8 +12,7 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime._base.validation import OpenRange
-from deadtime.estimation._estimate import METHODS
-from deadtime.estimation._estimate import _checked as checked
+from deadtime.estimation._estimate import METHODS, checked_run
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
 from deadtime.estimation.methods._arx_scan import ARXScan
@@ -328,7 +327,7 @@ def compare_methods(
     NotIdentifiableError
         When no fit of delay and gain has a result.
     """
-    runs = [checked(run) for run in paired_runs(recording, loop, window)]
+    runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
     named: list[str] = [

@@ -153,7 +153,7 @@ def estimate_delay(
     >>> round(fit.delay, 6)
     0.4
     """
-    runs = [_checked(run) for run in paired_runs(recording, loop, window)]
+    runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:
         raise ValueError(
@@ -169,7 +169,7 @@ def estimate_delay(
 OWN_REFUSALS = ("no_step", "command_constant", "output_constant")
 
 
-def _checked(run: Run) -> Run:
+def checked_run(run: Run) -> Run:
     """The run with what a check finds; refused by name where no estimate would be right."""
     check = run.recording.check(run.loop, run.window)
     for finding in check.findings:

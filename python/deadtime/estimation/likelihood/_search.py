@@ -45,9 +45,9 @@ ROUGH = 0.02
 #: Start of the coloured sensor noise: white deviations, and rows.
 SENSOR, SENSOR_TIME = 1.0, 2.0
 
-#: Prices in the criterion: of the two numbers of the coloured sensor noise that of Akaike (1974), of
-#: the trim twice that, because it would cost accuracy on a calm flight. Air has none: no air is the
-#: lower bound of its deviation.
+#: Prices in the criterion: of the two numbers of the coloured sensor noise that of Akaike (1974),
+#: of the trim twice that, because it would cost accuracy on a calm flight. Air has none: no air is
+#: the lower bound of its deviation.
 PRICE_OF_SENSOR, PRICE_OF_TRIM = 4.0, 4.0
 
 
