@@ -216,7 +216,10 @@ impl FlightLikelihood {
         Ok(Self {
             model: Model {
                 plant: converted(Plant::new(&num, &den))?,
-                runs: runs.iter().map(RecordedRows::rows).collect::<PyResult<_>>()?,
+                runs: runs
+                    .iter()
+                    .map(RecordedRows::rows)
+                    .collect::<PyResult<_>>()?,
                 free: Free {
                     delay,
                     gain,
@@ -243,12 +246,7 @@ impl FlightLikelihood {
 
     /// The maximum from a starting point.
     #[pyo3(signature = (start, tolerance=1e-6))]
-    fn fit(
-        &self,
-        py: Python<'_>,
-        start: &PlantNumbers,
-        tolerance: f64,
-    ) -> PyResult<PlantNumbers> {
+    fn fit(&self, py: Python<'_>, start: &PlantNumbers, tolerance: f64) -> PyResult<PlantNumbers> {
         let mut start = start.fit().point;
         if !self.model.free.delay {
             start.timing = Timing::Delay(start.delay());

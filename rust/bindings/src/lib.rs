@@ -36,9 +36,9 @@ mod _deadtime {
     #[pymodule_export]
     use super::dde::{LoopResponse, PyLinearLoop, on_samples};
     #[pymodule_export]
-    use super::fixed_step::{FixedStepResponse, fixed_step_run};
-    #[pymodule_export]
     use super::estimation::{FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise};
+    #[pymodule_export]
+    use super::fixed_step::{FixedStepResponse, fixed_step_run};
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,

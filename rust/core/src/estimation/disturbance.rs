@@ -44,7 +44,10 @@ impl Joint {
         let mut a = vec![0.0; n * n];
         let mut c = plant.c.clone();
         let (mut noise, mut start) = (vec![0.0; n * n], vec![0.0; n * n]);
-        for (row, own) in a.chunks_exact_mut(n).zip(plant.a.chunks_exact(states.max(1))) {
+        for (row, own) in a
+            .chunks_exact_mut(n)
+            .zip(plant.a.chunks_exact(states.max(1)))
+        {
             for (place, value) in row.iter_mut().zip(own) {
                 *place = *value;
             }

@@ -276,7 +276,11 @@ impl Model {
         let span = |run: usize| {
             self.runs.get(run).map_or(1.0, |rows| {
                 let ends = (rows.time.first(), rows.time.last());
-                if let (Some(first), Some(last)) = ends { last - first } else { 1.0 }
+                if let (Some(first), Some(last)) = ends {
+                    last - first
+                } else {
+                    1.0
+                }
             })
         };
         let noise = |run: usize| start.noise.get(run).copied().unwrap_or(QUIET);
@@ -286,9 +290,8 @@ impl Model {
             high: high.ln(),
             step: LOG_STEP,
         };
-        let time = |run, start| {
-            logarithm(start, SHORTEST_TIME * row_time, LONGEST_TIME * span(run))
-        };
+        let time =
+            |run, start| logarithm(start, SHORTEST_TIME * row_time, LONGEST_TIME * span(run));
         match slot {
             Slot::Time => Variable {
                 start: match start.timing {

@@ -80,7 +80,11 @@ impl Rows {
         );
         for time in [&self.time, &commands.time] {
             if let Some(pair) = time.windows(2).find(|pair| !(pair[1] > pair[0])) {
-                refuse!("the time {} follows {}: give increasing times", pair[1], pair[0]);
+                refuse!(
+                    "the time {} follows {}: give increasing times",
+                    pair[1],
+                    pair[0]
+                );
             }
         }
         Ok(self)
@@ -202,14 +206,26 @@ pub(super) fn evaluate(
     } else {
         rows.commands.value.first().copied().unwrap_or(0.0)
     };
-    let shifted: Vec<f64> = rows.commands.value.iter().map(|value| value - base).collect();
+    let shifted: Vec<f64> = rows
+        .commands
+        .value
+        .iter()
+        .map(|value| value - base)
+        .collect();
     let held = Held {
         time: &rows.commands.time,
         value: &shifted,
     };
     let mut response = vec![0.0; n];
     let mut rate = vec![0.0; n];
-    respond(&space, held, values.delay, &rows.time, &mut response, Some(&mut rate));
+    respond(
+        &space,
+        held,
+        values.delay,
+        &rows.time,
+        &mut response,
+        Some(&mut rate),
+    );
     // Columns of J, and the output last.
     let mut columns = Vec::with_capacity(8 * n);
     let (gain, eliminated) = match values.gain {
@@ -223,7 +239,12 @@ pub(super) fn evaluate(
         columns.extend(std::iter::repeat_n(1.0, n));
     }
     if rows.trim {
-        columns.extend(response_to_pulse(&space, (rows.time[0], f64::INFINITY), 0.0, &rows.time));
+        columns.extend(response_to_pulse(
+            &space,
+            (rows.time[0], f64::INFINITY),
+            0.0,
+            &rows.time,
+        ));
     }
     for pulse in &rows.commands.unknown {
         columns.extend(response_to_pulse(&space, *pulse, values.delay, &rows.time));
@@ -240,13 +261,27 @@ pub(super) fn evaluate(
             let mut moved = values.lags.clone();
             moved[i] = lag * (1.0 + STEP);
             let other = plant.space(&moved, values.zero);
-            columns.extend(difference(&other, held, values.delay, &rows.time, &response, lag * STEP));
+            columns.extend(difference(
+                &other,
+                held,
+                values.delay,
+                &rows.time,
+                &response,
+                lag * STEP,
+            ));
         }
     }
     if by.zero {
         let lag = values.lags.last().copied().unwrap_or(1.0);
         let other = plant.space(&values.lags, values.zero + lag * STEP);
-        columns.extend(difference(&other, held, values.delay, &rows.time, &response, lag * STEP));
+        columns.extend(difference(
+            &other,
+            held,
+            values.delay,
+            &rows.time,
+            &response,
+            lag * STEP,
+        ));
     }
     let count = columns.len() / n;
     let mut target: Vec<f64> = rows.output.clone();
@@ -278,7 +313,11 @@ pub(super) fn evaluate(
     let (x, target) = columns.split_at_mut(count * n);
     let mut orthogonal = Orthogonal::new(&mut x[..linear * n], n, linear);
     let parts = orthogonal.project(x, target);
-    let squares = target.iter().map(|e| e * e).sum::<f64>().max(ROUNDING * power);
+    let squares = target
+        .iter()
+        .map(|e| e * e)
+        .sum::<f64>()
+        .max(ROUNDING * power);
     for column in linear..count {
         let (before, rest) = x.split_at_mut(column * n);
         orthogonal.push(before, &mut rest[..n]);
@@ -298,7 +337,11 @@ pub(super) fn evaluate(
     };
     let objective = m * variance.ln() + log_det + log_gram;
     let mut found = Evaluation {
-        objective: if orthogonal.dependent { f64::INFINITY } else { objective },
+        objective: if orthogonal.dependent {
+            f64::INFINITY
+        } else {
+            objective
+        },
         log_det,
         variance,
         freedom,
@@ -347,7 +390,11 @@ fn kicks(rows: &Rows, space: &PlantSpace, delay: f64) -> Vec<Kick> {
         };
         let mut state = vec![0.0; n];
         let mut moved = vec![0.0; n];
-        Propagator::new(&space.a, &[&space.b], end - start).apply(&state, &[*deviation], &mut moved);
+        Propagator::new(&space.a, &[&space.b], end - start).apply(
+            &state,
+            &[*deviation],
+            &mut moved,
+        );
         if *time > arrival {
             std::mem::swap(&mut state, &mut moved);
             Propagator::new(&space.a, &[], time - arrival).apply(&state, &[], &mut moved);

@@ -89,7 +89,12 @@ impl Model {
         value: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
-        self.fit(&quantity.held(&near.point, value, self), Some(quantity), RISE_TOLERANCE, task)
+        self.fit(
+            &quantity.held(&near.point, value, self),
+            Some(quantity),
+            RISE_TOLERANCE,
+            task,
+        )
     }
 
     /// The end of the interval of a quantity: where −2 ln L has risen by `rise`.

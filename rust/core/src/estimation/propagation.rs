@@ -111,7 +111,13 @@ fn with_transpose(a: &[f64], n: usize) -> Vec<f64> {
 /// Largest column sum.
 fn norm(a: &[f64], n: usize) -> f64 {
     (0..n)
-        .map(|column| a.iter().skip(column).step_by(n.max(1)).map(|x| x.abs()).sum())
+        .map(|column| {
+            a.iter()
+                .skip(column)
+                .step_by(n.max(1))
+                .map(|x| x.abs())
+                .sum()
+        })
         .fold(0.0, f64::max)
 }
 

@@ -45,7 +45,10 @@ pub(super) fn minimise(
     mut function: impl FnMut(&[f64]) -> Result<f64, Error>,
 ) -> Result<Minimum, Error> {
     let n = variables.len();
-    let mut x: Vec<f64> = variables.iter().map(|v| v.start.clamp(v.low, v.high)).collect();
+    let mut x: Vec<f64> = variables
+        .iter()
+        .map(|v| v.start.clamp(v.low, v.high))
+        .collect();
     let mut value = function(&x)?;
     if n == 0 {
         return Ok(Minimum { place: x, value });
@@ -150,7 +153,12 @@ fn diagonal(curvature: &[f64]) -> Vec<f64> {
 }
 
 /// −H g over the moving variables, no longer than allowed.
-fn direction(variables: &[Variable], inverse: &[f64], gradient: &[f64], moving: &[bool]) -> Vec<f64> {
+fn direction(
+    variables: &[Variable],
+    inverse: &[f64],
+    gradient: &[f64],
+    moving: &[bool],
+) -> Vec<f64> {
     let n = gradient.len();
     let mut out = vec![0.0; n];
     let mut scale: f64 = 1.0;
@@ -175,12 +183,15 @@ fn update(inverse: &mut [f64], moved: &[f64], change: &[f64]) {
     if !(along > 0.0) {
         return;
     }
-    let turned: Vec<f64> = inverse.chunks_exact(n).map(|row| product(row, change)).collect();
+    let turned: Vec<f64> = inverse
+        .chunks_exact(n)
+        .map(|row| product(row, change))
+        .collect();
     let stretch = (1.0 + product(change, &turned) / along) / along;
     for i in 0..n {
         for j in 0..n {
-            inverse[i * n + j] +=
-                stretch * moved[i] * moved[j] - (turned[i] * moved[j] + moved[i] * turned[j]) / along;
+            inverse[i * n + j] += stretch * moved[i] * moved[j]
+                - (turned[i] * moved[j] + moved[i] * turned[j]) / along;
         }
     }
 }
@@ -209,7 +220,13 @@ mod tests {
     #[test]
     fn a_minimum_beyond_a_bound_is_found_on_it() {
         let bowl = |x: &[f64]| Ok((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
-        let found = minimise(&[variable(3.0, 0.0, 9.0), variable(0.0, -9.0, 9.0)], 1e-12, bowl);
-        assert!(found.is_ok_and(|found| found.place[0] == 0.0 && (found.place[1] - 2.0).abs() < 1e-4));
+        let found = minimise(
+            &[variable(3.0, 0.0, 9.0), variable(0.0, -9.0, 9.0)],
+            1e-12,
+            bowl,
+        );
+        assert!(
+            found.is_ok_and(|found| found.place[0] == 0.0 && (found.place[1] - 2.0).abs() < 1e-4)
+        );
     }
 }

@@ -48,7 +48,11 @@ pub fn whiten(
     );
     let wrong = time.windows(2).find(|pair| !(pair[1] > pair[0]));
     if let Some(pair) = wrong {
-        refuse!("the time {} follows {}: give increasing times", pair[1], pair[0]);
+        refuse!(
+            "the time {} follows {}: give increasing times",
+            pair[1],
+            pair[0]
+        );
     }
     let mut columns = crate::memory::copied("the whitened columns", columns)?;
     let joint = Joint::new(plant, disturbances)?;
@@ -102,9 +106,8 @@ fn square<const N: usize>(flat: &[f64]) -> Square<N> {
 
 /// Φ P Φᵀ + Q.
 fn predicted<const N: usize>(phi: &Square<N>, p: &Square<N>, q: &Square<N>) -> Square<N> {
-    let left: Square<N> = std::array::from_fn(|i| {
-        std::array::from_fn(|j| (0..N).map(|k| phi[i][k] * p[k][j]).sum())
-    });
+    let left: Square<N> =
+        std::array::from_fn(|i| std::array::from_fn(|j| (0..N).map(|k| phi[i][k] * p[k][j]).sum()));
     std::array::from_fn(|i| {
         std::array::from_fn(|j| q[i][j] + (0..N).map(|k| left[i][k] * phi[j][k]).sum::<f64>())
     })
