@@ -21,6 +21,7 @@ CORE_ARROWS = {
     "stability": {"elementary", "lambertw", "quasipoly", "roots"},
     "frequency": {"elementary", "quasipoly", "roots", "stability"},
     "dde": {"elementary", "quasipoly"},
+    "estimation": {"dde"},
 }
 
 # Files and folders of a room in order: each uses only those before it.
@@ -54,6 +55,21 @@ ORDER = {
         "ranges",
     ],
     "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
+    "estimation": [
+        "plant",
+        "disturbance",
+        "rows",
+        "path",
+        "propagation",
+        "orthogonal",
+        "whiten",
+        "mean",
+        "likelihood",
+        "search",
+        "point",
+        "fit",
+        "profile",
+    ],
 }
 
 

@@ -8,7 +8,7 @@ use crate::Error;
 
 /// Where a disturbance enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Entry {
+pub(super) enum Entry {
     /// At the input of the plant, as moving air does.
     Input,
     /// At the measurement.
@@ -17,13 +17,30 @@ pub enum Entry {
 
 /// An Ornstein–Uhlenbeck process with its stationary distribution at the first row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Disturbance {
+pub(super) struct Disturbance {
     /// Where it enters.
-    pub entry: Entry,
+    pub(super) entry: Entry,
     /// Time constant τ, s.
-    pub time_constant: f64,
+    pub(super) time_constant: f64,
     /// Standard deviation of the stationary process, in standard deviations of the white noise.
-    pub deviation: f64,
+    pub(super) deviation: f64,
+}
+
+impl Disturbance {
+    /// An error unless the numbers are those of a process.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        refuse_if!(
+            !(self.deviation >= 0.0 && self.deviation.is_finite()),
+            "noise of deviation {}: give a finite deviation of at least zero",
+            self.deviation
+        );
+        refuse_if!(
+            self.deviation > 0.0 && (self.time_constant.is_nan() || self.time_constant <= 0.0),
+            "noise of time constant {} s: give a time constant above zero",
+            self.time_constant
+        );
+        Ok(())
+    }
 }
 
 /// The joint equations of plant and disturbances: x′ = A x + G ξ, y = C x.
@@ -53,13 +70,7 @@ impl Joint {
             }
         }
         for (index, one) in (states..n).zip(disturbances) {
-            refuse_if!(
-                !(one.time_constant > 0.0 && one.deviation >= 0.0),
-                "a disturbance with time constant {} s and deviation {}: give a time constant \
-                 above zero and a deviation of at least zero",
-                one.time_constant,
-                one.deviation
-            );
+            one.check()?;
             let rate = 1.0 / one.time_constant;
             let variance = one.deviation * one.deviation;
             let (drive, direct) = match one.entry {
