@@ -54,20 +54,22 @@ ORDER = {
         "crossings",
         "ranges",
     ],
+    "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
     "estimation": [
         "plant",
+        "disturbance",
+        "rows",
         "path",
         "propagation",
-        "disturbance",
         "orthogonal",
         "whiten",
+        "mean",
         "likelihood",
         "search",
-        "quantity",
+        "point",
         "fit",
         "profile",
     ],
-    "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
 }
 
 

@@ -1,8 +1,8 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity,
-    Rows, Timing, whiten,
+    self, Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point,
+    Quantity, Rows, Timing,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -130,7 +130,7 @@ impl PlantNumbers {
         });
         Fit {
             point: Point {
-                timing: Timing::Total(self.delay + self.lags.iter().sum::<f64>()),
+                timing: Timing::Delay(self.delay),
                 lags: self.lags.clone(),
                 zero: self.zero,
                 gain: self.gain,
@@ -203,7 +203,7 @@ pub(crate) struct FlightLikelihood {
 impl FlightLikelihood {
     #[new]
     #[pyo3(signature = (num, den, runs, *, delay, gain, lags, zero, longest))]
-    #[expect(clippy::too_many_arguments)]
+    #[expect(clippy::too_many_arguments, reason = "given by name")]
     fn new(
         num: Vec<f64>,
         den: Vec<f64>,
@@ -214,44 +214,38 @@ impl FlightLikelihood {
         zero: bool,
         longest: f64,
     ) -> PyResult<Self> {
-        Ok(Self {
-            model: Model {
-                plant: converted(Plant::new(&num, &den))?,
-                runs: runs
-                    .iter()
-                    .map(RecordedRows::rows)
-                    .collect::<PyResult<_>>()?,
-                free: Free {
-                    delay,
-                    gain,
-                    lags,
-                    zero,
-                },
-                longest,
-            },
-        })
+        let plant = converted(Plant::new(&num, &den))?;
+        let runs = runs
+            .iter()
+            .map(RecordedRows::rows)
+            .collect::<PyResult<_>>()?;
+        let free = Free {
+            delay,
+            gain,
+            lags,
+            zero,
+        };
+        let model = converted(Model::new(plant, runs, free, longest))?;
+        Ok(Self { model })
     }
 
     /// The likelihood of one recording.
     fn at(&self, py: Python<'_>, run: usize, numbers: &PlantNumbers) -> PyResult<RowLikelihood> {
         let point = numbers.fit().point;
-        let found = run_here(py, |task| self.model.at(run, &point, None, true, task))?;
+        let found = run_here(py, |task| self.model.at(run, &point, task))?;
         Ok(RowLikelihood::new(py, found))
     }
 
     /// −2 ln L of all recordings.
     fn objective(&self, py: Python<'_>, numbers: &PlantNumbers) -> PyResult<f64> {
         let point = numbers.fit().point;
-        run_here(py, |task| self.model.objective(&point, None, task))
+        run_here(py, |task| self.model.objective(&point, task))
     }
 
     /// The maximum from a starting point.
     #[pyo3(signature = (start, tolerance=1e-6))]
     fn fit(&self, py: Python<'_>, start: &PlantNumbers, tolerance: f64) -> PyResult<PlantNumbers> {
-        let mut start = start.fit().point;
-        if !self.model.free.delay {
-            start.timing = Timing::Delay(start.delay());
-        }
+        let start = self.known(start).point;
         let found = run_here(py, |task| self.model.fit(&start, None, tolerance, task))?;
         Ok(PlantNumbers::from_fit(&found))
     }
@@ -289,11 +283,9 @@ impl FlightLikelihood {
 
 impl FlightLikelihood {
     fn known(&self, numbers: &PlantNumbers) -> Fit {
-        let mut fit = numbers.fit();
-        if !self.model.free.delay {
-            fit.point.timing = Timing::Delay(fit.point.delay());
-        }
-        fit
+        let Fit { point, objective } = numbers.fit();
+        let point = self.model.timed(point);
+        Fit { point, objective }
     }
 }
 
@@ -304,7 +296,11 @@ fn read(quantity: &str) -> PyResult<Quantity> {
         "gain" => Quantity::Gain,
         _ => match quantity.strip_prefix("lag ").and_then(|i| i.parse().ok()) {
             Some(i) => Quantity::Lag(i),
-            None => return Err(PyValueError::new_err(format!("quantity {quantity:?}"))),
+            None => {
+                return Err(PyValueError::new_err(format!(
+                    "quantity {quantity:?}: give 'delay', 'total', 'gain', or 'lag 0' and so on"
+                )));
+            }
         },
     })
 }
@@ -328,7 +324,7 @@ pub(crate) fn whitened_columns<'py>(
     time: Floats<'py>,
     columns: Floats<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let space = converted(Plant::new(&num, &den))?.space(&[], 0.0);
+    let plant = converted(Plant::new(&num, &den))?;
     let disturbances: Vec<Disturbance> = disturbances
         .iter()
         .map(|one| Disturbance {
@@ -343,7 +339,7 @@ pub(crate) fn whitened_columns<'py>(
         .collect();
     let (time, columns) = (owned(&time)?, owned(&columns)?);
     let found = run_here(py, |task| {
-        whiten(&time, &columns, &space, &disturbances, task)
+        estimation::whitened(&time, &columns, &plant, &disturbances, task)
     })?;
-    Ok(found.columns.into_pyarray(py))
+    Ok(found.into_pyarray(py))
 }

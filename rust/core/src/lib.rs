@@ -1,5 +1,5 @@
 //! Time-delay systems: Lambert W, quasi-polynomials and their roots, stability maps, delay
-//! differential equations.
+//! differential equations, the likelihood of recordings.
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
 //! Python. Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots

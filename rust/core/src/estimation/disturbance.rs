@@ -26,6 +26,23 @@ pub struct Disturbance {
     pub deviation: f64,
 }
 
+impl Disturbance {
+    /// An error unless the numbers are those of a process.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        refuse_if!(
+            !(self.deviation >= 0.0 && self.deviation.is_finite()),
+            "noise of deviation {}: give a finite deviation of at least zero",
+            self.deviation
+        );
+        refuse_if!(
+            self.deviation > 0.0 && (self.time_constant.is_nan() || self.time_constant <= 0.0),
+            "noise of time constant {} s: give a time constant above zero",
+            self.time_constant
+        );
+        Ok(())
+    }
+}
+
 /// The joint equations of plant and disturbances: x′ = A x + G ξ, y = C x.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Joint {
@@ -53,13 +70,7 @@ impl Joint {
             }
         }
         for (index, one) in (states..n).zip(disturbances) {
-            refuse_if!(
-                !(one.time_constant > 0.0 && one.deviation >= 0.0),
-                "a disturbance with time constant {} s and deviation {}: give a time constant \
-                 above zero and a deviation of at least zero",
-                one.time_constant,
-                one.deviation
-            );
+            one.check()?;
             let rate = 1.0 / one.time_constant;
             let variance = one.deviation * one.deviation;
             let (drive, direct) = match one.entry {

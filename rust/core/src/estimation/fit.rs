@@ -1,8 +1,10 @@
 //! The numbers of plant and noise at which the likelihood of one or more recordings is largest.
 
-use super::likelihood::{Derivatives, Evaluation, Gain, Noise, Rows, Values, Wanted, evaluate};
-use super::plant::Plant;
-use super::quantity::Quantity;
+use super::likelihood::{Evaluation, Noise, Wanted, evaluate};
+use super::mean::{Derivatives, Gain, Values};
+use super::plant::{MOST_STATES, Plant};
+use super::point::{Point, Quantity, Timing};
+use super::rows::Rows;
 use super::search::{Variable, minimise};
 use crate::{Error, Task};
 
@@ -42,56 +44,13 @@ pub struct Free {
 /// Recordings of one plant with what is unknown about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// The given part of the plant.
-    pub plant: Plant,
-    /// The recordings.
-    pub runs: Vec<Rows>,
-    /// What is unknown.
-    pub free: Free,
+    plant: Plant,
+    runs: Vec<Rows>,
+    pub(super) free: Free,
     /// Longest delay and lag, s.
-    pub longest: f64,
-}
-
-/// What the lags are measured from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Timing {
-    /// The delay, s.
-    Delay(f64),
-    /// Delay and lags together, s.
-    Total(f64),
-}
-
-/// One set of numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Point {
-    /// Delay, or delay and lags together.
-    pub timing: Timing,
-    /// s.
-    pub lags: Vec<f64>,
-    /// s.
-    pub zero: f64,
-    /// The gain; without effect where it is eliminated.
-    pub gain: f64,
-    /// The noise of each recording.
-    pub noise: Vec<Noise>,
-}
-
-impl Point {
-    /// Delay and lags together, s.
-    pub fn total(&self) -> f64 {
-        match self.timing {
-            Timing::Delay(delay) => delay + self.lags.iter().sum::<f64>(),
-            Timing::Total(total) => total,
-        }
-    }
-
-    /// s.
-    pub fn delay(&self) -> f64 {
-        match self.timing {
-            Timing::Delay(delay) => delay,
-            Timing::Total(total) => total - self.lags.iter().sum::<f64>(),
-        }
-    }
+    longest: f64,
+    /// Time between rows, s: the median of the first recording.
+    pub(super) row_time: f64,
 }
 
 /// A maximum of the likelihood.
@@ -117,15 +76,74 @@ enum Slot {
 }
 
 impl Model {
-    /// Time between rows, s: the median of the first recording.
-    pub(super) fn row_time(&self) -> f64 {
-        let mut between: Vec<f64> = self
-            .runs
-            .first()
-            .map(|run| run.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
-            .unwrap_or_default();
-        between.sort_by(f64::total_cmp);
-        between.get(between.len() / 2).copied().unwrap_or(1.0)
+    /// Recordings of one plant, the given part `plant` of which follows the lags, and the longest
+    /// delay and lag, s.
+    ///
+    /// # Errors
+    ///
+    /// If there is no recording, or a number is out of its range.
+    pub fn new(plant: Plant, runs: Vec<Rows>, free: Free, longest: f64) -> Result<Self, Error> {
+        let Some(first) = runs.first() else {
+            refuse!("no recording: give at least one")
+        };
+        let row_time = first.row_time();
+        refuse_if!(
+            !(longest.is_finite() && longest >= SHORTEST_LAG * row_time),
+            "the longest delay is {longest} s and the time between rows {row_time} s: give a delay \
+             of at least a thousandth of a row"
+        );
+        refuse_if!(
+            free.zero && free.lags.is_empty(),
+            "a zero is searched without a lag: give the plant a lag"
+        );
+        let states = plant.states(free.lags.len());
+        refuse_if!(
+            states > MOST_STATES,
+            "{states} states of the plant with its lags: the likelihood takes up to {MOST_STATES}"
+        );
+        Ok(Self {
+            plant,
+            runs,
+            free,
+            longest,
+            row_time,
+        })
+    }
+
+    /// The point with its lags measured from the delay if that is known or a lag is negative, and
+    /// from both together otherwise: their sum is known better than each.
+    pub fn timed(&self, mut point: Point) -> Point {
+        point.timing = if self.free.delay && point.lags.iter().all(|lag| *lag >= 0.0) {
+            Timing::Total(point.total())
+        } else {
+            Timing::Delay(point.delay())
+        };
+        point
+    }
+
+    /// An error unless the point is one of this model.
+    fn check(&self, point: &Point) -> Result<(), Error> {
+        refuse_if!(
+            point.lags.len() != self.free.lags.len() || point.noise.len() != self.runs.len(),
+            "{} lags and the noise of {} recordings: this likelihood has {} lags and {} recordings",
+            point.lags.len(),
+            point.noise.len(),
+            self.free.lags.len(),
+            self.runs.len()
+        );
+        let named = [
+            ("delay", point.delay()),
+            ("zero", point.zero),
+            ("gain", point.gain),
+        ];
+        let lags = point.lags.iter().map(|lag| ("lag", *lag));
+        for (name, value) in named.into_iter().chain(lags) {
+            refuse_if!(
+                !value.is_finite(),
+                "the {name} is {value}: give a finite number"
+            );
+        }
+        point.noise.iter().try_for_each(Noise::check)
     }
 
     fn gain_at(&self, point: &Point, held: Option<Quantity>) -> Gain {
@@ -142,13 +160,19 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// If there are fewer rows than unknowns, or after a request to stop.
-    pub fn at(
+    /// If there are fewer rows than unknowns, for a point that is not one of this model, and after a
+    /// request to stop.
+    pub fn at(&self, run: usize, point: &Point, task: &Task) -> Result<Evaluation, Error> {
+        self.check(point)?;
+        self.part(run, point, None, Wanted::All, task)
+    }
+
+    fn part(
         &self,
         run: usize,
         point: &Point,
         held: Option<Quantity>,
-        all: bool,
+        wanted: Wanted,
         task: &Task,
     ) -> Result<Evaluation, Error> {
         let values = Values {
@@ -162,9 +186,11 @@ impl Model {
             lags: self.free.lags.clone(),
             zero: self.free.zero,
         };
-        let wanted = if all { Wanted::All } else { Wanted::Objective };
         let (Some(rows), Some(noise)) = (self.runs.get(run), point.noise.get(run)) else {
-            refuse!("recording {run} of {}", self.runs.len())
+            refuse!(
+                "recording {run} of {}: give the number of one of them, from zero",
+                self.runs.len()
+            )
         };
         evaluate(rows, &self.plant, &values, noise, &by, wanted, task)
     }
@@ -174,17 +200,20 @@ impl Model {
     /// # Errors
     ///
     /// As for `at`.
-    pub fn objective(
-        &self,
-        point: &Point,
-        held: Option<Quantity>,
-        task: &Task,
-    ) -> Result<f64, Error> {
-        let mut sum = PENALTY * (-point.delay() / self.row_time()).max(0.0);
+    pub fn objective(&self, point: &Point, task: &Task) -> Result<f64, Error> {
+        self.check(point)?;
+        let mut sum = self.penalty(point);
         for run in 0..self.runs.len() {
-            sum += self.at(run, point, held, false, task)?.objective;
+            sum += self
+                .part(run, point, None, Wanted::Objective, task)?
+                .objective;
         }
         Ok(sum)
+    }
+
+    /// What a negative delay costs.
+    fn penalty(&self, point: &Point) -> f64 {
+        PENALTY * (-point.delay() / self.row_time).max(0.0)
     }
 
     /// The maximum of the likelihood from a starting point, with one quantity held if given.
@@ -201,11 +230,15 @@ impl Model {
         tolerance: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
-        let row_time = self.row_time();
+        self.check(start)?;
+        refuse_if!(
+            !(tolerance.is_finite() && tolerance > 0.0),
+            "a tolerance of {tolerance}: give a finite number above zero"
+        );
         let slots = self.slots(start, held);
         let variables: Vec<Variable> = slots
             .iter()
-            .map(|slot| self.variable(*slot, start, row_time))
+            .map(|slot| self.variable(*slot, start))
             .collect();
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
@@ -214,7 +247,7 @@ impl Model {
             for (slot, value) in slots.iter().zip(z) {
                 put(&mut trial, *slot, *value);
             }
-            let mut sum = PENALTY * (-trial.delay() / row_time).max(0.0);
+            let mut sum = self.penalty(&trial);
             for run in 0..self.runs.len() {
                 let mut own = trial.clone();
                 if self.runs.len() > 1 {
@@ -222,7 +255,10 @@ impl Model {
                 }
                 let part = match kept.get(run) {
                     Some(Some((point, value))) if *point == own => *value,
-                    _ => self.at(run, &trial, held, false, task)?.objective,
+                    _ => {
+                        self.part(run, &trial, held, Wanted::Objective, task)?
+                            .objective
+                    }
                 };
                 if let Some(place) = kept.get_mut(run) {
                     *place = Some((own, part));
@@ -268,22 +304,15 @@ impl Model {
         slots
     }
 
-    fn variable(&self, slot: Slot, start: &Point, row_time: f64) -> Variable {
-        let span = |run: usize| {
-            self.runs.get(run).map_or(1.0, |rows| {
-                let ends = (rows.time.first(), rows.time.last());
-                if let (Some(first), Some(last)) = ends {
-                    last - first
-                } else {
-                    1.0
-                }
-            })
-        };
+    fn variable(&self, slot: Slot, start: &Point) -> Variable {
+        let row_time = self.row_time;
+        let span = |run: usize| self.runs.get(run).map_or(1.0, Rows::span);
         let noise = |run: usize| start.noise.get(run).copied().unwrap_or(QUIET);
         let logarithm = |start: f64, low: f64, high: f64| Variable {
             start: start.abs().ln(),
             low: low.ln(),
-            high: high.ln(),
+            // A recording may be shorter than a row of the first.
+            high: high.max(low).ln(),
             step: LOG_STEP,
         };
         let time =
@@ -353,5 +382,194 @@ fn put(point: &mut Point, slot: Slot, value: f64) {
         Slot::Air(run) => point.noise[run].air = value.exp(),
         Slot::SensorTime(run) => point.noise[run].sensor_time = value.exp(),
         Slot::Sensor(run) => point.noise[run].sensor = value.exp(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::recorded;
+    use super::*;
+
+    const INTEGRATOR: (&[f64], &[f64]) = (&[1.0], &[1.0, 0.0]);
+    const NOTHING: (&[f64], &[f64]) = (&[1.0], &[1.0]);
+
+    fn free() -> Free {
+        Free {
+            delay: true,
+            gain: true,
+            lags: vec![true],
+            zero: false,
+        }
+    }
+
+    fn model(plant: (&[f64], &[f64]), runs: Vec<Rows>) -> Model {
+        Model::new(Plant::new(plant.0, plant.1).unwrap(), runs, free(), 5.0).unwrap()
+    }
+
+    fn point(delay: f64, lag: f64, noise: Vec<Noise>) -> Point {
+        Point {
+            timing: Timing::Delay(delay),
+            lags: vec![lag],
+            zero: 0.0,
+            gain: 1.0,
+            noise,
+        }
+    }
+
+    fn fitted(model: &Model, start: Point) -> Fit {
+        model
+            .fit(&model.timed(start), None, 1e-6, &Task::new())
+            .unwrap()
+    }
+
+    #[test]
+    fn delay_gain_and_lag_are_recovered() {
+        let model = model(
+            INTEGRATOR,
+            vec![recorded(INTEGRATOR, (0.31, 0.85, 0.17), 1e-5, 1)],
+        );
+        let found = fitted(&model, point(0.25, 0.3, vec![QUIET]));
+        assert!((found.point.delay() - 0.31).abs() < 1e-4, "{found:?}");
+        assert!((found.point.lags[0] - 0.17).abs() < 1e-4);
+        let there = model.at(0, &found.point, &Task::new()).unwrap();
+        assert!((there.gain - 0.85).abs() < 1e-5);
+        assert!((there.variance.sqrt() / 1e-5 - 1.0).abs() < 0.2);
+        assert_eq!(
+            model.objective(&found.point, &Task::new()).unwrap(),
+            found.objective
+        );
+    }
+
+    #[test]
+    fn air_that_is_not_there_is_fitted_to_nothing() {
+        let model = model(
+            INTEGRATOR,
+            vec![recorded(INTEGRATOR, (0.31, 0.85, 0.17), 5e-3, 2)],
+        );
+        let windy = Noise {
+            air_time: 1.0,
+            air: 3.0,
+            ..QUIET
+        };
+        let found = fitted(&model, point(0.3, 0.2, vec![windy]));
+        let white = fitted(&model, point(0.3, 0.2, vec![QUIET]));
+        assert!(found.objective <= white.objective + 1e-3);
+        assert!(
+            white.objective - found.objective < 8.0,
+            "{white:?} {found:?}"
+        );
+        assert!((found.point.total() - 0.48).abs() < 0.02);
+    }
+
+    #[test]
+    fn an_unstable_plant_of_first_order_has_a_negative_lag() {
+        let unstable = recorded(NOTHING, (0.31, 0.85, -4.0), 5e-3, 3);
+        let model = model(NOTHING, vec![unstable]);
+        let found = fitted(&model, point(0.25, -3.7, vec![QUIET]));
+        assert!((found.point.delay() - 0.31).abs() < 0.01, "{found:?}");
+        assert!((found.point.lags[0] + 4.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn recordings_share_the_plant_and_keep_their_noise() {
+        let numbers = (0.31, 0.85, 0.17);
+        let runs = vec![
+            recorded(INTEGRATOR, numbers, 1e-4, 4),
+            recorded(INTEGRATOR, numbers, 1e-2, 5),
+        ];
+        let model = model(INTEGRATOR, runs);
+        let found = fitted(&model, point(0.25, 0.3, vec![QUIET; 2]));
+        assert!((found.point.delay() - 0.31).abs() < 1e-3, "{found:?}");
+        assert!((found.point.gain - 0.85).abs() < 1e-3);
+        for (run, deviation) in [1e-4, 1e-2].into_iter().enumerate() {
+            let there = model.at(run, &found.point, &Task::new()).unwrap();
+            assert_eq!(there.gain, found.point.gain);
+            assert!((there.variance.sqrt() / deviation - 1.0).abs() < 0.2);
+        }
+        assert!(model.at(2, &found.point, &Task::new()).is_err());
+    }
+
+    #[test]
+    fn a_known_delay_stays() {
+        let runs = vec![recorded(INTEGRATOR, (0.31, 0.85, 0.17), 1e-5, 6)];
+        let free = Free {
+            delay: false,
+            ..free()
+        };
+        let plant = Plant::new(INTEGRATOR.0, INTEGRATOR.1).unwrap();
+        let model = Model::new(plant, runs, free, 5.0).unwrap();
+        let found = fitted(&model, point(0.31, 0.5, vec![QUIET]));
+        assert_eq!(found.point.delay(), 0.31);
+        assert!((found.point.lags[0] - 0.17).abs() < 1e-4);
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_refused_by_value() {
+        let runs = vec![recorded(INTEGRATOR, (0.31, 0.85, 0.17), 1e-5, 7)];
+        let plant = || Plant::new(INTEGRATOR.0, INTEGRATOR.1).unwrap();
+        let refusal = |model: Result<Model, Error>| model.unwrap_err().to_string();
+        let many = Free {
+            lags: vec![true; 9],
+            ..free()
+        };
+        let zero = Free {
+            lags: Vec::new(),
+            zero: true,
+            ..free()
+        };
+        for (found, expected) in [
+            (
+                refusal(Model::new(plant(), Vec::new(), free(), 5.0)),
+                "no recording",
+            ),
+            (
+                refusal(Model::new(plant(), runs.clone(), free(), f64::NAN)),
+                "longest delay is NaN",
+            ),
+            (
+                refusal(Model::new(plant(), runs.clone(), free(), -1.0)),
+                "longest delay is -1",
+            ),
+            (
+                refusal(Model::new(plant(), runs.clone(), many, 5.0)),
+                "10 states",
+            ),
+            (
+                refusal(Model::new(plant(), runs.clone(), zero, 5.0)),
+                "without a lag",
+            ),
+        ] {
+            assert!(found.contains(expected), "{found}");
+        }
+        let model = model(INTEGRATOR, runs);
+        let noise = |air_time, air| {
+            vec![Noise {
+                air_time,
+                air,
+                ..QUIET
+            }]
+        };
+        for (point, expected) in [
+            (point(f64::NAN, 0.2, vec![QUIET]), "the delay is NaN"),
+            (point(0.2, f64::INFINITY, vec![QUIET]), "the delay is"),
+            (point(0.2, 0.2, vec![QUIET; 2]), "noise of 2 recordings"),
+            (point(0.2, 0.2, noise(1.0, -2.0)), "noise of deviation -2"),
+            (point(0.2, 0.2, noise(-3.0, 2.0)), "time constant -3"),
+        ] {
+            let point = Point { gain: 1.0, ..point };
+            for found in [
+                model.at(0, &point, &Task::new()).map(|_| ()),
+                model.objective(&point, &Task::new()).map(|_| ()),
+                model.fit(&point, None, 1e-6, &Task::new()).map(|_| ()),
+            ] {
+                let found = found.unwrap_err().to_string();
+                assert!(
+                    found.contains(expected) || found.contains("lag is inf"),
+                    "{found}"
+                );
+            }
+        }
+        let found = model.fit(&point(0.2, 0.2, vec![QUIET]), None, 0.0, &Task::new());
+        assert!(found.unwrap_err().to_string().contains("a tolerance of 0"));
     }
 }

@@ -13,112 +13,19 @@
 //! independent of the scale of the columns, which changes with the lags.
 
 use super::disturbance::{Disturbance, Entry, Joint};
-use super::orthogonal::Orthogonal;
-use super::path::{Held, respond};
+use super::mean::{Derivatives, Gain, Mean, Values, sizes};
+use super::orthogonal::Triangle;
 use super::plant::{Plant, PlantSpace};
-use super::whiten::{Kick, whiten_in_place};
+use super::rows::Rows;
+use super::whiten::{Kick, whiten};
 use crate::dde::propagator::Propagator;
-use crate::{Error, Task};
-
-/// Relative step of the difference quotient by a lag.
-const STEP: f64 = 1e-5;
+use crate::{Error, Task, memory};
 
 /// Smallest sum of squares, as a share of that of the output: below is rounding.
 const ROUNDING: f64 = 1e-26;
 
-/// What was sent to the plant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Commands {
-    /// From when each command holds, s, increasing.
-    pub time: Vec<f64>,
-    /// The commands.
-    pub value: Vec<f64>,
-    /// Times between which the command is unknown: a linear unknown for each.
-    pub unknown: Vec<(f64, f64)>,
-    /// Times between which the command was computed, and its error: the standard deviation of the
-    /// response it causes, as a factor on that of a unit command, in white deviations.
-    pub uncertain: Vec<(f64, f64, f64)>,
-}
-
-/// The rows of one recording.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rows {
-    /// s, increasing.
-    pub time: Vec<f64>,
-    /// The output.
-    pub output: Vec<f64>,
-    /// Rows that are not used have no part in the likelihood.
-    pub used: Vec<bool>,
-    /// The commands.
-    pub commands: Commands,
-    /// Is the output at the start unknown?
-    pub offset: bool,
-    /// Is there a constant input besides the command?
-    pub trim: bool,
-}
-
-impl Rows {
-    /// The rows, checked.
-    ///
-    /// # Errors
-    ///
-    /// If lengths differ or times do not increase.
-    pub fn checked(self) -> Result<Self, Error> {
-        let n = self.time.len();
-        refuse_if!(
-            n < 2 || self.output.len() != n || self.used.len() != n,
-            "{n} times, {} outputs and {} marks of use: give two or more of each, equally many",
-            self.output.len(),
-            self.used.len()
-        );
-        let commands = &self.commands;
-        refuse_if!(
-            commands.time.is_empty() || commands.time.len() != commands.value.len(),
-            "{} times of commands and {} commands: give equally many, at least one",
-            commands.time.len(),
-            commands.value.len()
-        );
-        for time in [&self.time, &commands.time] {
-            if let Some(pair) = time.windows(2).find(|pair| !increases(pair)) {
-                refuse!(
-                    "the time {} follows {}: give increasing times",
-                    pair[1],
-                    pair[0]
-                );
-            }
-        }
-        Ok(self)
-    }
-}
-
-/// Is the second of two times after the first? Not where one of them is NaN.
-pub(super) fn increases(pair: &[f64]) -> bool {
-    pair[1] > pair[0]
-}
-
-/// The gain of the plant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Gain {
-    /// Unknown and eliminated.
-    Eliminated,
-    /// Unknown and searched, or held in a profile: at this value.
-    Searched(f64),
-    /// Given.
-    Known(f64),
-}
-
-/// The numbers of the mean.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Values {
-    /// s.
-    pub delay: f64,
-    /// Lags before the given part of the plant, s.
-    pub lags: Vec<f64>,
-    /// Time of the zero behind the last lag, s.
-    pub zero: f64,
-    /// The gain.
-    pub gain: Gain,
-}
+/// What memory is asked for.
+const WHAT: &str = "the residuals of the likelihood";
 
 /// Numbers of the noise, in standard deviations of the white noise; zero where there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,34 +41,33 @@ pub struct Noise {
 }
 
 impl Noise {
-    fn disturbances(&self) -> Vec<Disturbance> {
+    fn parts(&self) -> [Disturbance; 2] {
         [
             (Entry::Input, self.air_time, self.air),
             (Entry::Output, self.sensor_time, self.sensor),
         ]
-        .into_iter()
-        .filter(|(_, _, deviation)| *deviation > 0.0)
         .map(|(entry, time_constant, deviation)| Disturbance {
             entry,
             time_constant,
             deviation,
         })
-        .collect()
     }
-}
 
-/// By which numbers of the mean the likelihood is corrected for their estimation.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Derivatives {
-    pub(super) delay: bool,
-    pub(super) lags: Vec<bool>,
-    pub(super) zero: bool,
+    /// An error unless the numbers are those of noise.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        self.parts().iter().try_for_each(Disturbance::check)
+    }
+
+    fn disturbances(&self) -> Vec<Disturbance> {
+        let parts = self.parts().into_iter();
+        parts.filter(|part| part.deviation > 0.0).collect()
+    }
 }
 
 /// The likelihood at one set of numbers, and the best linear unknowns there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// −2 ln L, but for a constant.
+    /// −2 ln L, but for a constant; infinite where one unknown cannot be told from others.
     pub objective: f64,
     /// ln det V.
     pub log_det: f64,
@@ -205,152 +111,69 @@ pub(super) fn evaluate(
     task: &Task,
 ) -> Result<Evaluation, Error> {
     let n = rows.time.len();
-    let space = plant.space(&values.lags, values.zero);
-    let base = if plant.integrates() {
-        0.0
-    } else {
-        rows.commands.value.first().copied().unwrap_or(0.0)
-    };
-    let shifted: Vec<f64> = rows
-        .commands
-        .value
-        .iter()
-        .map(|value| value - base)
-        .collect();
-    let held = Held {
-        time: &rows.commands.time,
-        value: &shifted,
-    };
-    let mut response = vec![0.0; n];
-    let mut rate = vec![0.0; n];
-    respond(
-        &space,
-        held,
-        values.delay,
-        &rows.time,
-        &mut response,
-        Some(&mut rate),
-    );
-    // Columns of J, and the output last.
-    let mut columns = Vec::with_capacity(8 * n);
-    let (gain, eliminated) = match values.gain {
-        Gain::Eliminated => (1.0, true),
-        Gain::Searched(gain) | Gain::Known(gain) => (gain, false),
-    };
-    if eliminated {
-        columns.extend_from_slice(&response);
-    }
-    if rows.offset {
-        columns.extend(std::iter::repeat_n(1.0, n));
-    }
-    if rows.trim {
-        columns.extend(response_to_pulse(
-            &space,
-            (rows.time[0], f64::INFINITY),
-            0.0,
-            &rows.time,
-        ));
-    }
-    for pulse in &rows.commands.unknown {
-        columns.extend(response_to_pulse(&space, *pulse, values.delay, &rows.time));
-    }
-    let linear = columns.len() / n;
-    if matches!(values.gain, Gain::Searched(_)) {
-        columns.extend_from_slice(&response);
-    }
-    if by.delay {
-        columns.extend(rate.iter().map(|rate| -rate));
-    }
-    for (i, lag) in values.lags.iter().enumerate() {
-        if by.lags.get(i) == Some(&true) && *lag != 0.0 {
-            let mut moved = values.lags.clone();
-            moved[i] = lag * (1.0 + STEP);
-            let other = plant.space(&moved, values.zero);
-            columns.extend(difference(
-                &other,
-                held,
-                values.delay,
-                &rows.time,
-                &response,
-                lag * STEP,
-            ));
-        }
-    }
-    if by.zero {
-        let lag = values.lags.last().copied().unwrap_or(1.0);
-        let other = plant.space(&values.lags, values.zero + lag * STEP);
-        columns.extend(difference(
-            &other,
-            held,
-            values.delay,
-            &rows.time,
-            &response,
-            lag * STEP,
-        ));
-    }
-    let count = columns.len() / n;
-    let mut target: Vec<f64> = rows.output.clone();
-    if !eliminated {
-        for (target, response) in target.iter_mut().zip(&response) {
-            *target -= gain * response;
-        }
-    }
-    let power: f64 = rows.output.iter().map(|y| y * y).sum();
-    let raw_target = target.clone();
-    columns.extend(target);
-    let raw = (wanted == Wanted::All).then(|| columns[..linear * n].to_vec());
-    let all_used = rows.used.iter().all(|used| *used);
-    if !all_used {
-        for column in columns.chunks_exact_mut(n) {
-            clear(column, &rows.used);
-        }
-    }
-    let disturbances = noise.disturbances();
-    let kicks = kicks(rows, &space, values.delay);
-    let is_white = disturbances.is_empty() && kicks.is_empty();
-    let (mut log_det, mut raw_log_det) = (0.0, 0.0);
-    if !is_white {
-        let mut copy = columns[..count * n].to_vec();
-        raw_log_det = Orthogonal::new(&mut copy, n, count).log_det();
-        let joint = Joint::new(&space, &disturbances)?;
-        log_det = whiten_in_place(&rows.time, &rows.used, &mut columns, &joint, &kicks, task)?;
-    }
-    let (x, target) = columns.split_at_mut(count * n);
-    let mut orthogonal = Orthogonal::new(&mut x[..linear * n], n, linear);
-    let parts = orthogonal.project(x, target);
-    let squares = target
-        .iter()
-        .map(|e| e * e)
-        .sum::<f64>()
-        .max(ROUNDING * power);
-    for column in linear..count {
-        let (before, rest) = x.split_at_mut(column * n);
-        orthogonal.push(before, &mut rest[..n]);
-    }
     let used = rows.used.iter().filter(|used| **used).count();
+    let (_, count) = sizes(rows, values, by);
     refuse_if!(
         used <= count,
         "{used} rows for {count} unknowns: the likelihood needs more rows than unknowns"
     );
+    let space = plant.space(&values.lags, values.zero);
+    let mut mean = Mean::new(rows, plant, &space, values, by, task)?;
+    let (linear, all) = (mean.linear, count + 1);
+    let mut raw = Vec::new();
+    if wanted == Wanted::All {
+        // The linear columns and the output, to compute residuals from.
+        raw = memory::copied(WHAT, &mean.columns[..linear * n])?;
+        memory::append(WHAT, &mut raw, &mean.columns[count * n..])?;
+    }
+    if used < n {
+        for column in mean.columns.chunks_exact_mut(n) {
+            clear(column, &rows.used);
+        }
+    }
+    let recorded = rows.output.iter().zip(&rows.used);
+    let power: f64 = recorded
+        .filter(|(_, used)| **used)
+        .map(|(y, _)| y * y)
+        .sum();
+    let disturbances = noise.disturbances();
+    let kicks = kicks(rows, &space, values.delay)?;
+    let mut log_det = 0.0;
+    let mut log_gram = 0.0;
+    let is_white = disturbances.is_empty() && kicks.is_empty();
+    if !is_white {
+        log_gram = -Triangle::new(&mean.columns, n, count, task)?.log_det(count);
+        let joint = Joint::new(&space, &disturbances)?;
+        log_det = whiten(
+            &rows.time,
+            &rows.used,
+            &mut mean.columns,
+            &joint,
+            &kicks,
+            task,
+        )?;
+    }
+    let triangle = Triangle::new(&mean.columns, n, all, task)?;
+    if !is_white {
+        log_gram += triangle.log_det(count);
+    }
+    let (parts, rest) = triangle.column(count).split_at(linear);
+    let squares = rest
+        .iter()
+        .map(|e| e * e)
+        .sum::<f64>()
+        .max(ROUNDING * power);
     let freedom = used - count;
     let m = freedom as f64;
     let variance = (squares / m).max(f64::MIN_POSITIVE);
-    let log_gram = if is_white {
-        0.0
-    } else {
-        orthogonal.log_det() - raw_log_det
-    };
     let objective = m * variance.ln() + log_det + log_gram;
+    let is_certain = objective.is_finite() && !triangle.is_dependent(count);
     let mut found = Evaluation {
-        objective: if orthogonal.dependent {
-            f64::INFINITY
-        } else {
-            objective
-        },
+        objective: if is_certain { objective } else { f64::INFINITY },
         log_det,
         variance,
         freedom,
-        gain,
+        gain: 1.0,
         linear: Vec::new(),
         inverse: Vec::new(),
         score: Vec::new(),
@@ -358,45 +181,64 @@ pub(super) fn evaluate(
         residuals: Vec::new(),
         rate: Vec::new(),
     };
-    if let Some(raw) = raw {
-        found.linear = orthogonal.solve(&parts);
-        if eliminated {
-            found.gain = found.linear.first().copied().unwrap_or(0.0);
-        }
-        found.inverse = orthogonal.inverse();
-        // The derivatives above are those of a plant of unit gain.
-        let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
-        for (place, entry) in found.inverse.iter_mut().enumerate() {
-            for index in [place / count, place % count] {
-                if index >= first {
-                    *entry /= found.gain;
-                }
-            }
-        }
-        if by.delay {
-            let place = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
-            found.score = x[place * n..(place + 1) * n].to_vec();
-        }
-        found.whitened = target.iter().map(|e| e / variance.sqrt()).collect();
-        found.residuals = raw_target;
-        for (value, column) in found.linear.iter().zip(raw.chunks_exact(n)) {
-            for (residual, column) in found.residuals.iter_mut().zip(column) {
-                *residual -= value * column;
-            }
-        }
-        found.rate = rate.iter().map(|rate| found.gain * rate).collect();
+    if wanted == Wanted::Objective {
+        return Ok(found);
     }
+    found.linear = triangle.solve(parts);
+    found.gain = match values.gain {
+        Gain::Eliminated => found.linear.first().copied().unwrap_or(0.0),
+        Gain::Searched(gain) | Gain::Known(gain) => gain,
+    };
+    found.inverse = triangle.inverse(count)?;
+    // The derivatives by delay, lags and zero are those of a plant of unit gain.
+    let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
+    for (place, entry) in found.inverse.iter_mut().enumerate() {
+        for index in [place / count, place % count] {
+            if index >= first {
+                *entry /= found.gain;
+            }
+        }
+    }
+    if by.delay {
+        let place = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
+        let mut unit = vec![0.0; place + 1];
+        unit[place] = 1.0;
+        found.score = memory::filled(WHAT, 0.0, n)?;
+        subtract(&mut found.score, &triangle.solve(&unit), &mean.columns);
+        found.score.iter_mut().for_each(|entry| *entry = -*entry);
+    }
+    found.whitened = memory::copied(WHAT, &mean.columns[count * n..])?;
+    subtract(&mut found.whitened, &found.linear, &mean.columns);
+    let deviation = variance.sqrt();
+    found
+        .whitened
+        .iter_mut()
+        .for_each(|entry| *entry /= deviation);
+    found.residuals = memory::copied(WHAT, &raw[linear * n..])?;
+    subtract(&mut found.residuals, &found.linear, &raw);
+    found.rate = mean.rate;
+    found.rate.iter_mut().for_each(|rate| *rate *= found.gain);
     Ok(found)
 }
 
-/// What the errors of computed commands do to the states of the plant by the next row.
-fn kicks(rows: &Rows, space: &PlantSpace, delay: f64) -> Vec<Kick> {
-    let n = space.b.len();
-    if n == 0 {
-        return Vec::new();
+/// Subtract the first columns, as many as factors, each times its factor.
+fn subtract(from: &mut [f64], factors: &[f64], columns: &[f64]) {
+    for (factor, column) in factors.iter().zip(columns.chunks_exact(from.len().max(1))) {
+        for (from, entry) in from.iter_mut().zip(column) {
+            *from -= factor * entry;
+        }
     }
-    let mut found = Vec::with_capacity(rows.commands.uncertain.len());
-    for (start, end, deviation) in &rows.commands.uncertain {
+}
+
+/// What the errors of computed commands do to the states of the plant by the next row.
+fn kicks(rows: &Rows, space: &PlantSpace, delay: f64) -> Result<Vec<Kick>, Error> {
+    let n = space.b.len();
+    let uncertain = &rows.commands.uncertain;
+    let mut found = memory::reserved("the errors of commands", uncertain.len())?;
+    if n == 0 {
+        return Ok(found);
+    }
+    for (start, end, deviation) in uncertain {
         let arrival = end + delay;
         let row = rows.time.partition_point(|time| *time < arrival);
         let Some(time) = rows.time.get(row).filter(|_| row > 0) else {
@@ -415,35 +257,7 @@ fn kicks(rows: &Rows, space: &PlantSpace, delay: f64) -> Vec<Kick> {
         }
         found.push(Kick { row, state: moved });
     }
-    found
-}
-
-/// The response to an input of one between two times, `delay` later.
-fn response_to_pulse(space: &PlantSpace, ends: (f64, f64), delay: f64, times: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; times.len()];
-    let held = Held {
-        time: &[ends.0, ends.1],
-        value: &[1.0, 0.0],
-    };
-    respond(space, held, delay, times, &mut out, None);
-    out
-}
-
-/// The difference quotient of the response.
-fn difference(
-    other: &PlantSpace,
-    held: Held<'_>,
-    delay: f64,
-    times: &[f64],
-    response: &[f64],
-    step: f64,
-) -> Vec<f64> {
-    let mut out = vec![0.0; times.len()];
-    respond(other, held, delay, times, &mut out, None);
-    for (out, response) in out.iter_mut().zip(response) {
-        *out = (*out - response) / step;
-    }
-    out
+    Ok(found)
 }
 
 fn clear(column: &mut [f64], used: &[bool]) {
@@ -451,5 +265,276 @@ fn clear(column: &mut [f64], used: &[bool]) {
         if !used {
             *entry = 0.0;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{
+        cholesky, coloured, commands, forward, gaussian, gram, integral, integrated, log_det,
+        recording, solve,
+    };
+    use super::*;
+
+    const QUIET: Noise = Noise {
+        air_time: 1.0,
+        air: 0.0,
+        sensor_time: 1.0,
+        sensor: 0.0,
+    };
+    const WINDY: Noise = Noise {
+        air_time: 0.8,
+        air: 3.0,
+        sensor_time: 0.2,
+        sensor: 0.5,
+    };
+    const DELAY: f64 = 0.31;
+
+    fn integrator() -> Plant {
+        Plant::new(&[1.0], &[1.0, 0.0]).unwrap()
+    }
+
+    fn values(gain: Gain, lags: &[f64]) -> Values {
+        Values {
+            delay: DELAY,
+            lags: lags.to_vec(),
+            zero: 0.0,
+            gain,
+        }
+    }
+
+    fn by_delay(lags: usize) -> Derivatives {
+        Derivatives {
+            delay: true,
+            lags: vec![true; lags],
+            zero: false,
+        }
+    }
+
+    /// Rows with a hole, noise, trim and a time of unknown command.
+    fn rows(count: usize) -> Rows {
+        let mut rows = recording(count);
+        let sent = commands(&rows);
+        let noise = gaussian(5, count);
+        for (i, output) in rows.output.iter_mut().enumerate() {
+            *output = 0.3 + 0.85 * integral(&sent, DELAY, rows.time[i]) + 0.01 * noise[i];
+            rows.used[i] = !(20..26).contains(&i);
+        }
+        rows.trim = true;
+        rows.commands.unknown = vec![(1.3, 1.69)];
+        rows.checked().unwrap()
+    }
+
+    fn at(rows: &Rows, values: &Values, noise: &Noise) -> Evaluation {
+        let by = by_delay(values.lags.len());
+        evaluate(
+            rows,
+            &integrator(),
+            values,
+            noise,
+            &by,
+            Wanted::All,
+            &Task::new(),
+        )
+        .unwrap()
+    }
+
+    /// −2 ln L by dense matrices, the linear unknowns, and the mean there.
+    fn dense(
+        rows: &Rows,
+        noise: &Noise,
+        kicks: &[(usize, f64)],
+        known: Option<f64>,
+    ) -> (f64, Vec<f64>) {
+        let sent = commands(rows);
+        let place: Vec<usize> = (0..rows.time.len()).filter(|i| rows.used[*i]).collect();
+        let column = |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            place.iter().map(|i| of(rows.time[*i])).collect()
+        };
+        let response = column(&|t| integral(&sent, DELAY, t));
+        let mut x = vec![column(&|_| 1.0), column(&|t| t - rows.time[0])];
+        for (start, end) in &rows.commands.unknown {
+            x.push(column(&|t| {
+                integral(&[(*start, 1.0), (*end, 0.0)], DELAY, t)
+            }));
+        }
+        if known.is_none() {
+            x.insert(0, response.clone());
+        }
+        let slope = column(&|t| {
+            let arrived = sent.iter().rev().find(|(from, _)| from + DELAY <= t);
+            -arrived.map_or(0.0, |(_, value)| *value)
+        });
+        let y: Vec<f64> = place
+            .iter()
+            .zip(&response)
+            .map(|(i, response)| rows.output[*i] - known.unwrap_or(0.0) * response)
+            .collect();
+        let v: Vec<Vec<f64>> = place
+            .iter()
+            .map(|i| {
+                let entry = |j: &usize| {
+                    let (s, t) = (rows.time[*i] - rows.time[0], rows.time[*j] - rows.time[0]);
+                    let kicked = kicks.iter().filter(|(row, _)| row <= i && row <= j);
+                    f64::from(u8::from(i == j))
+                        + integrated(noise.air, noise.air_time, s, t)
+                        + coloured(noise.sensor, noise.sensor_time, s, t)
+                        + kicked.map(|(_, size)| size * size).sum::<f64>()
+                };
+                place.iter().map(entry).collect()
+            })
+            .collect();
+        let l = cholesky(&v);
+        let white = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            columns.iter().map(|column| forward(&l, column)).collect()
+        };
+        let mut j = x.clone();
+        j.push(slope);
+        let target = forward(&l, &y);
+        let whitened = white(&x);
+        let product = |a: &[f64]| -> f64 { a.iter().zip(&target).map(|(a, b)| a * b).sum() };
+        let right: Vec<f64> = whitened.iter().map(|column| product(column)).collect();
+        let linear = solve(&gram(&whitened), &right);
+        let explained: f64 = linear.iter().zip(&right).map(|(a, b)| a * b).sum();
+        let m = (place.len() - j.len()) as f64;
+        let objective = m * ((product(&target) - explained) / m).ln()
+            + log_det(&l)
+            + log_det(&cholesky(&gram(&white(&j))))
+            - log_det(&cholesky(&gram(&j)));
+        (objective, linear)
+    }
+
+    #[test]
+    fn the_objective_is_that_of_dense_matrices() {
+        let rows = rows(90);
+        for noise in [QUIET, WINDY] {
+            for known in [None, Some(0.8)] {
+                let gain = known.map_or(Gain::Eliminated, Gain::Known);
+                let found = at(&rows, &values(gain, &[]), &noise);
+                let (objective, linear) = dense(&rows, &noise, &[], known);
+                assert!((found.objective - objective).abs() < 1e-7, "{found:?}");
+                assert_eq!(found.linear.len(), linear.len());
+                for (found, expected) in found.linear.iter().zip(&linear) {
+                    assert!((found - expected).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_command_is_in_the_objective() {
+        let mut rows = rows(90);
+        rows.commands.unknown.clear();
+        // The first ends when row 40 is read; the second has no row any more.
+        rows.commands.uncertain = vec![(2.0, 2.6 - DELAY, 0.5), (5.0, 9.0, 1.0)];
+        let rows = rows.checked().unwrap();
+        for noise in [QUIET, WINDY] {
+            let found = at(&rows, &values(Gain::Eliminated, &[]), &noise);
+            let size = 0.5 * (2.6 - DELAY - 2.0);
+            let (objective, _) = dense(&rows, &noise, &[(40, size)], None);
+            assert!((found.objective - objective).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn residuals_score_and_covariance_are_those_of_the_fit() {
+        let rows = rows(90);
+        let found = at(&rows, &values(Gain::Eliminated, &[0.1]), &WINDY);
+        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+        assert!((norm(&found.score) - 1.0).abs() < 1e-12);
+        let unused = rows.used.iter().zip(&found.score).zip(&found.whitened);
+        assert!(
+            unused
+                .filter(|((used, _), _)| !**used)
+                .all(|((_, s), w)| *s == 0.0 && *w == 0.0)
+        );
+        // Gain, offset, trim and the unknown command are eliminated; delay and lag are searched.
+        assert_eq!(found.freedom, 84 - 6);
+        assert!((norm(&found.whitened) / found.freedom as f64 - 1.0).abs() < 1e-9);
+        assert_eq!(found.gain, found.linear[0]);
+        assert_eq!(found.inverse.len(), 36);
+        // Without noise beside the white the residuals are those, but for their scale.
+        let white = at(&rows, &values(Gain::Eliminated, &[0.1]), &QUIET);
+        for i in (0..90).filter(|i| rows.used[*i]) {
+            let expected = white.whitened[i] * white.variance.sqrt();
+            assert!((white.residuals[i] - expected).abs() < 1e-12);
+        }
+        // The delay is known as well as the part of its derivative that no linear unknown explains.
+        let alone = at(&rows, &values(Gain::Eliminated, &[]), &QUIET);
+        let sent = commands(&rows);
+        let slope: f64 = rows
+            .time
+            .iter()
+            .zip(&rows.used)
+            .zip(&alone.score)
+            .filter(|((_, used), _)| **used)
+            .map(|((t, _), score)| {
+                let arrived = sent.iter().rev().find(|(from, _)| from + DELAY <= *t);
+                -arrived.map_or(0.0, |(_, value)| *value) * score
+            })
+            .sum();
+        assert!((alone.inverse[24] * slope * slope - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rows_that_are_not_used_have_no_influence() {
+        let first = rows(90);
+        let expected = at(&first, &values(Gain::Eliminated, &[0.1]), &WINDY);
+        for value in [f64::NAN, f64::INFINITY, -1e300, 0.0] {
+            let mut other = first.clone();
+            for (output, used) in other.output.iter_mut().zip(&first.used) {
+                if !used {
+                    *output = value;
+                }
+            }
+            let found = at(
+                &other.checked().unwrap(),
+                &values(Gain::Eliminated, &[0.1]),
+                &WINDY,
+            );
+            assert_eq!(found.objective, expected.objective);
+            assert_eq!(found.linear, expected.linear);
+            assert_eq!(found.inverse, expected.inverse);
+            assert_eq!(found.whitened, expected.whitened);
+        }
+    }
+
+    #[test]
+    fn differences_of_the_objective_do_not_depend_on_units() {
+        let first = rows(90);
+        let mut other = first.clone();
+        other.output.iter_mut().for_each(|y| *y *= 1e3);
+        other.commands.value.iter_mut().for_each(|u| *u *= 250.0);
+        let difference = |rows: &Rows| {
+            at(rows, &values(Gain::Eliminated, &[0.1]), &WINDY).objective
+                - at(rows, &values(Gain::Eliminated, &[0.3]), &QUIET).objective
+        };
+        assert!((difference(&first) - difference(&other)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fewer_rows_than_unknowns_are_refused() {
+        let mut rows = rows(40);
+        rows.used.iter_mut().skip(5).for_each(|used| *used = false);
+        let by = by_delay(0);
+        let values = values(Gain::Eliminated, &[]);
+        let found = evaluate(
+            &rows,
+            &integrator(),
+            &values,
+            &QUIET,
+            &by,
+            Wanted::Objective,
+            &Task::new(),
+        );
+        assert!(found.is_err_and(|error| error.to_string().starts_with("5 rows for 5 unknowns")));
+    }
+
+    #[test]
+    fn an_unknown_that_shows_in_no_row_makes_the_objective_infinite() {
+        let mut rows = rows(90);
+        rows.commands.value.fill(0.0);
+        let found = at(&rows, &values(Gain::Eliminated, &[]), &WINDY);
+        assert_eq!(found.objective, f64::INFINITY);
     }
 }

@@ -6,25 +6,30 @@
 //! ```
 //!
 //! F is the response of the plant of unit gain to the commands as they were held, R its response
-//! to a constant input (trim). Gain, offset and trim are linear and eliminated exactly (`likelihood`), the
-//! variance of the white noise too; delay, lags and the numbers of the noise are searched (`search`,
-//! `fit`), and intervals are those of the profile (`profile`).
+//! to a constant input (trim). Gain, offset and trim are linear and eliminated exactly
+//! (`likelihood`), the variance of the white noise too; delay, lags and the numbers of the noise are
+//! searched (`search`, `fit`), and intervals are those of the profile (`profile`).
 
 mod disturbance;
 mod fit;
 mod likelihood;
+mod mean;
 mod orthogonal;
 mod path;
 mod plant;
+mod point;
 mod profile;
 mod propagation;
-mod quantity;
+mod rows;
 mod search;
+#[cfg(test)]
+mod tests;
 mod whiten;
 
 pub use disturbance::{Disturbance, Entry};
-pub use fit::{Fit, Free, Model, Point, Timing};
-pub use likelihood::{Commands, Evaluation, Gain, Noise, Rows, Values};
-pub use plant::{Plant, PlantSpace};
-pub use quantity::Quantity;
-pub use whiten::{Whitened, whiten};
+pub use fit::{Fit, Free, Model};
+pub use likelihood::{Evaluation, Noise};
+pub use plant::Plant;
+pub use point::{Point, Quantity, Timing};
+pub use rows::{Commands, Rows};
+pub use whiten::whitened;

@@ -1,106 +1,213 @@
-//! Least squares by modified Gram–Schmidt with the target as a last column (Björck 1967), which is
-//! as stable as Householder's reflections for the solution and the residuals.
+//! The triangular factor R of columns, X = Q R, by modified Gram–Schmidt on blocks of rows.
+//!
+//! Each block is made orthonormal below the factor of the rows before it (Golub & Van Loan 2013,
+//! section 5.2), so that long columns are read once and a block stays in the cache. R is as accurate as by
+//! Householder's reflections (Björck 1967); with the target as a last column it holds the solution
+//! and the sum of squares, and Q is not needed.
 
 use super::path::dot;
+use crate::{Error, Task, memory};
 
 /// Norm of what is left of a column, as a share of its norm, below which it depends on the others.
 const DEPENDENT: f64 = 1e-9;
 
-/// Columns made orthogonal, with the triangular factor R.
-#[derive(Debug, Clone)]
-pub(super) struct Orthogonal {
+/// Rows of a block, and the least as a multiple of the columns.
+const BLOCK: usize = 256;
+const BLOCK_SHARE: usize = 2;
+
+/// R of some columns.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Triangle {
     /// Column by column; row i of column j at j (j + 1)/2 + i.
     factor: Vec<f64>,
-    /// Number of columns.
-    pub(super) count: usize,
-    /// Does one column depend on those before it?
-    pub(super) dependent: bool,
 }
 
-impl Orthogonal {
-    /// Make the `count` columns of this length orthonormal in place.
-    pub(super) fn new(columns: &mut [f64], length: usize, count: usize) -> Self {
-        let mut found = Self {
-            factor: Vec::with_capacity(count * (count + 1) / 2),
-            count: 0,
-            dependent: false,
-        };
-        for _ in 0..count {
-            let (before, rest) = columns.split_at_mut(found.count * length);
-            found.push(before, &mut rest[..length]);
-        }
-        found
-    }
-
-    /// Subtract from `target` its parts along the columns, and return these.
-    pub(super) fn project(&self, columns: &[f64], target: &mut [f64]) -> Vec<f64> {
-        columns
-            .chunks_exact(target.len().max(1))
-            .take(self.count)
-            .map(|column| {
-                let part = dot(column, target);
-                for (target, column) in target.iter_mut().zip(column) {
-                    *target -= part * column;
+impl Triangle {
+    /// R of `count` columns of this length, one after the other.
+    pub(super) fn new(
+        columns: &[f64],
+        length: usize,
+        count: usize,
+        task: &Task,
+    ) -> Result<Self, Error> {
+        const WHAT: &str = "the triangular factor";
+        let block = BLOCK.max(BLOCK_SHARE * count).min(length);
+        let stride = count + block;
+        let mut factor = memory::filled(WHAT, 0.0, count * (count + 1) / 2)?;
+        let mut stacked = memory::filled(WHAT, 0.0, stride * count)?;
+        for start in (0..length).step_by(block.max(1)) {
+            task.check()?;
+            let rows = block.min(length - start);
+            for (j, to) in stacked.chunks_exact_mut(stride).enumerate() {
+                let (above, below) = to.split_at_mut(count);
+                above.fill(0.0);
+                above[..=j].copy_from_slice(&factor[j * (j + 1) / 2..][..=j]);
+                let from = j * length + start;
+                below[..rows].copy_from_slice(&columns[from..from + rows]);
+                below[rows..].fill(0.0);
+            }
+            for j in 0..count {
+                let (before, rest) = stacked.split_at_mut(j * stride);
+                let own = &mut rest[..stride];
+                let parts = &mut factor[j * (j + 1) / 2..][..=j];
+                for (part, q) in parts.iter_mut().zip(before.chunks_exact(stride)) {
+                    *part = dot(q, own);
+                    for (own, q) in own.iter_mut().zip(q) {
+                        *own -= *part * q;
+                    }
                 }
-                part
-            })
-            .collect()
+                let left = dot(own, own).sqrt();
+                let inverse = if left > 0.0 { 1.0 / left } else { 0.0 };
+                own.iter_mut().for_each(|entry| *entry *= inverse);
+                parts[j] = left;
+            }
+        }
+        Ok(Self { factor })
     }
 
-    /// Make one more column orthonormal to those `before`.
-    pub(super) fn push(&mut self, before: &[f64], column: &mut [f64]) {
-        let size = dot(column, column).sqrt();
-        let mut parts = self.project(before, column);
-        let left = dot(column, column).sqrt();
-        let stands_out = left > DEPENDENT * size;
-        self.dependent |= !stands_out;
-        let inverse = if left > 0.0 { 1.0 / left } else { 0.0 };
-        column.iter_mut().for_each(|entry| *entry *= inverse);
-        parts.push(left);
-        self.factor.extend(parts);
-        self.count += 1;
+    /// A column of R down to its diagonal.
+    pub(super) fn column(&self, j: usize) -> &[f64] {
+        &self.factor[j * (j + 1) / 2..][..=j]
     }
 
-    fn entry(&self, row: usize, column: usize) -> f64 {
-        self.factor[column * (column + 1) / 2 + row]
+    /// Is one of the first `count` columns not independent of those before it?
+    pub(super) fn is_dependent(&self, count: usize) -> bool {
+        (0..count).any(|j| {
+            let column = self.column(j);
+            let size = dot(column, column).sqrt();
+            // Not a number is not independent.
+            (column[j] / size).partial_cmp(&DEPENDENT) != Some(std::cmp::Ordering::Greater)
+        })
     }
 
-    /// ln det of the Gram matrix of the columns.
-    pub(super) fn log_det(&self) -> f64 {
-        (0..self.count)
-            .map(|j| 2.0 * self.entry(j, j).max(f64::MIN_POSITIVE).ln())
+    /// ln det of the Gram matrix of the first `count` columns.
+    pub(super) fn log_det(&self, count: usize) -> f64 {
+        (0..count)
+            .map(|j| 2.0 * self.column(j)[j].max(f64::MIN_POSITIVE).ln())
             .sum()
     }
 
-    /// The solution of R x = `parts`, for the first columns, as many as there are parts.
-    pub(super) fn solve(&self, parts: &[f64]) -> Vec<f64> {
-        let mut x = parts.to_vec();
+    /// The solution of R x = `right` for the first columns, as many as entries.
+    pub(super) fn solve(&self, right: &[f64]) -> Vec<f64> {
+        let mut x = right.to_vec();
         for j in (0..x.len()).rev() {
-            x[j] /= self.entry(j, j);
-            let (above, own) = x.split_at_mut(j);
-            for (i, x) in above.iter_mut().enumerate() {
-                *x -= self.entry(i, j) * own[0];
+            let column = self.column(j);
+            let value = x[j] / column[j];
+            x[j] = value;
+            for (x, entry) in x[..j].iter_mut().zip(column) {
+                *x -= entry * value;
             }
         }
         x
     }
 
-    /// (RᵀR)⁻¹, row-major.
-    pub(super) fn inverse(&self) -> Vec<f64> {
-        let n = self.count;
-        let columns: Vec<Vec<f64>> = (0..n)
-            .map(|j| {
-                let mut unit = vec![0.0; n];
-                unit[j] = 1.0;
-                self.solve(&unit)
-            })
-            .collect();
-        let mut out = vec![0.0; n * n];
-        for i in 0..n {
-            for j in 0..n {
-                out[i * n + j] = columns.iter().map(|column| column[i] * column[j]).sum();
+    /// (RᵀR)⁻¹ of the first `count` columns, row-major.
+    pub(super) fn inverse(&self, count: usize) -> Result<Vec<f64>, Error> {
+        const WHAT: &str = "the covariance of the unknowns";
+        let mut unit = vec![0.0; count];
+        let mut columns = memory::reserved(WHAT, count * count)?;
+        for j in 0..count {
+            unit[j] = 1.0;
+            columns.extend(self.solve(&unit));
+            unit[j] = 0.0;
+        }
+        let mut out = memory::filled(WHAT, 0.0, count * count)?;
+        for column in columns.chunks_exact(count.max(1)) {
+            for (row, left) in out.chunks_exact_mut(count).zip(column) {
+                for (place, right) in row.iter_mut().zip(column) {
+                    *place += left * right;
+                }
             }
         }
-        out
+        Ok(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{cholesky, gaussian, gram, solve};
+    use super::*;
+
+    fn factor(columns: &[Vec<f64>]) -> Triangle {
+        let all = columns.concat();
+        Triangle::new(&all, columns[0].len(), columns.len(), &Task::new()).unwrap()
+    }
+
+    fn random(length: usize, count: usize) -> Vec<Vec<f64>> {
+        (0..count).map(|j| gaussian(j as u64 + 1, length)).collect()
+    }
+
+    #[test]
+    fn the_factor_is_that_of_the_normal_equations() {
+        // One row more than columns; one block; several; more columns than half a block.
+        for (length, count) in [(6, 5), (120, 5), (700, 5), (2000, 150)] {
+            let columns = random(length, count);
+            let products = gram(&columns);
+            let expected = cholesky(&products);
+            let found = factor(&columns);
+            for (j, expected) in expected.iter().enumerate() {
+                for (found, expected) in found.column(j).iter().zip(expected) {
+                    assert!((found - expected).abs() < 1e-9 * (length as f64).sqrt());
+                }
+            }
+            let log_det: f64 = (0..count).map(|j| 2.0 * expected[j][j].ln()).sum();
+            assert!((found.log_det(count) - log_det).abs() < 1e-9);
+            assert!(!found.is_dependent(count));
+        }
+    }
+
+    #[test]
+    fn the_solution_and_the_covariance_are_those_of_the_normal_equations() {
+        let columns = random(900, 4);
+        let found = factor(&columns);
+        // The last column is the target.
+        let products = gram(&columns);
+        let inner: Vec<Vec<f64>> = products[..3].iter().map(|row| row[..3].to_vec()).collect();
+        let right: Vec<f64> = products[..3].iter().map(|row| row[3]).collect();
+        for (found, expected) in found
+            .solve(&found.column(3)[..3])
+            .iter()
+            .zip(solve(&inner, &right))
+        {
+            assert!((found - expected).abs() < 1e-13);
+        }
+        let inverse = found.inverse(3).unwrap();
+        for (row, unit) in
+            inverse
+                .chunks_exact(3)
+                .zip([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        {
+            for (found, expected) in row.iter().zip(solve(&inner, &unit)) {
+                assert!((found - expected).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn columns_that_begin_with_zeros_are_independent() {
+        // The response to a command is zero until the delay is over.
+        let mut columns = random(900, 3);
+        columns[0][..600].fill(0.0);
+        columns[1][..300].fill(0.0);
+        let found = factor(&columns);
+        assert!(!found.is_dependent(3));
+        let expected = cholesky(&gram(&columns));
+        assert!((found.column(2)[2] - expected[2][2]).abs() < 1e-11);
+    }
+
+    #[test]
+    fn a_column_that_depends_on_others_is_seen() {
+        let mut columns = random(700, 3);
+        columns[2] = columns[0]
+            .iter()
+            .zip(&columns[1])
+            .map(|(x, y)| 3.0 * x - y)
+            .collect();
+        assert!(factor(&columns).is_dependent(3));
+        assert!(!factor(&columns).is_dependent(2));
+        columns[2].fill(0.0);
+        assert!(factor(&columns).is_dependent(3));
+        columns[2].fill(f64::NAN);
+        assert!(factor(&columns).is_dependent(3));
     }
 }

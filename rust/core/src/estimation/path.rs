@@ -3,9 +3,9 @@
 //! Exact: the state is propagated from event to event, an event being a row or the arrival of an
 //! input. Step lengths repeat on even rows, so that few propagators are made.
 
-use crate::dde::propagator::Propagator;
-
 use super::plant::PlantSpace;
+use crate::dde::propagator::Propagator;
+use crate::{Error, Task};
 
 /// Number of propagators that are kept.
 const KEPT: usize = 6;
@@ -13,6 +13,9 @@ const KEPT: usize = 6;
 /// Step lengths that differ by less than this share of the time and of the step are one.
 pub(super) const SAME: f64 = 1e-15;
 pub(super) const SAME_STEP: f64 = 1e-12;
+
+/// Events between two checks for a stop.
+const CHECKED: u32 = 4096;
 
 /// Inputs that hold from their times on; zero before the first.
 #[derive(Debug, Clone, Copy)]
@@ -28,59 +31,121 @@ pub(super) fn respond(
     delay: f64,
     times: &[f64],
     out: &mut [f64],
-    mut rate: Option<&mut [f64]>,
-) {
-    let n = plant.b.len();
-    let mut kept: Vec<(f64, Propagator)> = Vec::with_capacity(KEPT);
-    let mut next_kept = 0;
-    let mut state = vec![0.0; n];
-    let mut moved = vec![0.0; n];
-    let mut next = 0;
-    let mut input = 0.0;
-    let mut now = inputs.time.first().map_or(0.0, |first| first + delay);
-    for (row, &time) in times.iter().enumerate() {
-        loop {
-            let arrival = inputs.time.get(next).map_or(f64::INFINITY, |t| t + delay);
-            let until = time.min(arrival);
-            let step = until - now;
-            if step > 0.0 {
-                if n > 0 {
-                    let tolerance = SAME * until.abs() + SAME_STEP * step;
-                    let place = kept
-                        .iter()
-                        .position(|(key, _)| (key - step).abs() <= tolerance);
-                    let place = place.unwrap_or_else(|| {
-                        let made = (step, Propagator::new(&plant.a, &[&plant.b], step));
-                        if kept.len() < KEPT {
-                            kept.push(made);
-                            kept.len() - 1
-                        } else {
-                            next_kept = (next_kept + 1) % KEPT;
-                            kept[next_kept] = made;
-                            next_kept
-                        }
-                    });
-                    kept[place].1.apply(&state, &[input], &mut moved);
-                    std::mem::swap(&mut state, &mut moved);
-                }
-                now = until;
-            }
-            if arrival > time {
-                break;
-            }
-            input = inputs.value[next];
-            next += 1;
-            now = now.max(arrival);
-        }
-        out[row] = dot(&plant.c, &state) + plant.d * input;
-        if let Some(rate) = rate.as_deref_mut() {
-            rate[row] = (0..n)
-                .map(|i| {
-                    plant.c[i] * (dot(&plant.a[i * n..(i + 1) * n], &state) + plant.b[i] * input)
-                })
-                .sum();
+    rate: Option<&mut [f64]>,
+    task: &Task,
+) -> Result<(), Error> {
+    let run = match plant.b.len() {
+        0 => run::<0>,
+        1 => run::<1>,
+        2 => run::<2>,
+        3 => run::<3>,
+        4 => run::<4>,
+        5 => run::<5>,
+        6 => run::<6>,
+        7 => run::<7>,
+        8 => run::<8>,
+        n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
+    };
+    run(plant, inputs, delay, times, out, rate, task)
+}
+
+/// Φ − I and Γ of one step length.
+struct Step<const N: usize> {
+    length: f64,
+    growth: [[f64; N]; N],
+    gamma: [f64; N],
+}
+
+impl<const N: usize> Step<N> {
+    fn new(plant: &PlantSpace, length: f64) -> Self {
+        let made = Propagator::new(&plant.a, &[&plant.b], length);
+        let (growth, gamma) = (made.growth(), made.gamma(0));
+        Self {
+            length,
+            growth: std::array::from_fn(|i| std::array::from_fn(|j| growth[i * N + j])),
+            gamma: std::array::from_fn(|i| gamma[i]),
         }
     }
+
+    fn apply(&self, state: &[f64; N], input: f64) -> [f64; N] {
+        std::array::from_fn(|i| {
+            let change = self.growth[i].iter().zip(state).map(|(f, x)| f * x);
+            state[i] + (self.gamma[i] * input + change.sum::<f64>())
+        })
+    }
+}
+
+fn run<const N: usize>(
+    plant: &PlantSpace,
+    inputs: Held<'_>,
+    delay: f64,
+    times: &[f64],
+    out: &mut [f64],
+    mut rate: Option<&mut [f64]>,
+    task: &Task,
+) -> Result<(), Error> {
+    let c: [f64; N] = std::array::from_fn(|i| plant.c[i]);
+    // The slope of the output is C (A x + B u) between events.
+    let by_state: [f64; N] =
+        std::array::from_fn(|j| (0..N).map(|i| plant.c[i] * plant.a[i * N + j]).sum());
+    let by_input: f64 = plant.c.iter().zip(&plant.b).map(|(c, b)| c * b).sum();
+    let mut kept: Vec<Step<N>> = Vec::with_capacity(KEPT);
+    let (mut recent, mut oldest) = (0, 0);
+    let mut follower = [0; KEPT];
+    let mut state = [0.0; N];
+    let mut arrivals = inputs.time.iter().zip(inputs.value);
+    let mut coming = arrivals.next();
+    let mut input = 0.0;
+    let mut now = inputs.time.first().map_or(0.0, |first| first + delay);
+    let mut events: u32 = 0;
+    for (row, &time) in times.iter().enumerate() {
+        loop {
+            events = events.wrapping_add(1);
+            if events.is_multiple_of(CHECKED) {
+                task.check()?;
+            }
+            let arrival = coming.map_or(f64::INFINITY, |(time, _)| time + delay);
+            let until = time.min(arrival);
+            let length = until - now;
+            if N > 0 && length > 0.0 {
+                let tolerance = SAME * until.abs() + SAME_STEP * length;
+                let fits = |step: &Step<N>| (step.length - length).abs() <= tolerance;
+                // Steps alternate on even rows: what followed the last one is the likeliest.
+                let before = recent;
+                recent = if kept.get(follower[before]).is_some_and(fits) {
+                    follower[before]
+                } else if let Some(place) = kept.iter().position(fits) {
+                    place
+                } else if kept.len() < KEPT {
+                    kept.push(Step::new(plant, length));
+                    kept.len() - 1
+                } else {
+                    oldest = (oldest + 1) % KEPT;
+                    kept[oldest] = Step::new(plant, length);
+                    oldest
+                };
+                follower[before] = recent;
+                state = kept[recent].apply(&state, input);
+                now = until;
+            }
+            if let Some((_, value)) = coming.filter(|_| arrival <= time) {
+                input = *value;
+                coming = arrivals.next();
+                now = now.max(arrival);
+            } else {
+                break;
+            }
+        }
+        out[row] = product(&c, &state) + plant.d * input;
+        if let Some(rate) = rate.as_deref_mut() {
+            rate[row] = product(&by_state, &state) + by_input * input;
+        }
+    }
+    Ok(())
+}
+
+fn product<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
 /// Sums that a dot product is split into, so that they are computed side by side.
@@ -101,4 +166,144 @@ pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::plant::Plant;
+    use super::super::tests::{integral, lagged};
+    use super::*;
+
+    /// The response and its slope.
+    fn response(
+        plant: (&[f64], &[f64], &[f64]),
+        inputs: &[(f64, f64)],
+        delay: f64,
+        times: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (num, den, lags) = plant;
+        let space = Plant::new(num, den).unwrap().space(lags, 0.0);
+        let (time, value): (Vec<f64>, Vec<f64>) = inputs.iter().copied().unzip();
+        let held = Held {
+            time: &time,
+            value: &value,
+        };
+        let (mut out, mut rate) = (vec![f64::NAN; times.len()], vec![f64::NAN; times.len()]);
+        let task = Task::new();
+        respond(&space, held, delay, times, &mut out, Some(&mut rate), &task).unwrap();
+        (out, rate)
+    }
+
+    const INTEGRATOR: (&[f64], &[f64], &[f64]) = (&[1.0], &[1.0, 0.0], &[]);
+
+    fn increasing(steps: &[f64], start: f64) -> Vec<f64> {
+        steps
+            .iter()
+            .scan(start, |time, step| {
+                *time += step;
+                Some(*time)
+            })
+            .collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn an_integrator_and_a_lag_have_their_closed_forms(
+            rows in proptest::collection::vec(1e-3..0.3_f64, 1..60),
+            steps in proptest::collection::vec((1e-3..0.5_f64, -2.0..2.0_f64), 1..60),
+            start in -3.0..3.0_f64,
+            delay in 0.0..2.0_f64,
+            lag in prop_oneof![0.02..2.0_f64, -8.0..-4.0_f64],
+        ) {
+            let times = increasing(&rows, 0.0);
+            let (lengths, values): (Vec<f64>, Vec<f64>) = steps.into_iter().unzip();
+            let inputs: Vec<(f64, f64)> =
+                increasing(&lengths, start).into_iter().zip(values).collect();
+            let (found, rate) = response(INTEGRATOR, &inputs, delay, &times);
+            let (behind, slope) = response((&[1.0], &[1.0], &[lag]), &inputs, delay, &times);
+            for (row, time) in times.iter().enumerate() {
+                prop_assert!((found[row] - integral(&inputs, delay, *time)).abs() < 1e-12);
+                prop_assert!((behind[row] - lagged(&inputs, delay, lag, *time)).abs() < 1e-11);
+                let arrived = inputs.iter().rev().find(|(from, _)| from + delay <= *time);
+                let input = arrived.map_or(0.0, |(_, value)| *value);
+                prop_assert_eq!(rate[row], input);
+                prop_assert!((slope[row] - (input - behind[row]) / lag).abs() < 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn rows_and_commands_may_be_dense_or_sparse() {
+        let rows: Vec<f64> = (0..2000).map(|i| 0.005 * f64::from(i)).collect();
+        let inputs: Vec<(f64, f64)> = (0..2000)
+            .map(|i| 0.005 * f64::from(i))
+            .map(|time| (time, (3.0 * time).sin()))
+            .collect();
+        let few: Vec<(f64, f64)> = inputs.iter().copied().step_by(130).collect();
+        let some: Vec<f64> = rows.iter().copied().step_by(170).collect();
+        for (inputs, times) in [(&inputs, &some), (&few, &rows), (&inputs, &rows)] {
+            for delay in [0.0, 0.0023, 0.31] {
+                let (found, _) = response(INTEGRATOR, inputs, delay, times);
+                for (found, time) in found.iter().zip(times) {
+                    assert!((found - integral(inputs, delay, *time)).abs() < 1e-11);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_command_acts_from_its_row_on_where_there_is_no_delay() {
+        let inputs = [(0.0, 2.0), (1.0, 5.0)];
+        let (found, rate) = response((&[1.0], &[1.0], &[]), &inputs, 0.0, &[-1.0, 0.0, 0.5, 1.0]);
+        assert_eq!(found, [0.0, 2.0, 2.0, 5.0]);
+        assert_eq!(rate, [0.0; 4]);
+    }
+
+    #[test]
+    fn the_rate_is_the_slope_of_the_response() {
+        let plant: (&[f64], &[f64], &[f64]) = (&[0.4, 2.0], &[1.0, 0.6, 3.0, 0.0], &[0.3, 0.1]);
+        let inputs: Vec<(f64, f64)> = (0..40)
+            .map(|i| 0.25 * f64::from(i))
+            .map(|time| (time, (1.7 * time).cos()))
+            .collect();
+        let step = 1e-4;
+        // Between the arrivals of commands.
+        let middle: Vec<f64> = (0..30).map(|i| 0.25 * f64::from(i) + 0.3).collect();
+        let times: Vec<f64> = middle
+            .iter()
+            .flat_map(|t| [t - step, *t, t + step])
+            .collect();
+        let (found, rate) = response(plant, &inputs, 0.2, &times);
+        for (found, rate) in found.chunks_exact(3).zip(rate.chunks_exact(3)) {
+            assert!(((found[2] - found[0]) / (2.0 * step) - rate[1]).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_dot_product_of_any_length_is_one() {
+        for length in 0..40 {
+            let x: Vec<f64> = (0..length).map(f64::from).collect();
+            let n = f64::from(length);
+            assert_eq!(dot(&x, &x), (n - 1.0) * n * (2.0 * n - 1.0) / 6.0);
+        }
+    }
+
+    #[test]
+    fn a_stop_is_seen_within_the_events() {
+        let task = Task::new();
+        task.stop();
+        let space = Plant::new(&[1.0], &[1.0, 0.0]).unwrap().space(&[], 0.0);
+        let times: Vec<f64> = (0..5000).map(f64::from).collect();
+        let held = Held {
+            time: &times,
+            value: &times,
+        };
+        let mut out = vec![0.0; times.len()];
+        let found = respond(&space, held, 0.5, &times, &mut out, None, &task);
+        assert_eq!(found, Err(Error::Interrupted));
+    }
 }

@@ -5,17 +5,20 @@
 
 use crate::Error;
 
+/// Most states of plant and noise.
+pub(super) const MOST_STATES: usize = 8;
+
 /// A plant x′ = A x + B u, y = C x + D u; A row-major.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlantSpace {
+pub(super) struct PlantSpace {
     /// Shape (n, n).
-    pub a: Vec<f64>,
+    pub(super) a: Vec<f64>,
     /// Shape (n,).
-    pub b: Vec<f64>,
+    pub(super) b: Vec<f64>,
     /// Shape (n,).
-    pub c: Vec<f64>,
+    pub(super) c: Vec<f64>,
     /// Direct part.
-    pub d: f64,
+    pub(super) d: f64,
 }
 
 /// The given part of a plant, of unit gain: num(s)/den(s), proper.
@@ -32,12 +35,21 @@ impl Plant {
     ///
     /// # Errors
     ///
-    /// For a denominator that is empty or zero, and a numerator of a higher degree.
+    /// For a coefficient that is not finite, a denominator that is empty, zero or of too high a
+    /// degree, and a numerator of a higher degree.
     pub fn new(num: &[f64], den: &[f64]) -> Result<Self, Error> {
+        if let Some(c) = num.iter().chain(den).find(|c| !c.is_finite()) {
+            refuse!("a coefficient of the plant is {c}: give finite numbers");
+        }
         let lead = den.iter().position(|c| *c != 0.0);
         let Some(den) = lead.map(|lead| &den[lead..]) else {
             refuse!("the denominator of the plant is zero")
         };
+        refuse_if!(
+            den.len() > MOST_STATES + 1,
+            "the denominator of the plant has degree {}: the likelihood takes up to {MOST_STATES}",
+            den.len() - 1
+        );
         let num = &num[num.iter().position(|c| *c != 0.0).unwrap_or(num.len())..];
         refuse_if!(
             num.len() > den.len(),
@@ -54,13 +66,18 @@ impl Plant {
         })
     }
 
+    /// Number of states behind so many lags.
+    pub(super) const fn states(&self, lags: usize) -> usize {
+        self.den.len() - 1 + lags
+    }
+
     /// Does a constant input let the output grow without end?
-    pub fn integrates(&self) -> bool {
+    pub(super) fn integrates(&self) -> bool {
         self.den.len() > 1 && self.den[0] == 0.0
     }
 
     /// The plant behind these lags, s, the last of them with the zero (`zero` s + 1).
-    pub fn space(&self, lags: &[f64], zero: f64) -> PlantSpace {
+    pub(super) fn space(&self, lags: &[f64], zero: f64) -> PlantSpace {
         let lags: Vec<f64> = lags.iter().copied().filter(|lag| *lag != 0.0).collect();
         let (count, order) = (lags.len(), self.den.len() - 1);
         let n = count + order;
@@ -131,9 +148,9 @@ mod tests {
             for k in 0..n {
                 if k != i {
                     let factor = m[k][i] / m[i][i];
-                    let own = m[i].clone();
-                    for (entry, own) in m[k].iter_mut().zip(own) {
-                        *entry -= factor * own;
+                    let above = m[i].clone();
+                    for (entry, above) in m[k].iter_mut().zip(above).skip(i) {
+                        *entry -= factor * above;
                     }
                 }
             }

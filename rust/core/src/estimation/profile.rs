@@ -1,7 +1,7 @@
 //! The profile of the likelihood over one quantity, and the ends of an interval.
 
-use super::fit::{Fit, Model, Point, SHORTEST_LAG, Timing};
-use super::quantity::Quantity;
+use super::fit::{Fit, Model, SHORTEST_LAG};
+use super::point::{Point, Quantity, Timing};
 use crate::{Error, Task};
 
 /// Farthest end of an interval, in Gaussian half widths.
@@ -17,16 +17,6 @@ const RISE_TOLERANCE: f64 = 1e-3;
 const REFINEMENTS: usize = 12;
 
 impl Quantity {
-    /// Its value at a point; a gain that is eliminated is no part of a point.
-    pub fn value(self, point: &Point) -> f64 {
-        match self {
-            Self::Delay => point.delay(),
-            Self::Total => point.total(),
-            Self::Gain => point.gain,
-            Self::Lag(i) => point.lags.get(i).copied().unwrap_or(0.0),
-        }
-    }
-
     /// A point with the quantity at this value and the others near where they were.
     fn held(self, point: &Point, value: f64, model: &Model) -> Point {
         let mut held = point.clone();
@@ -34,7 +24,7 @@ impl Quantity {
             Self::Delay => {
                 // What the delay loses or gains, the first free lag takes.
                 let change = value - point.delay();
-                let least = SHORTEST_LAG * model.row_time();
+                let least = SHORTEST_LAG * model.row_time;
                 let free = model.free.lags.iter().position(|free| *free);
                 if let Some(lag) = free.and_then(|free| held.lags.get_mut(free)) {
                     *lag = (*lag - change).max(least);
@@ -43,7 +33,7 @@ impl Quantity {
             }
             Self::Total => {
                 let lags: f64 = held.lags.iter().sum();
-                if value < lags {
+                if value < lags && lags > 0.0 {
                     let share = value / lags;
                     held.lags.iter_mut().for_each(|lag| *lag *= share);
                 }
@@ -69,7 +59,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As for `Model::at`.
+    /// As for `Model::at`, and for a lag that the model does not have.
     pub fn held(
         &self,
         near: &Fit,
@@ -77,6 +67,13 @@ impl Model {
         value: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
+        let lags = near.point.lags.len();
+        if let Quantity::Lag(i) = quantity {
+            refuse_if!(
+                i >= lags,
+                "lag {i} of {lags}: give the number of one of them, from zero"
+            );
+        }
         self.fit(
             &quantity.held(&near.point, value, self),
             Some(quantity),
@@ -92,7 +89,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// As for `Model::at`.
+    /// As for `Model::held`, and for a reach of zero or a rise that is not above it.
     pub fn end(
         &self,
         best: &Fit,
@@ -102,6 +99,12 @@ impl Model {
         floor: f64,
         task: &Task,
     ) -> Result<(f64, Fit), Error> {
+        refuse_if!(
+            reach == 0.0 || !reach.is_finite() || !(rise > 0.0 && rise.is_finite()),
+            "an interval of half width {reach} to a rise of {rise}: give finite numbers, not zero, \
+             and a rise above it"
+        );
+        refuse_if!(floor.is_nan(), "the least end is {floor}: give a number");
         let centre = quantity.value(&best.point);
         let mut lowest = best.clone();
         let mut near = best.clone();
@@ -138,7 +141,12 @@ impl Model {
             if (outer - inner).abs() <= TOLERANCE * reach.abs() || high.abs() < 1e-3 * goal {
                 break;
             }
-            let middle = inner + (outer - inner) * (low / (low - high));
+            let share = if high.is_finite() {
+                low / (low - high)
+            } else {
+                0.5
+            };
+            let middle = inner + (outer - inner) * share;
             near = self.held(&near, quantity, middle, task)?;
             if near.objective < lowest.objective {
                 lowest = near.clone();
@@ -157,5 +165,118 @@ impl Model {
             }
         }
         Ok((outer, lowest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fit::Free;
+    use super::super::likelihood::Noise;
+    use super::super::plant::Plant;
+    use super::super::tests::recorded;
+    use super::*;
+
+    const QUIET: Noise = Noise {
+        air_time: 1.0,
+        air: 0.0,
+        sensor_time: 1.0,
+        sensor: 0.0,
+    };
+
+    /// The fit of an integrator behind 0.31 s and these lags, which are free.
+    fn fitted(lags: &[f64]) -> (Model, Fit) {
+        let lag = lags.first().copied().unwrap_or(0.0);
+        let rows = recorded((&[1.0], &[1.0, 0.0]), (0.31, 0.85, lag), 0.01, 8);
+        let free = Free {
+            delay: true,
+            gain: true,
+            lags: vec![true; lags.len()],
+            zero: false,
+        };
+        let plant = Plant::new(&[1.0], &[1.0, 0.0]).unwrap();
+        let model = Model::new(plant, vec![rows], free, 5.0).unwrap();
+        let start = Point {
+            timing: Timing::Total(0.31 + lag),
+            lags: lags.to_vec(),
+            zero: 0.0,
+            gain: 0.85,
+            noise: vec![Noise {
+                air_time: 2.0,
+                air: 0.3,
+                ..QUIET
+            }],
+        };
+        let mut best = model.fit(&start, None, 1e-6, &Task::new()).unwrap();
+        best.point.gain = model.at(0, &best.point, &Task::new()).unwrap().gain;
+        (model, best)
+    }
+
+    #[test]
+    fn at_an_end_the_objective_has_risen_by_as_much() {
+        let (model, best) = fitted(&[0.17]);
+        let rise = 3.84;
+        for (quantity, reach) in [
+            (Quantity::Delay, 0.03),
+            (Quantity::Total, 4e-3),
+            (Quantity::Gain, 5e-3),
+        ] {
+            let centre = quantity.value(&best.point);
+            for sign in [-1.0, 1.0] {
+                let (end, lowest) = model
+                    .end(
+                        &best,
+                        quantity,
+                        sign * reach,
+                        rise,
+                        f64::NEG_INFINITY,
+                        &Task::new(),
+                    )
+                    .unwrap();
+                assert!(sign * (end - centre) > 0.0);
+                assert!(lowest.objective <= best.objective);
+                let there = model.held(&best, quantity, end, &Task::new()).unwrap();
+                let risen = there.objective - best.objective;
+                assert!(
+                    (risen - rise).abs() < 0.05 * rise,
+                    "{quantity:?} {sign} {risen}"
+                );
+                if quantity != Quantity::Gain {
+                    assert!((quantity.value(&there.point) - end).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_end_does_not_pass_the_floor() {
+        let (model, best) = fitted(&[0.17]);
+        let floor = 6.5e-5;
+        // No rise is as large, so that the search goes on to the floor.
+        let found = model.end(&best, Quantity::Lag(0), -0.05, 1e6, floor, &Task::new());
+        assert_eq!(found.unwrap().0, floor);
+    }
+
+    #[test]
+    fn what_has_no_interval_is_refused() {
+        let (model, best) = fitted(&[]);
+        let task = Task::new();
+        let end = |quantity, reach, rise, floor| {
+            model
+                .end(&best, quantity, reach, rise, floor, &task)
+                .unwrap_err()
+                .to_string()
+        };
+        for (found, expected) in [
+            (end(Quantity::Delay, 0.0, 3.84, 0.0), "half width 0"),
+            (end(Quantity::Delay, f64::NAN, 3.84, 0.0), "half width NaN"),
+            (end(Quantity::Delay, 0.1, -1.0, 0.0), "a rise of -1"),
+            (
+                end(Quantity::Delay, 0.1, 3.84, f64::NAN),
+                "least end is NaN",
+            ),
+            (end(Quantity::Lag(3), 0.1, 3.84, 0.0), "lag 3 of 0"),
+        ] {
+            assert!(found.contains(expected), "{found}");
+        }
     }
 }

@@ -7,63 +7,20 @@
 //! are computed once. The work is linear in the rows; on rows of equal spacing the gain converges
 //! and is kept.
 
-use std::cmp::Ordering;
-
 use super::disturbance::{Disturbance, Joint};
 use super::path::{SAME, SAME_STEP, dot};
-use super::plant::PlantSpace;
-use super::propagation::Propagation;
-use crate::{Error, Task};
+use super::plant::Plant;
+use super::propagation::{Propagation, Square};
+use super::rows::check_times;
+use crate::{Error, Task, memory};
 
-/// Relative change of the variance of a row below which the gain has converged.
-const CONVERGED: f64 = 1e-14;
+/// Change of the covariance of the states from row to row, as a share of their deviations, below
+/// which the gain has converged. All states count: weak air shows in the variance of a row long
+/// after its start.
+const CONVERGED: f64 = 1e-13;
 
 /// Rows between two checks for a stop.
 const CHECKED: usize = 4096;
-
-/// Whitened columns and the log determinant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Whitened {
-    /// One column after the other.
-    pub columns: Vec<f64>,
-    /// ln det V for white noise of unit variance.
-    pub log_det: f64,
-}
-
-/// Whiten `columns`, each as long as `time`, one after the other.
-///
-/// # Errors
-///
-/// If sizes do not fit, times do not increase, or a number of a disturbance is out of its range.
-pub fn whiten(
-    time: &[f64],
-    columns: &[f64],
-    plant: &PlantSpace,
-    disturbances: &[Disturbance],
-    task: &Task,
-) -> Result<Whitened, Error> {
-    refuse_if!(
-        time.is_empty() || !columns.len().is_multiple_of(time.len()),
-        "{} times and columns of {} values in all: give each column as many values as times",
-        time.len(),
-        columns.len()
-    );
-    let wrong = time
-        .windows(2)
-        .find(|pair| pair[1].partial_cmp(&pair[0]) != Some(Ordering::Greater));
-    if let Some(pair) = wrong {
-        refuse!(
-            "the time {} follows {}: give increasing times",
-            pair[1],
-            pair[0]
-        );
-    }
-    let mut columns = crate::memory::copied("the whitened columns", columns)?;
-    let joint = Joint::new(plant, disturbances)?;
-    let used = vec![true; time.len()];
-    let log_det = whiten_in_place(time, &used, &mut columns, &joint, &[], task)?;
-    Ok(Whitened { columns, log_det })
-}
 
 /// A random change of the states of the plant just before a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,11 +30,43 @@ pub(super) struct Kick {
     pub(super) state: Vec<f64>,
 }
 
+/// `columns`, one after the other and each as long as `time`, whitened by the covariance of their
+/// rows: that of disturbances of the plant, and of white noise of variance one.
+///
+/// # Errors
+///
+/// If sizes do not fit, times do not increase, or a number of a disturbance is out of its range.
+pub fn whitened(
+    time: &[f64],
+    columns: &[f64],
+    plant: &Plant,
+    disturbances: &[Disturbance],
+    task: &Task,
+) -> Result<Vec<f64>, Error> {
+    refuse_if!(
+        time.is_empty() || !columns.len().is_multiple_of(time.len()),
+        "{} times and columns of {} values in all: give each column as many values as times",
+        time.len(),
+        columns.len()
+    );
+    check_times("time", time)?;
+    for one in disturbances {
+        one.check()?;
+    }
+    let joint = Joint::new(&plant.space(&[], 0.0), disturbances)?;
+    let mut columns = memory::copied("the whitened columns", columns)?;
+    let used = vec![true; time.len()];
+    if !joint.c.is_empty() {
+        whiten(time, &used, &mut columns, &joint, &[], task)?;
+    }
+    Ok(columns)
+}
+
 /// Columns that are whitened together.
 const LANES: usize = 8;
 
 /// Whiten the columns in place; rows that are not `used` become zero. Returns ln det V.
-pub(super) fn whiten_in_place(
+pub(super) fn whiten(
     time: &[f64],
     used: &[bool],
     columns: &mut [f64],
@@ -102,18 +91,17 @@ pub(super) fn whiten_in_place(
     Ok(log_det)
 }
 
-type Square<const N: usize> = [[f64; N]; N];
-
 fn square<const N: usize>(flat: &[f64]) -> Square<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| flat[i * N + j]))
 }
 
-/// Φ P Φᵀ + Q.
-fn predicted<const N: usize>(phi: &Square<N>, p: &Square<N>, q: &Square<N>) -> Square<N> {
-    let left: Square<N> =
-        std::array::from_fn(|i| std::array::from_fn(|j| (0..N).map(|k| phi[i][k] * p[k][j]).sum()));
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| q[i][j] + (0..N).map(|k| left[i][k] * phi[j][k]).sum::<f64>())
+/// Is the covariance of a row that of the row before, but for rounding?
+fn has_converged<const N: usize>(p: &Square<N>, before: &Square<N>) -> bool {
+    (0..N).all(|i| {
+        (0..=i).all(|j| {
+            let change = p[i][j] - before[i][j];
+            change * change <= CONVERGED * CONVERGED * p[i][i] * p[j][j]
+        })
     })
 }
 
@@ -131,10 +119,12 @@ fn pass<const N: usize>(
     let c: [f64; N] = std::array::from_fn(|i| joint.c[i]);
     let mut states = [[0.0; LANES]; N];
     let mut p = square::<N>(&joint.start);
-    let (mut phi, mut q) = ([[0.0; N]; N], [[0.0; N]; N]);
+    let (a, noise) = (square::<N>(&joint.a), square::<N>(&joint.noise));
+    let mut by_step = Propagation::new(&a, &noise, 0.0);
     let mut gain = [0.0; N];
     let (mut step, mut steady) = (f64::NAN, false);
-    let mut variance = f64::INFINITY;
+    // The covariance of the row before, if that was used and as far away as this one.
+    let mut before = None;
     let (mut factor, mut log_variance, mut log_det) = (0.0, 0.0, 0.0);
     let mut kicks = kicks.iter().peekable();
     for row in 0..rows {
@@ -143,21 +133,19 @@ fn pass<const N: usize>(
         }
         if row > 0 {
             let between = time[row] - time[row - 1];
-            // The first step length, NaN, is the same as none.
-            let same = (between - step).abs() <= SAME * time[row].abs() + SAME_STEP * between;
-            if !same {
-                let made = Propagation::new(&joint.a, &joint.noise, between);
-                (phi, q) = (square(&made.phi), square(&made.q));
-                (step, steady) = (between, false);
+            let tolerance = SAME * time[row].abs() + SAME_STEP * between;
+            // No step is known before the first.
+            if step.is_nan() || (between - step).abs() > tolerance {
+                by_step = Propagation::new(&a, &noise, between);
+                (step, steady, before) = (between, false, None);
+            }
+            if !used[row] || kicks.peek().is_some_and(|kick| kick.row <= row) {
+                (steady, before) = (false, None);
             }
             if !steady {
-                p = predicted(&phi, &p, &q);
+                p = by_step.predicted(&p);
             }
             while let Some(kick) = kicks.next_if(|kick| kick.row <= row) {
-                if steady {
-                    p = predicted(&phi, &p, &q);
-                    steady = false;
-                }
                 for (p, left) in p.iter_mut().zip(&kick.state) {
                     for (p, right) in p.iter_mut().zip(&kick.state) {
                         *p += left * right;
@@ -165,7 +153,7 @@ fn pass<const N: usize>(
                 }
             }
             let mut moved = [[0.0; LANES]; N];
-            for (moved, phi) in moved.iter_mut().zip(&phi) {
+            for (moved, phi) in moved.iter_mut().zip(&by_step.phi) {
                 for (phi, state) in phi.iter().zip(&states) {
                     for (moved, state) in moved.iter_mut().zip(state) {
                         *moved += phi * state;
@@ -175,19 +163,18 @@ fn pass<const N: usize>(
             states = moved;
         }
         if !used[row] {
-            steady = false;
             for column in 0..count {
                 columns[column * rows + row] = 0.0;
             }
             continue;
         }
         if !steady {
+            steady = before.is_some_and(|before| has_converged(&p, &before));
+            before = Some(p);
             let pc: [f64; N] = std::array::from_fn(|i| dot(&p[i], &c));
-            let now = 1.0 + dot(&pc, &c);
-            steady = (now - variance).abs() <= CONVERGED * now;
-            variance = now;
-            (factor, log_variance) = (1.0 / now.sqrt(), now.ln());
-            gain = pc.map(|pc| pc / now);
+            let variance = 1.0 + dot(&pc, &c);
+            (factor, log_variance) = (1.0 / variance.sqrt(), variance.ln());
+            gain = pc.map(|pc| pc / variance);
             for (p, left) in p.iter_mut().zip(&pc) {
                 for (p, right) in p.iter_mut().zip(&gain) {
                     *p -= left * right;
@@ -214,4 +201,224 @@ fn pass<const N: usize>(
         }
     }
     Ok(log_det)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::disturbance::{Disturbance, Entry};
+    use super::super::plant::Plant;
+    use super::super::tests::{cholesky, coloured, forward, gaussian, integrated, log_det};
+    use super::*;
+
+    const AIR: Disturbance = Disturbance {
+        entry: Entry::Input,
+        time_constant: 0.8,
+        deviation: 3.0,
+    };
+    const SENSOR: Disturbance = Disturbance {
+        entry: Entry::Output,
+        time_constant: 0.15,
+        deviation: 0.7,
+    };
+
+    fn joint(den: &[f64], disturbances: &[Disturbance]) -> Joint {
+        let space = Plant::new(&[1.0], den).unwrap().space(&[], 0.0);
+        Joint::new(&space, disturbances).unwrap()
+    }
+
+    /// The covariance of an integrator that starts at the first row, behind air; and coloured noise.
+    fn covariance(time: &[f64], disturbances: &[Disturbance]) -> Vec<Vec<f64>> {
+        let one = |s: f64, t: f64, part: &Disturbance| match part.entry {
+            Entry::Input => {
+                integrated(part.deviation, part.time_constant, s - time[0], t - time[0])
+            }
+            Entry::Output => coloured(part.deviation, part.time_constant, s, t),
+        };
+        let row = |s: f64| -> Vec<f64> {
+            time.iter()
+                .map(|t| {
+                    f64::from(u8::from(s == *t))
+                        + disturbances
+                            .iter()
+                            .map(|part| one(s, *t, part))
+                            .sum::<f64>()
+                })
+                .collect()
+        };
+        time.iter().map(|s| row(*s)).collect()
+    }
+
+    /// Whitened columns have the inner products and the determinant of this covariance.
+    fn compare(time: &[f64], used: &[bool], joint: &Joint, kicks: &[Kick], v: &[Vec<f64>]) {
+        let (rows, count) = (time.len(), 11);
+        let columns: Vec<Vec<f64>> = (0..count).map(|j| gaussian(j + 1, rows)).collect();
+        let mut flat = columns.concat();
+        let found = whiten(time, used, &mut flat, joint, kicks, &Task::new()).unwrap();
+        let only = |x: &[f64]| -> Vec<f64> {
+            x.iter()
+                .zip(used)
+                .filter(|(_, used)| **used)
+                .map(|(x, _)| *x)
+                .collect()
+        };
+        let kept: Vec<Vec<f64>> = v
+            .iter()
+            .zip(used)
+            .filter(|(_, used)| **used)
+            .map(|(row, _)| only(row))
+            .collect();
+        let l = cholesky(&kept);
+        assert!((found - log_det(&l)).abs() < 1e-9 * log_det(&l).abs().max(1.0));
+        let expected: Vec<Vec<f64>> = columns.iter().map(|z| forward(&l, &only(z))).collect();
+        for (found, left) in flat.chunks_exact(rows).zip(&expected) {
+            assert!(
+                found
+                    .iter()
+                    .zip(used)
+                    .all(|(entry, used)| *used || *entry == 0.0)
+            );
+            for (other, right) in flat.chunks_exact(rows).zip(&expected) {
+                let product = dot(left, right);
+                assert!((dot(found, other) - product).abs() < 1e-9 * product.abs().max(1.0));
+            }
+            for (found, expected) in only(found).iter().zip(left) {
+                assert!((found - expected).abs() < 1e-9);
+            }
+        }
+    }
+
+    fn even(rows: usize) -> Vec<f64> {
+        (0..rows).map(|i| 5.0 + 0.065 * i as f64).collect()
+    }
+
+    fn irregular(rows: usize) -> Vec<f64> {
+        let noise = gaussian(77, rows);
+        (0..rows)
+            .map(|i| 0.065 * i as f64 + 0.01 * noise[i].clamp(-3.0, 3.0))
+            .collect()
+    }
+
+    /// Marks of use: a hole, single rows here and there, the first row.
+    fn lost(rows: usize) -> Vec<bool> {
+        (0..rows)
+            .map(|i| !(i == 0 || i % 17 == 5 || (60..75).contains(&i) || i == 170 || i == 171))
+            .collect()
+    }
+
+    #[test]
+    fn whitened_columns_have_the_products_of_the_dense_covariance() {
+        for time in [even(200), irregular(200)] {
+            for used in [vec![true; 200], lost(200)] {
+                for parts in [&[AIR] as &[_], &[SENSOR], &[AIR, SENSOR]] {
+                    let v = covariance(&time, parts);
+                    compare(&time, &used, &joint(&[1.0, 0.0], parts), &[], &v);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_lost_after_the_gain_has_converged_is_predicted_over() {
+        let time = even(200);
+        let used: Vec<bool> = (0..200).map(|i| i != 150 && i != 180 && i != 181).collect();
+        let parts = [AIR];
+        compare(
+            &time,
+            &used,
+            &joint(&[1.0, 0.0], &parts),
+            &[],
+            &covariance(&time, &parts),
+        );
+    }
+
+    #[test]
+    fn slow_air_is_a_random_walk_of_the_rate() {
+        // With τ beyond all rows the air is a constant of its own deviation and a random walk.
+        let (tau, drift) = (1e7, 1e-2);
+        let time = irregular(60);
+        let slow = Disturbance {
+            time_constant: tau,
+            deviation: drift * (tau / 2.0_f64).sqrt(),
+            entry: Entry::Output,
+        };
+        let v: Vec<Vec<f64>> = time
+            .iter()
+            .map(|s| {
+                let start = slow.deviation * slow.deviation;
+                // e^{−|t − s|/τ} is 1 − |t − s|/τ to 1e-14.
+                time.iter()
+                    .map(|t| {
+                        f64::from(u8::from(s == t)) + start - drift * drift * (t - s).abs() / 2.0
+                    })
+                    .collect()
+            })
+            .collect();
+        compare(&time, &[true; 60], &joint(&[1.0], &[slow]), &[], &v);
+    }
+
+    #[test]
+    fn weak_air_counts_from_the_first_row_to_the_last() {
+        // ln det (1 + K) is the trace of a small K. Each row adds 1e-14 at first and 1e-7 at last.
+        let time = even(3000);
+        let weak = Disturbance {
+            time_constant: 1e4,
+            deviation: 1.5e-6,
+            entry: Entry::Input,
+        };
+        let trace: f64 = time
+            .iter()
+            .map(|t| integrated(1.5e-6, 1e4, t - time[0], t - time[0]))
+            .sum();
+        let mut column = gaussian(1, 3000);
+        let found = whiten(
+            &time,
+            &[true; 3000],
+            &mut column,
+            &joint(&[1.0, 0.0], &[weak]),
+            &[],
+            &Task::new(),
+        );
+        assert!((found.unwrap() / trace - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_error_of_a_command_moves_all_later_rows() {
+        let time = even(150);
+        let kick = |row, size| Kick {
+            row,
+            state: vec![size],
+        };
+        let kicks = [kick(40, 0.6), kick(40, 0.8), kick(120, 2.0)];
+        for parts in [&[] as &[_], &[AIR]] {
+            let mut v = covariance(&time, parts);
+            for kick in &kicks {
+                for row in &mut v[kick.row..] {
+                    for entry in &mut row[kick.row..] {
+                        *entry += kick.state[0] * kick.state[0];
+                    }
+                }
+            }
+            let mut padded = kicks.to_vec();
+            for kick in &mut padded {
+                kick.state.resize(1 + parts.len(), 0.0);
+            }
+            for used in [vec![true; 150], lost(150)] {
+                compare(&time, &used, &joint(&[1.0, 0.0], parts), &padded, &v);
+            }
+        }
+    }
+
+    #[test]
+    fn more_states_than_the_kernel_takes_are_refused() {
+        let joint = joint(&[1.0; 9], &[AIR]);
+        let found = whiten(
+            &[0.0, 1.0],
+            &[true; 2],
+            &mut [1.0, 2.0],
+            &joint,
+            &[],
+            &Task::new(),
+        );
+        assert!(found.is_err_and(|error| error.to_string().contains("9 states")));
+    }
 }

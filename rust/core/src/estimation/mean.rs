@@ -1,0 +1,181 @@
+//! The mean of the rows of one recording: a column for each linear unknown, and the derivatives by
+//! the numbers that are searched.
+
+use super::path::{Held, respond};
+use super::plant::{Plant, PlantSpace};
+use super::rows::Rows;
+use crate::{Error, Task, memory};
+
+/// Relative step of the difference quotient by a lag.
+const STEP: f64 = 1e-5;
+
+/// What memory is asked for.
+const WHAT: &str = "the columns of the likelihood";
+
+/// The gain of the plant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Gain {
+    /// Unknown and eliminated.
+    Eliminated,
+    /// Unknown and searched, or held in a profile: at this value.
+    Searched(f64),
+    /// Given.
+    Known(f64),
+}
+
+/// The numbers of the mean.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Values {
+    /// s.
+    pub(super) delay: f64,
+    /// Lags before the given part of the plant, s.
+    pub(super) lags: Vec<f64>,
+    /// Time of the zero behind the last lag, s.
+    pub(super) zero: f64,
+    /// The gain.
+    pub(super) gain: Gain,
+}
+
+/// By which numbers of the mean the likelihood is corrected for their estimation.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Derivatives {
+    pub(super) delay: bool,
+    pub(super) lags: Vec<bool>,
+    pub(super) zero: bool,
+}
+
+impl Derivatives {
+    /// Is there a derivative by this lag? A lag of zero has no state, so none.
+    fn by_lag(&self, values: &Values, lag: usize) -> bool {
+        self.lags.get(lag) == Some(&true) && values.lags.get(lag).is_some_and(|lag| *lag != 0.0)
+    }
+}
+
+/// The columns J of the mean, then the output less its known part.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mean {
+    /// One column after the other.
+    pub(super) columns: Vec<f64>,
+    /// Columns of linear unknowns, which come first.
+    pub(super) linear: usize,
+    /// Columns of J.
+    pub(super) count: usize,
+    /// Slope of the response of the plant of unit gain.
+    pub(super) rate: Vec<f64>,
+}
+
+impl Mean {
+    pub(super) fn new(
+        rows: &Rows,
+        plant: &Plant,
+        space: &PlantSpace,
+        values: &Values,
+        by: &Derivatives,
+        task: &Task,
+    ) -> Result<Self, Error> {
+        let n = rows.time.len();
+        let (linear, count) = sizes(rows, values, by);
+        let base = if plant.integrates() {
+            0.0
+        } else {
+            rows.commands.value.first().copied().unwrap_or(0.0)
+        };
+        let shifted = rows.commands.value.iter().map(|value| value - base);
+        let shifted = memory::collected(WHAT, shifted)?;
+        let held = Held {
+            time: &rows.commands.time,
+            value: &shifted,
+        };
+        let mut response = memory::filled(WHAT, 0.0, n)?;
+        let mut rate = memory::filled(WHAT, 0.0, n)?;
+        let (delay, time) = (values.delay, &rows.time);
+        let slope = Some(rate.as_mut_slice());
+        respond(space, held, delay, time, &mut response, slope, task)?;
+        let mut columns = memory::filled(WHAT, 0.0, (count + 1).saturating_mul(n))?;
+        let mut places = columns.chunks_exact_mut(n);
+        let mut place = || places.next().unwrap_or_default();
+        if values.gain == Gain::Eliminated {
+            place().copy_from_slice(&response);
+        }
+        if rows.offset {
+            place().fill(1.0);
+        }
+        if rows.trim {
+            let always = (time[0], f64::INFINITY);
+            pulse(space, always, 0.0, time, place(), task)?;
+        }
+        for ends in &rows.commands.unknown {
+            pulse(space, *ends, delay, time, place(), task)?;
+        }
+        if matches!(values.gain, Gain::Searched(_)) {
+            place().copy_from_slice(&response);
+        }
+        if by.delay {
+            for (place, rate) in place().iter_mut().zip(&rate) {
+                *place = -rate;
+            }
+        }
+        let difference = |other: &PlantSpace, step: f64, out: &mut [f64]| {
+            respond(other, held, delay, time, out, None, task)?;
+            for (out, response) in out.iter_mut().zip(&response) {
+                *out = (*out - response) / step;
+            }
+            Ok::<(), Error>(())
+        };
+        for (i, lag) in values.lags.iter().enumerate() {
+            if by.by_lag(values, i) {
+                let mut moved = values.lags.clone();
+                moved[i] = lag * (1.0 + STEP);
+                difference(&plant.space(&moved, values.zero), moved[i] - lag, place())?;
+            }
+        }
+        if by.zero {
+            let step = values.lags.last().copied().unwrap_or(1.0) * STEP;
+            let other = plant.space(&values.lags, values.zero + step);
+            difference(&other, step, place())?;
+        }
+        let target = place();
+        target.copy_from_slice(&rows.output);
+        if let Gain::Searched(gain) | Gain::Known(gain) = values.gain {
+            for (target, response) in target.iter_mut().zip(&response) {
+                *target -= gain * response;
+            }
+        }
+        Ok(Self {
+            columns,
+            linear,
+            count,
+            rate,
+        })
+    }
+}
+
+/// Linear unknowns, and all columns of J.
+pub(super) fn sizes(rows: &Rows, values: &Values, by: &Derivatives) -> (usize, usize) {
+    let linear = usize::from(values.gain == Gain::Eliminated)
+        + usize::from(rows.offset)
+        + usize::from(rows.trim)
+        + rows.commands.unknown.len();
+    let lags = (0..values.lags.len()).filter(|lag| by.by_lag(values, *lag));
+    let searched = usize::from(matches!(values.gain, Gain::Searched(_)))
+        + usize::from(by.delay)
+        + lags.count()
+        + usize::from(by.zero);
+    (linear, linear + searched)
+}
+
+/// The response to an input of one between two times, `delay` later.
+fn pulse(
+    space: &PlantSpace,
+    ends: (f64, f64),
+    delay: f64,
+    times: &[f64],
+    out: &mut [f64],
+    task: &Task,
+) -> Result<(), Error> {
+    let held = Held {
+        time: &[ends.0, ends.1],
+        value: &[1.0, 0.0],
+    };
+    respond(space, held, delay, times, out, None, task)
+}
