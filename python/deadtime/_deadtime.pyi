@@ -454,6 +454,113 @@ class LoopSensitivities:
     outputs: Final[_Reals]
     inputs: Final[_Reals]
 
+class _Disturbance(Protocol):
+    @property
+    def at_input(self) -> bool: ...
+    @property
+    def time_constant(self) -> float: ...
+    @property
+    def deviation(self) -> float: ...
+
+class _RecordedRows(Protocol):
+    @property
+    def time(self) -> _Reals: ...
+    @property
+    def output(self) -> _Reals: ...
+    @property
+    def used(self) -> NDArray[np.bool_]: ...
+    @property
+    def command_time(self) -> _Reals: ...
+    @property
+    def command(self) -> _Reals: ...
+    @property
+    def unknown(self) -> Sequence[_Pair]: ...
+    @property
+    def uncertain(self) -> Sequence[tuple[float, float, float]]: ...
+    @property
+    def offset(self) -> bool: ...
+    @property
+    def trim(self) -> bool: ...
+
+@final
+class RowNoise:
+    air_time: Final[float]
+    air: Final[float]
+    sensor_time: Final[float]
+    sensor: Final[float]
+    def __new__(
+        cls,
+        air_time: float = 1.0,
+        air: float = 0.0,
+        sensor_time: float = 1.0,
+        sensor: float = 0.0,
+    ) -> RowNoise: ...
+    def __getnewargs__(self) -> tuple[float, float, float, float]: ...
+
+@final
+class PlantNumbers:
+    delay: Final[float]
+    lags: Final[list[float]]
+    zero: Final[float]
+    gain: Final[float]
+    noise: Final[list[RowNoise]]
+    objective: Final[float]
+    def __new__(
+        cls,
+        delay: float,
+        lags: Sequence[float],
+        noise: Sequence[RowNoise],
+        gain: float = 1.0,
+        zero: float = 0.0,
+        objective: float = ...,
+    ) -> PlantNumbers: ...
+    def __getnewargs__(
+        self,
+    ) -> tuple[float, list[float], list[RowNoise], float, float, float]: ...
+
+@final
+class RowLikelihood:
+    objective: Final[float]
+    log_det: Final[float]
+    variance: Final[float]
+    freedom: Final[int]
+    gain: Final[float]
+    linear: Final[list[float]]
+    inverse: Final[_Reals]
+    score: Final[_Reals]
+    whitened: Final[_Reals]
+    residuals: Final[_Reals]
+    rate: Final[_Reals]
+
+@final
+class FlightLikelihood:
+    def __new__(
+        cls,
+        num: Sequence[float],
+        den: Sequence[float],
+        runs: Sequence[_RecordedRows],
+        *,
+        delay: bool,
+        gain: bool,
+        lags: Sequence[bool],
+        zero: bool,
+        longest: float,
+    ) -> FlightLikelihood: ...
+    def at(self, run: int, numbers: PlantNumbers) -> RowLikelihood: ...
+    def objective(self, numbers: PlantNumbers) -> float: ...
+    def fit(self, start: PlantNumbers, tolerance: float = 1e-6) -> PlantNumbers: ...
+    def held(self, near: PlantNumbers, quantity: str, value: float) -> PlantNumbers: ...
+    def end(
+        self, best: PlantNumbers, quantity: str, reach: float, rise: float, floor: float
+    ) -> tuple[float, PlantNumbers]: ...
+
+def whitened_columns(
+    num: Sequence[float],
+    den: Sequence[float],
+    disturbances: Sequence[_Disturbance],
+    time: _Reals,
+    columns: _Reals,
+) -> _Reals: ...
 def loop_sensitivities(
     slopes: _LoopSlopes,
     run: _LoopRun,

@@ -260,7 +260,8 @@ def test_invalid_numbers_are_refused(tmp_path, arguments, words):
 )
 def test_invalid_options_of_estimate_are_refused(demo, more, words):
     folder, _ = demo
-    arguments = ["estimate", folder / "demo" / "flight.csv", *COLUMNS, "--kp", "2.4", *more]
+    Kp = [] if "--kp" in more else ["--kp", "2.4"]
+    arguments = ["estimate", folder / "demo" / "flight.csv", *COLUMNS, *Kp, *more]
     assert words in one_clear_line(run(*arguments))
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 import pickle
+from dataclasses import replace
 
 import deadtime as dtm
 import matplotlib.pyplot
@@ -98,3 +99,53 @@ def test_an_invalid_window_is_refused_with_the_expected_form(window):
     recording, known = record_step(rest=1.0)
     with pytest.raises(TypeError, match=r"give a range \(low, high\)"):
         dtm.estimate_delay(recording, known, window=window)
+
+
+def test_a_comparison_says_by_how_much_and_why_methods_are_off():
+    loop = dtm.ControlLoop(
+        dtm.Integrator(0.8), dtm.P(2.2), delay=0.36, sample_time=0.065, limit=1.0
+    )
+    recording = dtm.Experiment.step(8.0, rest=1.04).run(loop, noise=0.004, seed=3)
+    found = compare_methods(recording, loop.replace(delay=None, gain=1.0), window=(0.5, 8.0))
+    differences = found.differences()
+    assert {"dominant", "graphical", "gcc", "arx_scan"} <= differences.keys()
+    assert differences.keys() == found.estimates.keys()
+    best, error = found.best, found.best.stderr["delay"]
+    assert best.method == "output_error"
+    for name, one in differences.items():
+        fit = found.estimates[name]
+        assert one.seconds == fit.delay_plus_lag - best.delay_plus_lag
+        assert one.standard_errors == pytest.approx(one.seconds / error)
+        assert (one.interval is None) == (not fit.calibrated) == bool(one.no_interval_because)
+        assert bool(one.limits) == (fit.method not in ("output_error", "waveform"))
+        assert 0.5 <= one.window[0] < one.window[1] <= 8.0
+        assert one.rows == len(fit.recording)
+    # The gain is 0.8, not 1: the paper's method is off by tens of milliseconds, as its limit says.
+    assert differences["dominant"].seconds < -0.02
+    (said,) = (one for one in found.limitations() if one.startswith("Paper's overshoot"))
+    assert f"{-differences['dominant'].seconds:.3f} s less than output error (" in said
+    assert "takes the gain as given" in said
+    assert not any(one.startswith(("Waveform", "Output")) for one in found.limitations())
+    row = next(row for row in found.rows() if row[0] == "gcc")
+    assert row[-3:-1] == [
+        f"{differences['gcc'].seconds:+.3f}",
+        f"{differences['gcc'].standard_errors:+.1f}",
+    ]
+
+
+@pytest.mark.parametrize("logged", [True, False])
+def test_auto_takes_a_method_of_likelihood(logged):
+    loop = KNOWN.replace(delay=0.36, limit=None, Kp=2.0)
+    recording = dtm.Experiment.step(6.0).run(loop, noise=0.003)
+    if not logged:
+        recording = replace(recording, command=None)
+    fit = dtm.estimate_delay(recording, loop.replace(delay=None))
+    assert fit.method == ("output_error" if logged else "waveform")
+    assert METHODS[fit.method].limits == ""
+    assert fit.calibrated
+
+
+def test_what_has_no_interval_says_why_it_is_off():
+    biased = {"gcc", "arx_scan", "decay", "decrement", "graphical", "relay", "overshoot"}
+    assert {name for name, method in METHODS.items() if method.limits} == biased
+    assert all(METHODS[name].limits.endswith(".") for name in biased)

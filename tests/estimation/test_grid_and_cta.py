@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import CTA, Grid
 from deadtime.estimation.methods._cta import chebyshev_differentiation
+from deadtime.estimation.methods._method import paired_runs
 from step_recordings import (
     TS,
     delay_errors,
@@ -145,7 +146,7 @@ def test_chebyshev_with_noise_equals_the_fit_of_the_waveform():
 def test_chebyshev_is_for_linear_continuous_loops(change, words):
     recording, known = record_step(ts=None, dt=0.02, limit=None)
     with pytest.raises(ValueError, match=words):
-        dtm.estimate_delay(recording, known.replace(**change), method="cta")
+        CTA().estimate(paired_runs(recording, known.replace(**change)), ("delay",))
 
 
 def test_the_delay_line_has_1_to_24_intervals():

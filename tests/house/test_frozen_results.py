@@ -55,6 +55,7 @@ MADE = {
         LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9
     ),
     "FirstOrder": lambda: dtm.FirstOrder(1.0, 0.3),
+    "FlightNoise": lambda: dtm.experiments.FlightNoise(0.01, air=0.1, air_time=0.3),
     "FittedRun": lambda: dtm.estimate_delay(
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ).runs[0],
@@ -127,7 +128,7 @@ def public_types():
 def test_the_list_of_types_is_complete():
     # Base classes that are never instantiated, tuples of arrays, and what has a test of its own.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
-        "Controller", "Plant", "OffsetW", "NoiseModel", "WhiteNoise",
+        "Controller", "Plant", "OffsetW", "NoiseModel", "DisturbanceModel",
         "Comparison",
     }  # fmt: skip
 

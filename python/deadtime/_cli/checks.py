@@ -35,7 +35,7 @@ def grave_findings(files: Sequence[Path], checks: Sequence[RecordingCheck]) -> l
 
 
 def print_grave_findings(findings: Sequence[dict[str, Any]]) -> None:
-    """Print each in a line above a result."""
+    """Print each in a line."""
     for finding in findings:
         print_text("{file.name}, {severity}: {message}".format(**finding), "yellow")
     if findings:

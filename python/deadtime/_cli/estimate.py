@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from itertools import cycle
+from collections.abc import Sequence
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -13,7 +13,11 @@ from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.checks import grave_findings, print_grave_findings, show_checks
 from deadtime._cli.comparisons import estimates_table
+from deadtime._cli.fits import print_details, print_headline
+from deadtime._cli.free import check_fitted, checked_free
+from deadtime._cli.plants import with_names
 from deadtime._cli.show import print_json, print_points, print_table, print_text, save_figure
+from deadtime._cli.windows import files_and_windows
 from deadtime.estimation import Comparison, Method, compare_methods, estimate_delay
 from deadtime.estimation._estimate import JOINT, METHODS, automatic_method
 from deadtime.estimation._plots import estimate_axes, plot_estimate, plot_fits
@@ -21,15 +25,37 @@ from deadtime.estimation.methods._overshoot import OvershootMap
 from deadtime.estimation.methods._waveform import NoisePath
 from deadtime.recordings import read_recording
 
+Each = TypeVar("Each")
+
 CHOICES = ("all", "auto", *METHODS)
 
 
 def command(
-    files: opt.Files,
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="CSV files with a header line, of one vehicle. FILE@LOW:HIGH is a file with a "
+            "window of its own.",
+            show_default=False,
+        ),
+    ],
     kp: Annotated[
         list[float],
-        typer.Option(help="Proportional gain: one, or one for each file.", show_default=False),
+        typer.Option(
+            help="Proportional gain. This and the other gains: one, or one for each file.",
+            show_default=False,
+        ),
     ],
+    kv: Annotated[
+        list[float] | None, typer.Option(help="Velocity gain, of PV.", show_default=False)
+    ] = None,
+    ki: Annotated[
+        list[float] | None, typer.Option(help="Integral gain, of PI and PID.", show_default=False)
+    ] = None,
+    kd: Annotated[
+        list[float] | None, typer.Option(help="Derivative gain, of PD and PID.", show_default=False)
+    ] = None,
+    filter: opt.Filter = None,  # noqa: A002
     time: opt.Time = "time",
     reference: opt.Reference = "reference",
     output: opt.Output = "output",
@@ -47,8 +73,14 @@ def command(
         ),
     ] = None,
     free: Annotated[
-        str, typer.Option(help="What is fitted, where the method can: of delay, gain, lag.")
-    ] = "delay,gain",
+        str | None,
+        typer.Option(
+            help="What is fitted, for one method: of delay, gain, lag of an integrator, "
+            "time_constant of a first-order plant; for waveform also limit and start. Without: "
+            "delay,gain.",
+            show_default=False,
+        ),
+    ] = None,
     map: Annotated[  # noqa: A002
         OvershootMap | None, typer.Option(help="From overshoot to delay, for overshoot.")
     ] = None,
@@ -74,39 +106,62 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Estimate the delay of a loop from a recording of it, or from several together."""
+    files, windows = files_and_windows(files, window)
     given = {"map": map, "noise": noise, "initial_output": initial_output}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     name = _chosen(method, len(files), options)
+    if filter is not None and kv is None and kd is None:
+        raise ValueError("--filter is for the derivative: give --kv or --kd, or leave it out")
+    gains = zip(
+        _each("kp", kp, files),
+        _each("kv", kv or [0.0], files),
+        _each("ki", ki or [0.0], files),
+        _each("kd", kd or [0.0], files),
+        strict=True,
+    )
     loops = [
-        opt.described_loop(one, gain=gain, sample_time=sample_time, limit=limit, plant=plant)
-        for one in kp
-    ]
-    if len(loops) not in (1, len(files)):
-        raise ValueError(
-            f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(loops)} of --kp: give "
-            "one for all, or one for each"
+        opt.described_loop(
+            Kp,
+            Kv,
+            gain=gain,
+            ki=Ki,
+            kd=Kd,
+            sample_time=sample_time,
+            limit=limit,
+            corner=filter,
+            plant=plant,
         )
+        for Kp, Kv, Ki, Kd in gains
+    ]
+    loops = [loop.replace(plant=with_names(loop.plant)) for loop in loops]
     flights = [
         read_recording(file, time=time, reference=reference, output=output, command=command)
         for file in files
     ]
+    if name == "auto":
+        name = automatic_method(flights)
+    fitted = checked_free(free, loops[0], name)
     checks = [
-        flight.check(loop, window) for flight, loop in zip(flights, cycle(loops), strict=False)
+        flight.check(loop, ends) for flight, loop, ends in zip(flights, loops, windows, strict=True)
     ]
     if check:
         show_checks(files, checks, as_json)
         raise typer.Exit(1 if any(one.refused for one in checks) else 0)
     findings = grave_findings(files, checks)
     if name == "all":
-        _show_all(compare_methods(flights[0], loops[0], window), findings, plot, as_json)
+        if free is not None:
+            raise ValueError("--free is for one method: name it by --method")
+        _show_all(compare_methods(flights[0], loops[0], windows[0]), findings, plot, as_json)
         return
     fit = estimate_delay(
         flights,
-        loops[0] if len(loops) == 1 else loops,
-        method=_with_options(automatic_method(flights) if name == "auto" else name, options),
-        free=[name.strip() for name in free.split(",") if name.strip()],
-        window=window,
+        loops,
+        method=_with_options(name, options),
+        free=fitted,
+        window=windows,
     )
+    if free is not None:
+        check_fitted(fitted, fit)
     if plot is not None:
         figure = empty_figure(7.0 + 3.5 * len(fit.runs), 4.6)
         plot_estimate(fit, estimate_axes(fit, figure))
@@ -114,8 +169,19 @@ def command(
     if as_json:
         print_json(fit.to_dict() | {"findings": findings})
     else:
+        print_headline(fit)
         print_grave_findings(findings)
-        print_text(fit.summary(), wrapped=False)
+        print_details(fit)
+
+
+def _each(name: str, values: Sequence[Each], files: Sequence[Path]) -> list[Each]:
+    """A value for each file, of one for all or of one each."""
+    if len(values) not in (1, len(files)):
+        raise ValueError(
+            f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(values)} of --{name}: "
+            "give one for all, or one for each"
+        )
+    return list(values) * (len(files) if len(values) == 1 else 1)
 
 
 def _chosen(method: str | None, number: int, options: dict[str, Any]) -> str:
@@ -156,12 +222,20 @@ def _show_all(
             {
                 "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
                 "refusals": comparison.refusals,
+                "differences": {
+                    name: asdict(one) for name, one in comparison.differences().items()
+                },
                 "explanation": comparison.explanation(),
                 "findings": findings,
             }
         )
         return
+    print_headline(comparison.best)
     print_grave_findings(findings)
     print_table(estimates_table(comparison))
-    print_text("in brackets: taken as given; sum: delay and lag", "dim")
-    print_points(comparison.explanation())
+    print_text(
+        f"in brackets: taken as given; sum: delay and lag; off: sum less that of "
+        f"{comparison.best.method}, in s and in its standard errors",
+        "dim",
+    )
+    print_points([*comparison.explanation(), *comparison.limitations()])

@@ -13,6 +13,9 @@ from deadtime._base.validation import finite
 from deadtime._cli.plants import plant_from
 from deadtime._cli.show import check_picture
 from deadtime.loops import (
+    PD,
+    PI,
+    PID,
     PV,
     Controller,
     ControlLoop,
@@ -34,10 +37,6 @@ def _drawn_later(path: Path | None) -> Path | None:
 Ends = tuple[float, float]
 
 File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
-Files = Annotated[
-    list[Path],
-    typer.Argument(help="CSV files with a header line, of one vehicle.", show_default=False),
-]
 Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
 Reference = Annotated[str, typer.Option(help="Column of the reference.")]
 Output = Annotated[str, typer.Option(help="Column of the measured output.")]
@@ -83,17 +82,19 @@ def described_loop(
     gain: float = 1.0,
     lag: float = 0.0,
     *,
+    ki: float = 0.0,
+    kd: float = 0.0,
     sample_time: float | None = None,
     limit: float | None = None,
     corner: float | None = None,
     plant: str | None = None,
 ) -> ControlLoop:
-    """The loop that the options describe: an integrator or `plant` under P or PV control."""
-    for name, value in {"kp": kp, "kv": kv, "gain": gain, "lag": lag}.items():
+    """The loop that the options describe: an integrator or `plant`, and the controller."""
+    given = {"kp": kp, "kv": kv, "ki": ki, "kd": kd, "gain": gain, "lag": lag}
+    for name, value in given.items():
         if not math.isfinite(value):
             raise ValueError(f"--{name} is {value}: give a finite number")
-    smoothing = None if corner is None else DerivativeFilter(omega=corner)
-    controller: Controller = P(Kp=kp) if kv == 0.0 else PV(Kp=kp, Kv=kv, filter=smoothing)
+    controller = _described_controller(kp, kv, ki, kd, corner)
     if plant is not None and lag != 0.0:
         raise ValueError("--lag is that of the integrating plant: write it into --plant")
     loop = ControlLoop(
@@ -104,6 +105,23 @@ def described_loop(
         limit=limit,
     )
     return loop if plant is None else loop.replace(gain=gain)
+
+
+def _described_controller(
+    kp: float, kv: float, ki: float, kd: float, corner: float | None
+) -> Controller:
+    """P, PV, PD, PI or PID, by which gains are not zero."""
+    smoothing = None if corner is None else DerivativeFilter(omega=corner)
+    if kv != 0.0:
+        if ki != 0.0 or kd != 0.0:
+            raise ValueError(
+                "--kv is the velocity gain of PV, and --ki and --kd are those of PI, PD and PID: "
+                "give --kv, or the others"
+            )
+        return PV(Kp=kp, Kv=kv, filter=smoothing)
+    if ki != 0.0:
+        return PI(Kp=kp, Ki=ki) if kd == 0.0 else PID(Kp=kp, Ki=ki, Kd=kd, filter=smoothing)
+    return P(Kp=kp) if kd == 0.0 else PD(Kp=kp, Kd=kd, filter=smoothing)
 
 
 def check_duration(loop: ControlLoop, duration: float | None = None) -> None:

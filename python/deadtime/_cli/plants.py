@@ -12,6 +12,7 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
+from deadtime.loops import FirstOrder, Integrator, Plant
 from deadtime.roots import QuasiPolynomial, delay, s
 from deadtime.systems import TransferFunction
 
@@ -50,6 +51,24 @@ def plant_from(text: str) -> TransferFunction:
         raise ValueError(f"--plant {text!r} is no formula: {_MEANING}") from None
     found = _Reader(text.strip()).value(tree.body)
     return found if isinstance(found, TransferFunction) else TransferFunction(found)
+
+
+def with_names(plant: Plant) -> Plant:
+    """An integrator with a lag or a first-order plant as such: its time is then a free parameter.
+
+    Any other plant is returned as it is.
+    """
+    if not plant.is_rational:
+        return plant
+    num, den = plant.polynomials()
+    match num.tolist(), den.tolist():
+        case [b], [a, c, 0.0] if a * c > 0.0:
+            return Integrator(b / c, lag=a / c)
+        case [b], [c, 0.0]:
+            return Integrator(b / c)
+        case [b], [a, c] if a * c > 0.0:
+            return FirstOrder(b / c, time_constant=a / c)
+    return plant
 
 
 class _Reader:

@@ -5,7 +5,7 @@
 `fit` least squares, profiles and residuals, `planning` the bounds of planned experiments.
 """
 
-from deadtime.estimation._compare import Comparison, compare_methods
+from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.fit._residuals import Whiteness
@@ -41,6 +41,7 @@ __all__ = [
     "Grid",
     "Identifiability",
     "Method",
+    "MethodDifference",
     "MonteCarlo",
     "OutputError",
     "Overshoot",

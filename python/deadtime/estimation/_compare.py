@@ -6,24 +6,40 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import get_args
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime._base.validation import OpenRange
+from deadtime.estimation._estimate import METHODS, checked_run
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import check_setpoint_active, independent_samples
+from deadtime.estimation.data._checks import independent_samples
+from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._decay import Decay
 from deadtime.estimation.methods._decrement import Decrement
+from deadtime.estimation.methods._gcc import GCC
+from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._method import Method, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
+from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 #: Headings of the columns of `Comparison.rows`.
-COLUMNS = ("method", "delay / s", "95 % interval", "gain", "lag / s", "sum / s", "adequate")
+COLUMNS = (
+    "method",
+    "delay / s",
+    "95 % interval",
+    "gain",
+    "lag / s",
+    "sum / s",
+    "off / s",
+    "off / σ",
+    "adequate",
+)
 
 #: Largest relative difference of two delays that agree.
 AGREEMENT = 0.03
@@ -43,6 +59,39 @@ IN_WORDS = {
 
 
 @dataclass(frozen=True)
+class MethodDifference:
+    """How far an estimate is from that of the preferred method, and what biases it.
+
+    Attributes
+    ----------
+    delay : float
+        The estimated delay, s.
+    interval : (float, float) or None
+        Its 95 % interval, s.
+    no_interval_because : str
+        Why there is none; empty where there is one.
+    seconds : float
+        Delay and lag together, less those of the preferred estimate, s.
+    standard_errors : float or None
+        The same in standard errors of the preferred estimate; None where it has none.
+    rows : int
+    window : (float, float)
+        The rows it was computed on: how many, and their first and last time, s.
+    limits : str
+        What biases the method, in a sentence; empty for methods of maximum likelihood.
+    """
+
+    delay: float
+    interval: tuple[float, float] | None
+    no_interval_because: str
+    seconds: float
+    standard_errors: float | None
+    rows: int
+    window: tuple[float, float]
+    limits: str
+
+
+@dataclass(frozen=True)
 class Comparison:
     """Estimates of one delay by several methods.
 
@@ -50,8 +99,8 @@ class Comparison:
     ----------
     estimates : dict of str to DelayEstimate
         By name: ``dominant``, ``exact``, ``saturated``, ``waveform``, ``waveform with lag``; where
-        a command was logged ``output_error`` and ``output_error with lag``; ``decrement`` and
-        ``decay`` where they give an estimate.
+        a command was logged ``output_error`` and ``output_error with lag``; ``decrement``,
+        ``decay``, ``graphical``, ``relay``, ``gcc`` and ``arx_scan`` where they give an estimate.
     refusals : dict of str to str
         The reasons of the other methods that gave no estimate.
     """
@@ -68,13 +117,15 @@ class Comparison:
     def best(self) -> DelayEstimate:
         """The preferred estimate.
 
-        The fit with a lag if the lag is above zero and the Bayesian information criterion favours
-        it, for the number of independent samples that the autocorrelation of the residuals gives;
-        otherwise the fit of delay and gain.
+        The fit with a lag if the interval of the lag is above zero and, for least squares, the
+        Bayesian information criterion favours it, for the number of independent samples that the
+        autocorrelation of the residuals gives; otherwise the fit of delay and gain.
         """
         plain, lagged = self._fits()
         if lagged is None or lagged.ci(0.95, "lag")[0] <= 0.0:
             return plain
+        if lagged.noise is not None:  # the interval is that of the likelihood
+            return lagged
         effective = independent_samples(lagged.residuals.size, lagged.whiteness.autocorrelation)
         gain = 2.0 * effective * np.log(plain.rms / lagged.rms) if lagged.rms > 0 else np.inf
         return lagged if gain > np.log(max(effective, 2.0)) else plain
@@ -82,6 +133,43 @@ class Comparison:
     def _fits(self) -> tuple[DelayEstimate, DelayEstimate | None]:
         """The trusted fit of delay and gain, and the one with a lag, if there is one."""
         return self.estimates[self.trusted], self.estimates.get(f"{self.trusted} with lag")
+
+    def differences(self) -> dict[str, MethodDifference]:
+        """How far each estimate is from the preferred one, and what biases its method."""
+        best = self.best
+        error = best.stderr["delay+lag"]
+        found = {}
+        for name, fit in self.estimates.items():
+            seconds = fit.delay_plus_lag - best.delay_plus_lag
+            time = fit.recording.time
+            found[name] = MethodDifference(
+                delay=fit.delay,
+                interval=fit.ci(0.95) if fit.calibrated else None,
+                no_interval_because=fit.uncalibrated,
+                seconds=seconds,
+                standard_errors=seconds / error if error > 0.0 else None,
+                rows=len(fit.recording),
+                window=(float(time[0]), float(time[-1])),
+                limits=METHODS[fit.method].limits,
+            )
+        return found
+
+    def limitations(self) -> list[str]:
+        """On which rows, by how much and why the methods without an interval are off."""
+        best = self.best
+        reference = next(name for name, fit in self.estimates.items() if fit is best)
+        sentences: list[str] = []
+        for name, one in self.differences().items():
+            if not one.limits:
+                continue
+            label = _label(name)
+            said = any(one.limits in sentence for sentence in sentences)
+            sentences.append(
+                f"{label[0].upper()}{label[1:]}, on {one.rows} rows from {one.window[0]:g} to "
+                f"{one.window[1]:g} s: {abs(one.seconds):.3f} s {_side(one)} {_label(reference)}"
+                f"{_in_errors(one)}.{'' if said else f' {one.limits}'}"
+            )
+        return sentences
 
     def pictured(self) -> dict[str, DelayEstimate]:
         """The estimates for one plot, by their labels in its legend."""
@@ -99,6 +187,7 @@ class Comparison:
         its reason.
         """
         rows = []
+        differences = self.differences()
         for name, fit in self.estimates.items():
             interval, total = "–", "–"
             if fit.calibrated:
@@ -112,6 +201,8 @@ class Comparison:
                     _number(fit.gain, "gain" in fit.free),
                     _number(fit.lag, "lag" in fit.free),
                     total,
+                    f"{differences[name].seconds:+.3f}",
+                    _signed(differences[name].standard_errors),
                     "yes" if fit.adequate else "no",
                 ]
             )
@@ -131,13 +222,15 @@ class Comparison:
             sentences += _overshoot_against_fit(dominant, plain, IN_WORDS[self.trusted])
         if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
             sentences.append(
-                "The vehicle has a lag: with it fitted too, the residuals fall from "
-                f"{plain.rms:.3g} to {lagged.rms:.3g} rms, at {lagged.delay:.3f} s of delay and "
+                f"The vehicle has a lag: the fit with it gives {lagged.delay:.3f} s of delay and "
                 f"{lagged.lag:.3f} s of lag. Part of what looks like dead time is the dynamics of "
                 f"the vehicle; the sum, {lagged.delay_plus_lag:.3f} s, is what the recording "
                 "determines well."
             )
-        if not plain.adequate:
+        _, _, why = plain.message.partition("not adequate: ")
+        if why:
+            sentences.append(f"The model without a further lag is not adequate: {why}.")
+        elif not plain.adequate:
             sentences.append(
                 "The residuals of the fit without lag are coloured: that model only approximates "
                 "the vehicle, and its interval is the robust one."
@@ -155,11 +248,28 @@ def truth_row(numbers: Mapping[str, float]) -> list[str]:
         f"{numbers['lag']:.3f}",
         f"{numbers['delay+lag']:.3f}",
         "",
+        "",
+        "",
     ]
 
 
 def _label(name: str) -> str:
     return LABELS.get(name, name.replace("_", " "))
+
+
+def _side(one: MethodDifference) -> str:
+    return "more than" if one.seconds >= 0.0 else "less than"
+
+
+def _in_errors(one: MethodDifference) -> str:
+    """A difference in standard errors, in brackets."""
+    if one.standard_errors is None:
+        return ""
+    return f" ({abs(one.standard_errors):.2g} of its standard errors)"
+
+
+def _signed(value: float | None) -> str:
+    return "–" if value is None else f"{value:+.1f}"
 
 
 def _number(value: float | None, fitted: bool) -> str:
@@ -217,8 +327,7 @@ def compare_methods(
     NotIdentifiableError
         When no fit of delay and gain has a result.
     """
-    runs = paired_runs(recording, loop, window)
-    check_setpoint_active(recording.window(*runs[0].window))
+    runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     estimates: dict[str, DelayEstimate] = {}
     refusals: dict[str, str] = {}
     named: list[str] = [
@@ -230,10 +339,12 @@ def compare_methods(
             estimates[name] = Overshoot(map=name).estimate(runs, plain)
         except (NotIdentifiableError, ValueError) as error:
             refusals[name] = str(error).rstrip(".")
-    # One is for steps with overshoot, the other for steps without; their refusals need no report.
-    readings: list[Method] = [Decrement(), Decay()]
+    # Each is for another kind of experiment; their refusals need no report, and what they warn of
+    # is said by `limitations`.
+    readings: list[Method] = [Decrement(), Decay(), Graphical(), Relay(), GCC(), ARXScan()]
     for method in readings:
-        with suppress(NotIdentifiableError, ValueError):
+        with suppress(NotIdentifiableError, RecordingError, ValueError), catch_warnings():
+            simplefilter("ignore")
             estimates[method.name] = method.estimate(runs, plain)
     fits: list[Method] = [Waveform()]
     if recording.command is not None:

@@ -153,14 +153,15 @@ def estimate_delay(
     >>> round(fit.delay, 6)
     0.4
     """
-    runs = paired_runs(recording, loop, window)
-    runs = [_checked(run) for run in runs]
+    runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:
         raise ValueError(
             f"the {chosen.name} method takes one recording, not {len(runs)}: fit them together by "
             f"{' or '.join(map(repr, JOINT))}"
         )
+    if chosen.joint:
+        runs = [_sampled_as_seen(run) for run in runs]
     return chosen.estimate(runs, free)
 
 
@@ -168,17 +169,22 @@ def estimate_delay(
 OWN_REFUSALS = ("no_step", "command_constant", "output_constant")
 
 
-def _checked(run: Run) -> Run:
+def checked_run(run: Run) -> Run:
     """The run with what a check finds; refused by name where no estimate would be right."""
     check = run.recording.check(run.loop, run.window)
     for finding in check.findings:
         if finding.severity == "refused" and finding.code not in OWN_REFUSALS:
             raise NotIdentifiableError(str(finding))
-    loop = run.loop
-    seen = next((one for one in check.findings if one.code == "sample_time_seen"), None)
-    if seen is not None and seen.severity == "warning":
-        loop = loop.replace(sample_time=check.sample_time_seen)
-    return run._replace(loop=loop, check=check)
+    return run._replace(check=check)
+
+
+def _sampled_as_seen(run: Run) -> Run:
+    """The run with the sample time that its rows show, where the loop has none."""
+    assert run.check is not None
+    for finding in run.check.findings:
+        if finding.code == "sample_time_seen" and finding.severity == "warning":
+            return run._replace(loop=run.loop.replace(sample_time=run.check.sample_time_seen))
+    return run
 
 
 def automatic_method(recordings: Iterable[Recording]) -> str:

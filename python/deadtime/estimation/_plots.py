@@ -139,7 +139,7 @@ def _draw_recording(ax: Axes, plan: Identifiability) -> None:
     ax.plot(recording.time, recording.output, color="0.15", lw=1.4, label="output")
     held: Literal["post", "mid"] = "post" if plan.loop.is_sampled else "mid"
     ax.step(recording.time, recording.command, where=held, color="0.6", lw=0.8, label="command")
-    _legend_above(ax, f"{plan.experiment.name}, noise {plan.noise:g}:")
+    _legend_above(ax, f"{plan.experiment.name}, {plan.noise}:")
     ax.tick_params(labelbottom=False)
 
 
@@ -147,9 +147,9 @@ def _draw_slopes(ax: Axes, plan: Identifiability) -> None:
     """Effect of an error as large as the bound; similar curves are hard to tell apart."""
     bound = plan.bound
     for name, colour in zip(plan.free, COLOURS, strict=False):
-        moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise
+        moved = bound.sensitivities[name] * bound.stderr[name] / bound.noise.white
         ax.plot(plan.recording.time, moved, color=colour, lw=1.2, label=_with_error(bound, name))
-    ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the noise")
+    ax.set(xlabel="time (s)", ylabel="change of the output\nin units of the white noise")
     _legend_above(ax, "for one standard error of")
 
 

@@ -15,6 +15,7 @@ from deadtime._base.validation import real_array
 from deadtime.estimation.fit._profile import Profile, floor_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
+from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -35,61 +36,15 @@ class CramerRaoBound(ReadOnlyArrays):
     ----------
     free : tuple of str
         The parameters that are taken as unknown; the bound depends on them.
-    noise : float
-        Standard deviation of the white measurement noise it is for, in the output's unit.
+    noise : FlightNoise
+        The noise it is for.
     stderr : dict of str to float
         The bound for each free quantity, and for ``delay+lag`` where both are free.
     """
 
     free: tuple[str, ...]
-    noise: float
+    noise: FlightNoise
     stderr: dict[str, float]
-
-
-@dataclass(frozen=True)
-class FlightNoise:
-    """The noise of a recording, as it was fitted.
-
-    Attributes
-    ----------
-    white : float
-        Standard deviation of the white noise of the sensor, in the unit of the output.
-    air : float
-        Standard deviation of what moves the plant beside the command, such as moving air, in the
-        unit of the command times the gain; zero where there is none.
-    air_time : float
-        Its time constant, s.
-    trim : float
-        Constant input beside the command, in the same unit as the air.
-    sensor : float
-        Standard deviation of the coloured noise of the sensor.
-    sensor_time : float
-        Its time constant, s.
-    left_out : int
-        Rows that were left out as outliers.
-    """
-
-    white: float
-    air: float = 0.0
-    air_time: float = math.inf
-    trim: float = 0.0
-    sensor: float = 0.0
-    sensor_time: float = 0.0
-    left_out: int = 0
-
-    def __str__(self) -> str:
-        parts = [f"white noise of {self.white:.3g}"]
-        if self.air:
-            parts.append(f"air of {self.air:.3g} over {self.air_time:.2g} s")
-        if self.trim:
-            parts.append(f"trim of {self.trim:.3g}")
-        if self.sensor:
-            parts.append(
-                f"coloured sensor noise of {self.sensor:.3g} over {self.sensor_time:.2g} s"
-            )
-        if self.left_out:
-            parts.append(f"{self.left_out} rows left out as outliers")
-        return ", ".join(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,8 +303,8 @@ class DelayEstimate(ReadOnlyArrays):
             lines.append(f"  no interval: {self.uncalibrated}")
         if self.crb is not None and "delay" in self.crb.stderr:
             lines.append(
-                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for white noise of "
-                f"{self.crb.noise:.3g} with {', '.join(self.crb.free)} free"
+                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for {self.crb.noise} "
+                f"with {', '.join(self.crb.free)} free"
             )
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(

@@ -18,7 +18,8 @@ from deadtime._base.validation import (
     positive,
     whole_number,
 )
-from deadtime.experiments._noise import Noise, Seed, noise_model, reference_shift
+from deadtime.experiments._noise import Noise, Seed, noise_model
+from deadtime.experiments._noise_in_loop import disturbance_of, reference_shift
 from deadtime.experiments._waves import (
     ON_A_SAMPLE,
     binary_sequence,
@@ -419,12 +420,13 @@ class Experiment(ReadOnlyArrays):
         loop : ControlLoop
             The true loop, at rest at zero before the first sample.
         noise : float or NoiseModel
-            Noise of the measured output: the standard deviation of white noise, or a model.
+            The standard deviation of white noise on the measured output, or a model, such as
+            `FlightNoise` with moving air.
         seed : int
             Seed of the noise.
         noise_in_loop : bool
-            Whether the controller acts on the noise, as on that of a sensor; otherwise the noise
-            is in the log only.
+            Whether the controller acts on the noise of the sensor; otherwise that noise is in the
+            log only. On the effect of air and trim it always acts, because they move the vehicle.
 
         Returns
         -------
@@ -432,12 +434,15 @@ class Experiment(ReadOnlyArrays):
             Reference, output with its noise, and the command after the limit, at the samples.
             The output is the one that arrives at the controller, late by a delay of the
             measurement. In a continuous loop the noise holds from each sample to the next.
+            Air and trim begin to act on that output at the first sample.
 
         Raises
         ------
         ValueError
             If the delay of the loop is None, its samples are not those of the experiment, or
-            the controller takes an ideal derivative of the noise, which does not exist.
+            the controller takes an ideal derivative of the noise, which does not exist. With air
+            or trim, also if the controller acts on the output between the samples, as continuous
+            ones do and those with an integral.
 
         Examples
         --------
@@ -448,10 +453,12 @@ class Experiment(ReadOnlyArrays):
         """
         loop = self.loop_in_run(loop)
         reference = self.reference_in_run()
-        error = noise_model(noise).sample(self.time, seed)
-        if noise_in_loop and error.any():
-            reference = reference - reference_shift(error, loop)
+        model = noise_model(noise)
+        error = model.sample(self.time, seed)
+        moved = disturbance_of(model, self.time, seed, loop)
+        read = moved + error if noise_in_loop else moved
+        if read.any():
+            reference = reference - reference_shift(read, loop)
         response = loop.simulate(self.time, reference, reference_time=self.time, initial_output=0.0)
-        return Recording(
-            self.time, self.reference, response.outputs + error, response.inputs, source=self.name
-        )
+        output = response.outputs + moved + error
+        return Recording(self.time, self.reference, output, response.inputs, source=self.name)

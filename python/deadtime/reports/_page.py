@@ -28,6 +28,7 @@ def render(study: Study) -> str:
             "<h2>The delay, by several methods</h2>",
             _estimates(study),
             *(f"<p>{escaped(sentence)}</p>" for sentence in study.comparison.explanation()),
+            *(f"<p>{escaped(sentence)}</p>" for sentence in study.comparison.limitations()),
             _fits(study),
             "<h2>Which gains are stable</h2>",
             _map(study),

@@ -1,18 +1,20 @@
 """Choose the gains of a loop whose delay is known up to an interval.
 
-`_problem` holds what is free and what is not known, `_stabilising` where to look for gains,
-`_objectives` what is made best, `_margins` what must hold. `_survey` maps the gains, `_search`
-finds the best of them, `_exchange` looks for the delay at which they are worst and repeats the
-search until it finds none that is worse, and `_made` puts the result together. `_filter_choice`
-chooses the filter of the derivative.
+`_problem` holds what is free and what is not known, `_region` the region of an estimate,
+`_stabilising` where to look for gains, `_objectives` what is made best, `_margins` what must hold.
+`_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the delay at which
+they are worst and repeats the search until it finds none that is worse, and `_made` puts the result
+together. `_filter_choice` chooses the filter of the derivative.
 """
 
 from deadtime.tuning._design import design
 from deadtime.tuning._filter_choice import design_filter
+from deadtime.tuning._region import ConfidenceRegion
 from deadtime.tuning._result import Design, FilterChoice, LeastMargins, Trade
 from deadtime.tuning._stabilising import critical_gain
 
 __all__ = [
+    "ConfidenceRegion",
     "Design",
     "FilterChoice",
     "LeastMargins",

@@ -30,15 +30,18 @@ def design(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     shape: Sequence[int] | None = None,
     amplitude: float = 1.0,
+    level: float = 0.95,
+    allow_inadequate: bool = False,
     threads: int | None = None,
 ) -> Design:
     """Find the gains that are best in the worst case, within margins.
 
     Parameters
     ----------
-    loop : ControlLoop or a plant
-        Plant, delay, hold and limit; its controller is replaced. A plant of any kind that
-        `ControlLoop` takes stands for the continuous loop around it without a limit.
+    loop : ControlLoop, DelayEstimate or a plant
+        Plant, delay, hold and limit; its controller is replaced. With an estimate the gains are the
+        best for the worst loop of its joint confidence region of delay, gain and lag. A plant of
+        any kind that `ControlLoop` takes stands for the continuous loop around it without a limit.
     controller : Controller or class of one
         `P`, `PV`, `PD`, `PI`, `PID`, or an instance whose other numbers, such as the filter of
         its derivative, are to be kept.
@@ -70,6 +73,12 @@ def design(
         Points of the map that the search starts from, along each free gain.
     amplitude : float
         Height of the step; with a limit it matters.
+    level : float
+        Probability of the region of an estimate. The true loop has the margins of the design at
+        least as probably, where the model of the estimate is right.
+    allow_inadequate : bool
+        Design also for an estimate whose model is not adequate. Its region has no known
+        probability, so neither have the margins.
     threads : int, optional
         Number of threads; all cores if not given.
 
@@ -81,7 +90,8 @@ def design(
     ------
     ValueError
         When the delay is not known, no gains in the ranges are stable, or none of them meet the
-        margins; the message says what was searched, or which margins are possible.
+        margins; the message says what was searched, or which margins are possible. When an
+        estimate is not adequate, or has no intervals.
     TypeError
         When `loop` is neither a `ControlLoop` nor a plant, or `fixed` or `ranges` no mapping.
 
@@ -112,7 +122,9 @@ def design(
         raise ValueError(f"filter={filter!r}: give a DerivativeFilter, 'auto' or None")
     goal = objective_named(objective)
     required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)
-    problem = pose(loop, template, delay, gain, fixed, ranges, amplitude, threads)
+    problem = pose(
+        loop, template, delay, gain, fixed, ranges, amplitude, threads, level, allow_inadequate
+    )
     if filter != "auto":
         return made(problem, goal, required, shape)
     choice = filter_choice(problem, goal, required, shape)

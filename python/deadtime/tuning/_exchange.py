@@ -9,10 +9,10 @@ Review 35, 1993). The margins of the search are estimates: a requirement that th
 miss is raised by what is missing, in the same rounds.
 
 The look over the intervals is a search, not a proof: a fine grid of scenarios, and between the
-neighbours of the worst of them a search along the delay. Stability itself, the gain margin and the
-delay margin of a continuous loop are proved for all of the intervals at once, by boxes: a gain
-margin of 2 is the stability of all plants up to twice as strong, a delay margin that of all delays
-up to this margin longer.
+neighbours of the worst of them a search along the delay; or the points around the region of an
+estimate. Stability itself, the gain margin and the delay margin of a continuous loop are proved for
+all of the intervals at once, by boxes: a gain margin of 2 is the stability of all plants up to
+twice as strong, a delay margin that of all delays up to this margin longer.
 """
 
 from __future__ import annotations
@@ -51,6 +51,8 @@ _HOPELESS = 3e-3
 #: exact margins, which cost more.
 _FINE = {1: 33, 2: 9}
 _FINE_MARGINS = {1: 9, 2: 3}
+#: Points of a region for each margin.
+_LEAST = 2
 
 #: Most boxes of a proof (bounds time).
 _BOXES = 20_000
@@ -83,7 +85,7 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
         added = [worst] if cost > seen + objective.tolerance * abs(seen) else []
         missing = np.zeros(3)
         if required.named:
-            places = [*fine(problem, margins=True), *scenarios[len(problem.corners) :]]
+            places = [*margin_places(search, gains), *scenarios[len(problem.corners) :]]
             each = exact_margins(problem, gains, places)
             missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
             missing = np.where(required.vector > 0.0, missing, 0.0)
@@ -144,10 +146,26 @@ def _with_unit(name: str, value: float) -> str:
     return f"{name.replace('_', ' ')} {number}{UNITS[name]}"
 
 
-def fine(problem: Problem, margins: bool = False) -> tuple[Scenario, ...]:
+def fine(problem: Problem) -> tuple[Scenario, ...]:
     """The scenarios a design is checked in."""
-    unknown = sum(low < high for low, high in problem.intervals.values())
-    return problem.scenarios((_FINE_MARGINS if margins else _FINE).get(unknown, 1))
+    if problem.region is not None:
+        return problem.region.points
+    return problem.scenarios(_FINE.get(_unknown(problem), 1))
+
+
+def margin_places(search: Search, gains: Vector) -> tuple[Scenario, ...]:
+    """Those its exact margins are computed in: of a region the points with the least estimates."""
+    problem = search.problem
+    if problem.region is None:
+        return problem.scenarios(_FINE_MARGINS.get(_unknown(problem), 1))
+    points = problem.region.points
+    each = np.array([search.estimate.of(gains[None, :], [one])[0] for one in points])
+    least = np.argsort(each, axis=0, kind="stable")[:_LEAST]
+    return tuple(points[place] for place in np.unique(least))
+
+
+def _unknown(problem: Problem) -> int:
+    return sum(low < high for low, high in problem.intervals.values())
 
 
 def worst_scenario(
@@ -162,7 +180,7 @@ def worst_scenario(
     delays = sorted({one["delay"] for one in scenarios})
     at = delays.index(worst["delay"])
     low, high = delays[max(at - 1, 0)], delays[min(at + 1, len(delays) - 1)]
-    if high > low and not objective.simulated:
+    if high > low and not objective.simulated and problem.region is None:
         found = minimize_scalar(
             lambda late: -objective.worst(problem, gains, [worst | {"delay": float(late)}]),
             bounds=(low, high),
@@ -176,7 +194,7 @@ def worst_scenario(
 
 def proved(problem: Problem, gains: Vector, required: RequiredMargins) -> tuple[str, ...]:
     """What of ``stable``, ``gain_margin``, ``delay_margin`` is proved for all of the intervals."""
-    if problem.loop.is_sampled:
+    if problem.loop.is_sampled or problem.region is not None:
         return ()
     loop = problem.at(gains)
     found = []

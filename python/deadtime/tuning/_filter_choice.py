@@ -76,13 +76,15 @@ def design_filter(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     shape: Sequence[int] | None = None,
     amplitude: float = 1.0,
+    level: float = 0.95,
+    allow_inadequate: bool = False,
     threads: int | None = None,
 ) -> FilterChoice:
     """Choose the corner of the derivative's filter, and the gains with it.
 
     Parameters
     ----------
-    loop : ControlLoop or a plant
+    loop : ControlLoop, DelayEstimate or a plant
         As in `design`.
     controller : Controller or class of one
         With a derivative: `PV`, `PD` or `PID`.
@@ -102,7 +104,7 @@ def design_filter(
         times the fastest corner.
     delay, gain, objective, fixed, gain_margin, phase_margin, delay_margin, ranges, shape
         As in `design`.
-    amplitude, threads
+    amplitude, level, allow_inadequate, threads
         As in `design`.
 
     Returns
@@ -126,7 +128,16 @@ def design_filter(
     True
     """
     problem = pose(
-        loop, controller_template(controller), delay, gain, fixed, ranges, amplitude, threads
+        loop,
+        controller_template(controller),
+        delay,
+        gain,
+        fixed,
+        ranges,
+        amplitude,
+        threads,
+        level,
+        allow_inadequate,
     )
     goal = objective_named(objective)
     required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)

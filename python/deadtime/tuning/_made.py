@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, proved
+from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, margin_places, proved
 from deadtime.tuning._margins import UNITS, MarginEstimate, RequiredMargins, exact_margins
 from deadtime.tuning._objectives import Objective, dominant_damping
 from deadtime.tuning._problem import Problem
@@ -43,7 +43,7 @@ def made(
     loops = [problem.at(found.gains, one) for one in judged]
     value = objective.proved(problem, found.gains, judged)
     middle = problem.at(found.gains)
-    places = [*fine(problem, margins=True), found.worst]
+    places = [*margin_places(search, found.gains), found.worst]
     margins = LeastMargins(*least_margins(exact_margins(problem, found.gains, places)).tolist())
     return Design(
         loop=middle,
@@ -61,6 +61,7 @@ def made(
         worst=found.worst,
         checked=found.checked,
         proved=proved(problem, found.gains, required),
+        region=problem.region,
         traded=_trades(search, found, margins, value),
         charts=charts_at(problem, survey, found.gains),
     )
@@ -95,9 +96,13 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
     if any(low < high for low, high in problem.intervals.values()):
         without = best_without(required, (problem.middle,))
         lost = objective.lost(value, without)
-        names = " and ".join(name for name, (low, high) in problem.intervals.items() if low < high)
+        *others, last = (name for name, (low, high) in problem.intervals.items() if low < high)
+        names = f"{', '.join(others)} and {last}" if others else last
+        sure = "were it in the middle of its interval for certain"
+        if problem.region is not None:
+            sure = "were the estimate exact"
         words = (
-            f"not knowing the {names}: were it in the middle of its interval for certain, "
+            f"not knowing the {names}: {sure}, "
             f"{figure_in_words(objective.name, without)} could be had ({_part(lost)})"
         )
         made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import Range, finite, interval, non_negative
+from deadtime.estimation import DelayEstimate
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.tuning._region import ConfidenceRegion, region_of
 from deadtime.tuning._stabilising import candidate_ranges
 
 Vector: TypeAlias = NDArray[np.float64]
@@ -39,10 +41,13 @@ class Problem:
     spans : tuple of dict of str to (float, float)
         Where they are looked for, one after the other until some gains are stable.
     intervals : dict of str to (float, float)
-        ``delay`` and, where it is not known either, ``gain`` of the plant.
+        ``delay`` and, where it is not known either, ``gain`` of the plant; of a region those of
+        all its numbers.
     amplitude : float
         Height of the step, where steps are judged.
     threads : int or None
+    region : ConfidenceRegion or None
+        The scenarios in place of all combinations of the intervals.
     """
 
     loop: ControlLoop
@@ -51,6 +56,7 @@ class Problem:
     intervals: dict[str, Range]
     amplitude: float
     threads: int | None
+    region: ConfidenceRegion | None = None
 
     def named(self, gains: Sequence[float] | Vector) -> dict[str, float]:
         """The free gains by name."""
@@ -78,19 +84,23 @@ class Problem:
 
     @property
     def corners(self) -> tuple[Scenario, ...]:
-        """Ends and middle of each interval."""
+        """Ends and middle of each interval, or the extremes of the region."""
+        if self.region is not None:
+            return (self.region.estimate, *self.region.extremes)
         return self.scenarios(3)
 
     @property
     def middle(self) -> Scenario:
-        """All numbers in the middles of their intervals."""
+        """All numbers in the middles of their intervals, or as they were estimated."""
+        if self.region is not None:
+            return self.region.estimate
         return {name: 0.5 * (low + high) for name, (low, high) in self.intervals.items()}
 
     @property
     def delays(self) -> tuple[float, ...]:
         """Ends and middle of the delay's interval."""
         low, high = self.intervals["delay"]
-        return (low, 0.5 * (low + high), high) if low < high else (low,)
+        return (low, self.middle["delay"], high) if low < high else (low,)
 
 
 def pose(
@@ -102,8 +112,19 @@ def pose(
     ranges: Mapping[str, Range] | None,
     amplitude: float,
     threads: int | None,
+    level: float = 0.95,
+    allow_inadequate: bool = False,
 ) -> Problem:
     """Check these arguments of `design`, and state its problem."""
+    region = None
+    if isinstance(loop, DelayEstimate):
+        if delay is not None or gain is not None:
+            raise ValueError(
+                "delay and gain are in the region of the estimate: leave delay= and gain= out, or "
+                "give the loop of the estimate, fit.loop"
+            )
+        region = region_of(loop, level, allow_inadequate)
+        loop = loop.loop
     if not isinstance(loop, ControlLoop):
         loop, delay = _around(loop, template, delay)
     held = {name: finite(name, value) for name, value in _mapping("fixed", fixed).items()}
@@ -124,10 +145,13 @@ def pose(
             f"{len(free)} free gains ({', '.join(free)}): fix some, {_MOST_FREE} are searched at "
             "most"
         )
-    intervals = {"delay": _delay_interval(loop, delay)}
-    if gain is not None:
-        intervals["gain"] = _gain_interval(gain)
-    middle = {name: 0.5 * (low + high) for name, (low, high) in intervals.items()}
+    if region is not None:
+        intervals, middle = region.intervals, region.estimate
+    else:
+        intervals = {"delay": _delay_interval(loop, delay)}
+        if gain is not None:
+            intervals["gain"] = _gain_interval(gain)
+        middle = {name: 0.5 * (low + high) for name, (low, high) in intervals.items()}
     whole = loop.replace(controller=template, **middle)
     if held:
         whole = whole.replace(**held)
@@ -146,7 +170,7 @@ def pose(
     height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")
-    return Problem(whole, free, spans, intervals, height, threads)
+    return Problem(whole, free, spans, intervals, height, threads, region)
 
 
 def _around(

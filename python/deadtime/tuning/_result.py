@@ -10,6 +10,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import ControlLoop
 from deadtime.stability import StabilityMap
 from deadtime.tuning._problem import ObjectiveName, Scenario, Vector
+from deadtime.tuning._region import ConfidenceRegion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,6 +103,9 @@ class Design(ReadOnlyArrays):
         delay.
     filter_choice : FilterChoice or None
         Where the filter's corner was chosen, how.
+    region : ConfidenceRegion or None
+        The region of the estimate it was designed for. The margins are the least over it, so that
+        the true loop has them with the probability `region.level` where `region.adequate`.
     """
 
     loop: ControlLoop
@@ -122,6 +126,7 @@ class Design(ReadOnlyArrays):
     traded: tuple[Trade, ...]
     charts: tuple[StabilityMap, ...]
     filter_choice: FilterChoice | None = None
+    region: ConfidenceRegion | None = None
 
     def __repr__(self) -> str:
         kind = type(self.loop.controller).__name__
@@ -149,6 +154,8 @@ class Design(ReadOnlyArrays):
         over = f"over a delay of {self._late()} s"
         if self.gain is not None:
             over += f" and a gain of {self.gain[0]:g} to {self.gain[1]:g}"
+        if self.region is not None:
+            over = f"over {_in_words(self.region)}"
         info, least = self.step_info, self.margins
         proof = f"; proved: {', '.join(self.proved).replace('_', ' ')}" if self.proved else ""
         settled = info["settling_time"]
@@ -165,6 +172,8 @@ class Design(ReadOnlyArrays):
             f"({self.checked} scenarios checked{proof})",
             f"step of {self.amplitude:g}: {step}",
         ]
+        if self.region is not None:
+            lines.insert(3, _probability(self.region))
         lines += [trade.words for trade in self.traded]
         return "\n".join(lines)
 
@@ -183,6 +192,26 @@ class Design(ReadOnlyArrays):
         from deadtime.tuning._plots import plot_design
 
         return plot_design(self)
+
+
+def _in_words(region: ConfidenceRegion) -> str:
+    """The region with the range of each number."""
+    ranges = [
+        f"{name.replace('_', ' ')} {low:.4g} to {high:.4g}{'' if name == 'gain' else ' s'}"
+        for name, (low, high) in region.intervals.items()
+        if low < high
+    ]
+    return f"the joint {100.0 * region.level:g} % region of the estimate ({', '.join(ranges)})"
+
+
+def _probability(region: ConfidenceRegion) -> str:
+    """With which probability the true loop has the least margins."""
+    if region.adequate:
+        return f"the true loop has these margins with a probability of {100.0 * region.level:g} %"
+    return (
+        "the model of the estimate is not adequate: with which probability the true loop has these "
+        "margins is not known"
+    )
 
 
 def figure_in_words(objective: ObjectiveName, value: float) -> str:

@@ -1,7 +1,8 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Commands, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity, Rows, Timing,
+    Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity,
+    Rows, Timing, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -302,4 +303,43 @@ fn read(quantity: &str) -> PyResult<Quantity> {
             }
         },
     })
+}
+
+/// What moves the output besides the command, in deviations of the white noise.
+#[derive(FromPyObject)]
+pub(crate) struct GivenDisturbance {
+    at_input: bool,
+    time_constant: f64,
+    deviation: f64,
+}
+
+/// Columns, one after the other, whitened by the covariance of their rows: that of disturbances of
+/// the plant num/den, and of white noise of variance one.
+#[pyfunction]
+pub(crate) fn whitened_columns<'py>(
+    py: Python<'py>,
+    num: Vec<f64>,
+    den: Vec<f64>,
+    disturbances: Vec<GivenDisturbance>,
+    time: Floats<'py>,
+    columns: Floats<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let plant = converted(Plant::new(&num, &den))?;
+    let disturbances: Vec<Disturbance> = disturbances
+        .iter()
+        .map(|one| Disturbance {
+            entry: if one.at_input {
+                Entry::Input
+            } else {
+                Entry::Output
+            },
+            time_constant: one.time_constant,
+            deviation: one.deviation,
+        })
+        .collect();
+    let (time, columns) = (owned(&time)?, owned(&columns)?);
+    let found = run_here(py, |task| {
+        whiten(&time, columns, &plant, &disturbances, task)
+    })?;
+    Ok(found.into_pyarray(py))
 }

@@ -36,7 +36,9 @@ mod _deadtime {
     #[pymodule_export]
     use super::dde::{LoopResponse, PyLinearLoop, on_samples};
     #[pymodule_export]
-    use super::estimation::{FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise};
+    use super::estimation::{
+        FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, whitened_columns,
+    };
     #[pymodule_export]
     use super::fixed_step::{FixedStepResponse, fixed_step_run};
     #[pymodule_export]

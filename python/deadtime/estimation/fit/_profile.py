@@ -85,11 +85,11 @@ class Profile:
         from scipy.optimize import brentq
 
         def excess(offset: float) -> float:
-            return float(np.sqrt(self.statistic(name, value + offset)) - quantile)
+            # At the best fit itself the search for the others may end a little above it.
+            rise = self.statistic(name, value + offset) if offset else 0.0
+            return float(np.sqrt(rise) - quantile)
 
         inner, factor = 0.0, FIRST_STEP * quantile
-        if excess(inner) > 0.0:  # the best fit is exact to rounding
-            return value
         while factor <= FARTHEST:
             outer = reach * factor
             if value + outer <= floor:

@@ -7,6 +7,7 @@ whitened residuals stay white. Beside their whiteness, these are tested:
   1987);
 * a delay that is constant over the window: the cumulated score of the delay is a Brownian bridge
   over its information (Nyblom 1989);
+* air that is slower than the rows: faster air stands for something else;
 * noise that does not grow with the speed of the output, as it does where time stamps are not the
   times of the samples (Breusch & Pagan 1979).
 """
@@ -35,6 +36,9 @@ NONE = 1e-3
 #: Level at which a further lag may not move delay and lag together out of their interval.
 MOVES = 0.05
 
+#: Most deviations of the sensor noise by which air that changes within a row may move the output.
+RESTLESS = 15.0
+
 #: Largest difference of the cumulated score at the 1 % level (Kolmogorov).
 BRIDGE = 1.628
 
@@ -51,11 +55,14 @@ class Adequacy:
         The further lag that makes the recordings likeliest, s.
     reasons : tuple of str
         Why the model is not adequate; empty where it is.
+    lacks_lag : bool
+        Whether the further lag is one of them.
     """
 
     whiteness: Whiteness
     further_lag: float
     reasons: tuple[str, ...]
+    lacks_lag: bool = False
 
 
 def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -> Adequacy:
@@ -72,6 +79,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
         )
     richer, p_value = further_lag(fit)
     further = richer.lags[-1]
+    plain = len(reasons)
     if p_value < SIGNIFICANCE:
         reasons.append(
             f"a further lag of {further:.3g} s makes the recording likelier: the plant lacks it"
@@ -81,6 +89,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
             f"a further lag of {further:.3g} s would move delay and lag together to "
             f"{richer.delay + sum(richer.lags):.3g} s, out of their interval"
         )
+    lacks_lag = len(reasons) > plain
     for index, part in enumerate(fit.parts):
         where = f" in recording {index + 1}" if len(fit.parts) > 1 else ""
         if part.score.size and bridge(part.score, part.whitened) > BRIDGE:
@@ -91,7 +100,21 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
                 f"the noise grows with the speed of the output{where}, as where time stamps are "
                 "not the times of the samples"
             )
-    return Adequacy(whiteness, further, tuple(reasons))
+        if (share := restless_air(fit, index)) > RESTLESS:
+            reasons.append(
+                f"the air found{where} changes within a row and moves the output {share:.2g} times "
+                "the noise of the sensor, as no air does: it stands for something else"
+            )
+    return Adequacy(whiteness, further, tuple(reasons), lacks_lag)
+
+
+def restless_air(fit: NoiseFit, run: int) -> float:
+    """How far air that changes within a row moves the output, in deviations of sensor noise."""
+    noise, time = fit.numbers.noise[run], fit.runs[run].time
+    if not fit.model.integrates or noise.air_time > float(np.median(np.diff(time))):
+        return 0.0
+    moved = noise.air * math.sqrt(2.0 * noise.air_time * float(time[-1] - time[0]))
+    return moved / math.hypot(1.0, noise.sensor)
 
 
 def _holds(profile: LikelihoodProfile, total: float, level: float) -> bool:

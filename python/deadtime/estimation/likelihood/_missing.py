@@ -199,9 +199,7 @@ def predicted_commands(
 
         left = smoothed(output - modelled(time))
 
-        def predicted(
-            times: Array, left: Array = left, modelled: Predicted = modelled
-        ) -> Array:
+        def predicted(times: Array, left: Array = left, modelled: Predicted = modelled) -> Array:
             return modelled(times) + np.interp(times, time, left)
 
         again = with_missing(recording, loop, command, predicted, step)

@@ -88,7 +88,7 @@ class LikelihoodProfile:
     def _weights(self) -> dict[str, Array]:
         """Each quantity as a sum of the common numbers: gain, delay, lags."""
         model = self.fit.model
-        order = [name for name in ("gain", "delay") if name in model.names]
+        order: list[str] = [name for name in ("gain", "delay") if name in model.names]
         order += [f"lag {i}" for i, free in enumerate(model.free_lags) if free]
         found = {}
         for name, kernel in self.names.items():
@@ -201,7 +201,9 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
         moved = fit.moved(numbers)
         cov = common_covariance(moved)
         value = sum(part.objective for part in moved.parts)
-        return value, {name: math.log(max(w @ cov @ w, 1e-300)) for name, w in weights.items()}
+        return value, {
+            name: math.log(max(float(w @ cov @ w), 1e-300)) for name, w in weights.items()
+        }
 
     h, count = LOG_STEP, len(places)
     middle, _ = at({})

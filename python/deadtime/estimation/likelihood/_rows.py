@@ -57,4 +57,4 @@ def is_outlier(whitened: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
     if np.sum(~used) + np.sum(found) > MOST_SPIKES * used.size:
         return np.zeros(used.size, dtype=bool)
     # The rows after an outlier are predicted from it: only the first of a run is one.
-    return found & ~np.r_[False, found[:-1]]
+    return np.asarray(found & ~np.r_[False, found[:-1]])

@@ -30,8 +30,8 @@ GRID_STEP, GRID_GROWTH, GRID_ROWS = 1.0, 0.1, 5000
 LAGS = (0.5, 3.0, 8.0)
 
 #: Deviations of the air in the grid, and where it is added to a fit without: white deviations a
-#: row. Its time constant there, as a share of the window.
-STRONG_AIR, WEAK_AIR, AIR_TIME = 0.65, 0.02, 0.13
+#: row. Its time constant there, as a share of the window, and by how much slow air is slower.
+STRONG_AIR, WEAK_AIR, AIR_TIME, SLOW = 0.65, 0.02, 0.13, 10.0
 
 #: The same for plants that do not integrate, in white deviations.
 STRONG_INPUT, WEAK_INPUT = 3.0, 0.3
@@ -45,9 +45,10 @@ ROUGH = 0.02
 #: Start of the coloured sensor noise: white deviations, and rows.
 SENSOR, SENSOR_TIME = 1.0, 2.0
 
-#: Price of a number of the coloured sensor noise (Akaike 1974), and of the trim, which would cost
-#: accuracy on a calm flight. Air has none: no air is the lower bound of its deviation.
-PRICE, PRICE_OF_TRIM = 2.0, 4.0
+#: Prices in the criterion: of the two numbers of the coloured sensor noise that of Akaike (1974),
+#: of the trim twice that, because it would cost accuracy on a calm flight. Air has none: no air is
+#: the lower bound of its deviation.
+PRICE_OF_SENSOR, PRICE_OF_TRIM = 4.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ class NoiseFit:
         for rows, part, noise in zip(self.runs, self.parts, self.numbers.noise, strict=True):
             count = int(np.sum(rows.used))
             total += count * np.log(part.variance * part.freedom / count) + part.log_det
-            total += 2.0 * PRICE * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
+            total += PRICE_OF_SENSOR * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
         return float(total)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -180,7 +181,8 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
             (likelihood.fit(one, ROUGH) for one in (with_noise(first, quiet), *starts[0])),
             key=_objective,
         )
-        airy = (with_noise(calm, weak), *starts[1])
+        slow = [RowNoise(SLOW * one.air_time, one.air) for one in weak]
+        airy = (with_noise(calm, weak), with_noise(calm, slow), *starts[1])
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)

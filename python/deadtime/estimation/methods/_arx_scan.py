@@ -69,6 +69,10 @@ class ARXScan(Method):
     fractional: bool = False
 
     name: ClassVar[str] = "arx_scan"
+    limits: ClassVar[str] = (
+        "The delay is a whole number of samples, and noise of the sensor biases the coefficients "
+        "of the ARX models, under feedback more so."
+    )
 
     def __post_init__(self) -> None:
         whole_number("na", self.na, least=0)

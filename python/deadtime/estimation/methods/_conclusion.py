@@ -37,6 +37,7 @@ from deadtime.estimation.fit._residuals import (
     whiteness_of,
 )
 from deadtime.estimation.methods._method import Run
+from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -148,7 +149,7 @@ def concluded(
         free=names,
         stderr=errors,
         cov=spread[:count, :count],
-        crb=CramerRaoBound(labels, math.sqrt(found.cost / freedom), plain),
+        crb=CramerRaoBound(labels, FlightNoise(math.sqrt(found.cost / freedom)), plain),
         recording=runs[0].recording,
         residuals=runs[0].residuals,
         whiteness=whiteness,

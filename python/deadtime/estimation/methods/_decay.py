@@ -62,6 +62,10 @@ class Decay(Method):
     tail: float = 0.3
 
     name: ClassVar[str] = "decay"
+    limits: ClassVar[str] = (
+        "It takes the gain as given and the tail as one exponential, so that a wrong gain, a lag "
+        "or other modes move the delay."
+    )
 
     def __post_init__(self) -> None:
         if positive("tail", self.tail) >= 1.0:

@@ -52,6 +52,10 @@ class Decrement(Method):
     """Delay, and gain if it is free, from the decay of successive peaks and valleys."""
 
     name: ClassVar[str] = "decrement"
+    limits: ClassVar[str] = (
+        "It takes the peaks as those of one decaying oscillation, so that other modes in the first "
+        "peaks, and noise on which the controller acts, move the delay."
+    )
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""

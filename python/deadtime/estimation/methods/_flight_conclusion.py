@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._deadtime import PlantNumbers, RowNoise
-from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun, FlightNoise
+from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
-from deadtime.estimation.likelihood._adequacy import Adequacy, adequacy_of
+from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -22,6 +22,7 @@ from deadtime.estimation.likelihood._profile import (
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise
 from deadtime.estimation.methods._method import Run
+from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
     wanted = {name: kernel[name] for name in names}
     if "delay" in names:
         slow = "time_constant" if "time_constant" in names else "lag"
-        wanted[f"delay+{slow}"] = "total" if slow in names else "delay"
+        wanted[f"delay+{slow}"] = "total"
     return profile_of(fit, wanted)
 
 
@@ -90,17 +91,16 @@ def concluded_flight(
     known: Mapping[str, float],
     message: str,
     details: Mapping[str, Any],
-    doubts: Sequence[str] = (),
+    adequacy: Adequacy,
 ) -> DelayEstimate:
-    """Make the estimate of a fit; it is not adequate where there are `doubts`."""
+    """Make the estimate of a fit."""
     fit = profile.fit
     values = values_of(fit, names, known)
-    adequacy = adequacy_of(profile, len(names))
-    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
     cov = common_covariance(fit)
     order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
     place = [order.index(name) for name in names]
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
+    left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
     fitted = tuple(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals)
         for run, part in zip(runs, fit.parts, strict=True)
@@ -115,13 +115,13 @@ def concluded_flight(
         free=names,
         stderr=stderr,
         cov=cov[np.ix_(place, place)],
-        crb=CramerRaoBound(labels, noise[0].white, dict(stderr)),
+        crb=CramerRaoBound(labels, noise[0], dict(stderr)),
         recording=fitted[0].recording,
         residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         adequate=not adequacy.reasons,
-        message=_message(message, names, held, noise, adequacy, runs[0]),
-        details=dict(details),
+        message=_message(message, names, held, noise[0], left_out, adequacy, runs[0]),
+        details={**details, "rows_left_out": left_out},
         others=fitted[1:],
         noise=noise[0],
         _profile=profile,
@@ -159,7 +159,6 @@ def _noise_of(fit: NoiseFit, run: int) -> FlightNoise:
         trim=trim,
         sensor=white * one.sensor,
         sensor_time=one.sensor_time if one.sensor > 0.0 else 0.0,
-        left_out=int(np.sum(~rows.used)),
     )
 
 
@@ -170,15 +169,30 @@ def gain_is_certain(profile: LikelihoodProfile) -> bool:
     return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * profile.stderr["gain"]
 
 
+def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate:
+    """The estimate of least squares for a plant that lacks something.
+
+    The likelihood takes what the plant lacks for air, and weighs the rows that show it least. Least
+    squares weighs all alike, and finds the plant that comes closest to the recording.
+    """
+    reasons = [reason for reason in adequacy.reasons if reason not in plain.message]
+    return replace(
+        plain, adequate=False, message=f"{plain.message}; not adequate: {'; '.join(reasons)}"
+    )
+
+
 def _message(
     done: str,
     names: tuple[str, ...],
     held: list[str],
-    noise: Sequence[FlightNoise],
+    noise: FlightNoise,
+    left_out: int,
     adequacy: Adequacy,
     run: Run,
 ) -> str:
-    text = f"{done}; {noise[0]}"
+    text = f"{done}; {noise}"
+    if left_out:
+        text += f"; {left_out} rows left out as outliers"
     if held:
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:

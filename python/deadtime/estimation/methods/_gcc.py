@@ -69,6 +69,10 @@ class GCC(Method):
     weighting: Weighting = "none"
 
     name: ClassVar[str] = "gcc"
+    limits: ClassVar[str] = (
+        "Under feedback the command contains the noise of the output, which moves the peak of the "
+        "correlation, the more the weaker the excitation."
+    )
 
     def __post_init__(self) -> None:
         check_choice("weighting", self.weighting, get_args(Weighting))

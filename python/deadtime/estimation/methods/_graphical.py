@@ -71,6 +71,10 @@ class Graphical(Method):
     shares: tuple[float, float] = (0.1, 0.35)
 
     name: ClassVar[str] = "graphical"
+    limits: ClassVar[str] = (
+        "It reads the few samples on the first straight part of the step, and counts part of a lag "
+        "as delay."
+    )
 
     def __post_init__(self) -> None:
         check_choice("construction", self.construction, get_args(Construction))

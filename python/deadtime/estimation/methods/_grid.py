@@ -43,6 +43,7 @@ from deadtime.estimation.fit._residuals import robust_covariance, white_covarian
 from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.methods._waveform import SimulatedModel
+from deadtime.experiments import FlightNoise
 
 Array = NDArray[np.float64]
 
@@ -126,7 +127,7 @@ class Grid(Method):
             values,
             spread[:count, :count],
             residuals,
-            crb=CramerRaoBound(problem.labels, noise, standard_errors(names, white)),
+            crb=CramerRaoBound(problem.labels, FlightNoise(noise), standard_errors(names, white)),
             message=_message(names, grid, adequate),
             uncalibrated=(
                 "the grid method fits the response to the reference, without the noise that the "

@@ -75,10 +75,13 @@ class Method(ABC):
         ``method=Waveform()``.
     joint : bool
         Whether it fits several recordings together.
+    limits : str
+        What biases it, in a sentence; empty for methods of maximum likelihood and least squares.
     """
 
     name: ClassVar[str]
     joint: ClassVar[bool] = False
+    limits: ClassVar[str] = ""
 
     @abstractmethod
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:

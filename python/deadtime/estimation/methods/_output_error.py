@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from deadtime.estimation.data._simulated import (
     moves_between_rows,
 )
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
+from deadtime.estimation.likelihood._adequacy import adequacy_of
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
     predicted_commands,
@@ -48,6 +49,7 @@ from deadtime.estimation.methods._flight_conclusion import (
     gain_is_certain,
     profile_for,
     values_of,
+    without_the_plant,
 )
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.models._held import Path, path_of
@@ -121,17 +123,25 @@ def estimate_from_commands(
         message += " computed from the recorded output, on whose noise the controller acts"
     elif sources != {"logged"}:
         message += ", which was not logged but computed from reference and output"
-    details = {
+    details: dict[str, Any] = {
         "command": " or ".join(sorted(sources)),
         **({"noise": "loop"} if computed else {}),
     }
     fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
-    if is_exact(model, found, fitted):
+
+    def plain() -> DelayEstimate:
         start = found.point[len(names) :] if initial_output is None else [initial_output]
-        details["initial_output"] = float(start[0])
         return concluded(
-            method, model, found, fitted, message=f"least squares {message}", details=details
+            method,
+            model,
+            found,
+            fitted,
+            message=f"least squares {message}",
+            details={**details, "initial_output": float(start[0])},
         )
+
+    if is_exact(model, found, fitted):
+        return plain()
     first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
     pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
     rows = [
@@ -151,6 +161,10 @@ def estimate_from_commands(
         )
     if not gain_is_certain(profile):
         check_fit(model, found, fitted)
+    adequacy = adequacy_of(profile, len(names))
+    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
+    if adequacy.lacks_lag:
+        return without_the_plant(plain(), adequacy)
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
@@ -162,7 +176,7 @@ def estimate_from_commands(
         models[0].known,
         f"maximum likelihood {message}",
         details,
-        doubts,
+        adequacy,
     )
 
 

@@ -154,6 +154,10 @@ class Overshoot(Method):
     map: OvershootMap = "dominant"
 
     name: ClassVar[str] = "overshoot"
+    limits: ClassVar[str] = (
+        "It reads one peak and takes the gain as given: a vehicle of less gain overshoots less, "
+        "and its delay comes out too short."
+    )
 
     def __post_init__(self) -> None:
         check_choice("map", self.map, get_args(OvershootMap))

@@ -75,6 +75,10 @@ class Relay(Method):
     amplitude: float | None = None
 
     name: ClassVar[str] = "relay"
+    limits: ClassVar[str] = (
+        "It counts a lag of the plant as delay and takes the slopes of the cycle as straight, so "
+        "that a drift moves the delay."
+    )
 
     def __post_init__(self) -> None:
         if self.amplitude is not None:

@@ -47,6 +47,9 @@ from deadtime.estimation.methods._output_error import estimate_from_commands
 
 Array = NDArray[np.float64]
 
+#: Price of air, as ln L, where a fit with it is compared with a simulation without.
+PRICE_OF_AIR = 2.0
+
 #: Where sensor noise goes: into the recording alone, or through the controller as well.
 NoisePath = Literal["auto", "recording", "loop"]
 
@@ -138,7 +141,9 @@ def _unlikelihood(fit: DelayEstimate) -> float:
     Residuals are taken as no smaller than rounding. Further numbers of the noise have their price.
     """
     if isinstance(fit._profile, LikelihoodProfile):
-        return 0.5 * fit._profile.fit.criterion
+        fitted = fit._profile.fit
+        air = any(one.air > 0.0 for one in fitted.numbers.noise)
+        return 0.5 * fitted.criterion + PRICE_OF_AIR * air
     total = 0.0
     for one in fit.runs:
         scatter = max(float(np.std(one.residuals)), ROUNDING * excited(one.recording))

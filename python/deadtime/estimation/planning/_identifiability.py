@@ -27,7 +27,13 @@ from deadtime.estimation.planning._planned_bound import (
     from_the_command,
     from_the_reference,
 )
-from deadtime.experiments import Experiment, WhiteNoise
+from deadtime.estimation.planning._whitening import (
+    ClosedLoop,
+    in_open_loop,
+    trim_is_free,
+    trim_response,
+)
+from deadtime.experiments import Experiment, FlightNoise, NoiseModel
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -47,8 +53,8 @@ class Identifiability(ReadOnlyArrays):
         The planned experiment.
     free : tuple of str
         What is to be fitted.
-    noise : float
-        Standard deviation of the white noise on the output.
+    noise : FlightNoise
+        The noise of the run.
     initial_output : float or None
         The output at the start where it is known, None where it is fitted too.
     recording : Recording
@@ -66,7 +72,7 @@ class Identifiability(ReadOnlyArrays):
     loop: ControlLoop
     experiment: Experiment
     free: tuple[str, ...]
-    noise: float
+    noise: FlightNoise
     initial_output: float | None
     recording: Recording
     command_logged: PlannedBound | None
@@ -178,7 +184,7 @@ class Identifiability(ReadOnlyArrays):
         """The bounds as a few lines of text."""
         lines = [
             f"{self.experiment.name}: {len(self.experiment)} samples, "
-            f"{self.experiment.time[0]:g} to {self.experiment.time[-1]:g} s, noise {self.noise:g}; "
+            f"{self.experiment.time[0]:g} to {self.experiment.time[-1]:g} s, {self.noise}; "
             f"free: {', '.join(self.bound.free)}",
             "  smallest standard errors",
             f"  {'':<12}{'command logged':>16}{'reference only':>16}",
@@ -228,7 +234,7 @@ def identifiability(
     loop: ControlLoop,
     experiment: Experiment,
     *,
-    noise: float | WhiteNoise,
+    noise: float | FlightNoise,
     free: Sequence[str] | None = None,
     initial_output: float | None = None,
     runs: int = 0,
@@ -242,8 +248,9 @@ def identifiability(
         The assumed loop, its delay included.
     experiment : Experiment
         The planned experiment.
-    noise : float or WhiteNoise
-        Standard deviation of the white noise on the measured output, in the output's unit.
+    noise : float or FlightNoise
+        Standard deviation of the white noise on the measured output, in the output's unit; or a
+        noise with air, trim and coloured noise of the sensor, such as that of an estimate.
     free : sequence of str, optional
         What is to be fitted: any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``. By
         default all of them that the loop has, a lag only where it is above zero.
@@ -277,6 +284,11 @@ def identifiability(
     method it uses, and ``estimate_delay(method="output_error")`` reaches it. It holds for small
     noise: where the bound on a lag is as large as the lag itself, estimates pile up at zero.
 
+    Air hides the response to the command wherever the two have the same frequencies. The trim is
+    fitted beside the parameters where the noise has one, and where the air walks at random, whose
+    value at the start no estimator knows. The deviations and time constants of the noise are taken
+    as known; in few samples they are not, and estimates scatter more.
+
     The loop may be unstable or in a limit cycle: the bound depends on the recording alone.
 
     Examples
@@ -293,6 +305,14 @@ def identifiability(
     ...     print({name: round(1e3 * plan.stderr[name], 1) for name in ("delay", "delay+lag")})
     {'delay': 18.3, 'delay+lag': 2.8}
     {'delay': 4.2, 'delay+lag': 1.1}
+
+    Gusts of 0.1 m/s that last a second make both worse:
+
+    >>> from deadtime.experiments import FlightNoise
+    >>> wind = FlightNoise(white=0.01, air=0.1, air_time=1.0)
+    >>> plan = dtm.identifiability(loop, experiment, noise=wind, initial_output=0.0)
+    >>> {name: round(1e3 * plan.stderr[name], 1) for name in ("delay", "delay+lag")}
+    {'delay': 7.2, 'delay+lag': 3.1}
     """
     if not isinstance(loop, ControlLoop):
         raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
@@ -301,31 +321,41 @@ def identifiability(
     if free is None:
         free = ["delay", *(name for name in VEHICLE_PARAMETERS if loop.parameters.get(name))]
     names = checked_names(free, loop)
-    level = positive("noise", noise.deviation if isinstance(noise, WhiteNoise) else noise)
+    noise = _noise_with_covariance(noise)
     if initial_output is not None and finite("initial_output", initial_output) != 0.0:
         raise ValueError(
             f"initial_output={initial_output}: an experiment starts at rest at zero; give 0.0 "
             "where that is known, None where the start is fitted"
         )
     count = whole_number("runs", runs, least=0)
-    offset = initial_output is None
+    offset, trim = initial_output is None, trim_is_free(noise)
     run_loop = experiment.loop_in_run(loop)
     recording = experiment.run(loop)
     _check_excitation(run_loop, recording, names)
     seeds = np.random.SeedSequence(seed).spawn(count)
-    noisy = [experiment.run(loop, level, one) for one in seeds]
+    noisy = [experiment.run(loop, noise, one) for one in seeds]
 
     def command_logged() -> PlannedBound:
         if not run_loop.is_sampled:
             raise NotIdentifiableError(
                 "a continuous loop changes its command between the samples of a log"
             )
-        slopes = [from_the_command(run_loop, one, names, offset) for one in noisy or [recording]]
-        return bound_of(slopes, names, level)
+        slopes = [
+            from_the_command(run_loop, one, names, offset, trim) for one in noisy or [recording]
+        ]
+        whitened = partial(in_open_loop, run_loop, experiment.time, noise=noise)
+        return bound_of(slopes, whitened, names, noise)
 
     def reference_only() -> PlannedBound:
-        slopes = from_the_reference(run_loop, experiment, names, offset, level)
-        return bound_of([slopes], names, level)
+        slopes = from_the_reference(run_loop, experiment, names, offset, noise.white)
+        if not noise.moves_plant:
+            whitened = partial(in_open_loop, run_loop, experiment.time, noise=noise)
+            return bound_of([slopes], whitened, names, noise)
+        assert recording.command is not None
+        closed = ClosedLoop.along(run_loop, experiment, recording.command)
+        if trim:
+            slopes["trim"] = closed.response(trim_response(run_loop, experiment.time))
+        return bound_of([slopes], partial(closed.whitened, run_loop, noise=noise), names, noise)
 
     found: list[PlannedBound | None] = []
     remarks: list[str] = []
@@ -341,13 +371,26 @@ def identifiability(
         loop,
         experiment,
         names,
-        level,
+        noise,
         initial_output,
         recording,
         found[0],
         found[1],
         tuple(remarks),
     )
+
+
+def _noise_with_covariance(noise: float | FlightNoise) -> FlightNoise:
+    """The noise, checked to have a covariance that is known and regular."""
+    if isinstance(noise, FlightNoise):
+        positive("noise.white", noise.white)
+        return noise
+    if isinstance(noise, NoiseModel):
+        raise TypeError(
+            f"noise is a {type(noise).__name__}, whose covariance is not known: give a standard "
+            "deviation or a FlightNoise"
+        )
+    return FlightNoise(positive("noise", noise))
 
 
 def _check_excitation(loop: ControlLoop, recording: Recording, names: tuple[str, ...]) -> None:

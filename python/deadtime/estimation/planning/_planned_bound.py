@@ -1,7 +1,8 @@
 """The Cramér-Rao bound of a planned experiment.
 
-For output y_i = f(t_i; p) + white noise of standard deviation sigma, no unbiased estimator of p
-has a smaller covariance than sigma^2 (J^T J)^-1, J = df/dp. Two bounds, for two kinds of log:
+For output y_i = f(t_i; p) + Gaussian noise of covariance V, no unbiased estimator that reads p from
+the mean has a smaller covariance than (J^T V^-1 J)^-1, J = df/dp; for white noise of standard
+deviation sigma it is sigma^2 (J^T J)^-1. `_whitening` has V. Two bounds, for two kinds of log:
 
 * command logged: f is the response of the plant to that command, which is known, with the noise
   that the controller acted on. With P its transfer function, w the command and T the delay,
@@ -11,12 +12,12 @@ has a smaller covariance than sigma^2 (J^T J)^-1, J = df/dp. Two bounds, for two
   is the sensitivity of its simulation.
 
 Both are taken along the run without noise. Noise that the controller acts on moves the command too,
-which adds information; the information of the first kind is then the mean of J^T J over runs.
+which adds information; the information of the first kind is then the mean of J^T V^-1 J over runs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,8 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import check_distinguishable, standard_errors
-from deadtime.experiments import Experiment
+from deadtime.estimation.planning._whitening import trim_response
+from deadtime.experiments import Experiment, FlightNoise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
@@ -49,8 +51,8 @@ class PlannedBound(CramerRaoBound):
     ----------
     free : tuple of str
         What is taken as unknown; a bound without this says nothing.
-    noise : float
-        Standard deviation of the white measurement noise it is for, in the output's unit.
+    noise : FlightNoise
+        The noise it is for.
     stderr : dict of str to float
         The bound for each free quantity, and for ``delay+lag`` where both are free.
     cov : ndarray, shape (len(free), len(free))
@@ -88,23 +90,32 @@ class PlannedBound(CramerRaoBound):
 
 
 def bound_of(
-    runs: Sequence[dict[str, Array]], names: tuple[str, ...], noise: float
+    runs: Sequence[dict[str, Array]],
+    whitened: Callable[[Array], Array],
+    names: tuple[str, ...],
+    noise: FlightNoise,
 ) -> PlannedBound:
-    """The bound from the mean information of runs; the sensitivities of the first are kept."""
+    """The bound from the mean information of runs; the sensitivities of the first are kept.
+
+    `whitened` whitens columns, a row each, in units of the white noise.
+    """
     labels = tuple(runs[0])
-    jacobian = np.concatenate([np.stack(list(run.values()), axis=1) for run in runs])
+    jacobian = np.concatenate([whitened(np.stack(list(run.values()))).T for run in runs])
     check_distinguishable(jacobian, list(labels))
     scale = np.linalg.norm(jacobian, axis=0)
     # P P^T is the inverse of J^T J for the pseudoinverse P of J.
     inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
-    cov = noise**2 * len(runs) * inverse @ inverse.T
+    cov = noise.white**2 * len(runs) * inverse @ inverse.T
     return PlannedBound(labels, noise, standard_errors(names, cov), cov, runs[0])
 
 
 def from_the_command(
-    loop: ControlLoop, recording: Recording, names: Sequence[str], offset: bool
+    loop: ControlLoop, recording: Recording, names: Sequence[str], offset: bool, trim: bool = False
 ) -> dict[str, Array]:
-    """Sensitivities of the plant's response to the recorded command, held between samples."""
+    """Sensitivities of the plant's response to the recorded command, held between samples.
+
+    By the names, and by the initial output and the trim where these are unknown.
+    """
     num, den = loop.plant.polynomials()
     if len(num) == len(den):
         raise NotIdentifiableError(
@@ -129,6 +140,8 @@ def from_the_command(
             slopes[name] = -response(plant * s / (values[name] * s + 1.0))
     if offset:
         slopes["initial output"] = np.ones(len(recording))
+    if trim:
+        slopes["trim"] = trim_response(loop, time)
     return slopes
 
 

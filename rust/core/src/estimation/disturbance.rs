@@ -8,7 +8,7 @@ use crate::Error;
 
 /// Where a disturbance enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Entry {
+pub enum Entry {
     /// At the input of the plant, as moving air does.
     Input,
     /// At the measurement.
@@ -17,13 +17,13 @@ pub(super) enum Entry {
 
 /// An Ornstein–Uhlenbeck process with its stationary distribution at the first row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Disturbance {
+pub struct Disturbance {
     /// Where it enters.
-    pub(super) entry: Entry,
+    pub entry: Entry,
     /// Time constant τ, s.
-    pub(super) time_constant: f64,
+    pub time_constant: f64,
     /// Standard deviation of the stationary process, in standard deviations of the white noise.
-    pub(super) deviation: f64,
+    pub deviation: f64,
 }
 
 impl Disturbance {
@@ -62,7 +62,7 @@ impl Joint {
         let mut c = plant.c.clone();
         let (mut noise, mut start) = (vec![0.0; n * n], vec![0.0; n * n]);
         for (row, own) in a
-            .chunks_exact_mut(n)
+            .chunks_exact_mut(n.max(1))
             .zip(plant.a.chunks_exact(states.max(1)))
         {
             for (place, value) in row.iter_mut().zip(own) {
@@ -77,7 +77,10 @@ impl Joint {
                 Entry::Input => (Some(&plant.b), plant.d),
                 Entry::Output => (None, 1.0),
             };
-            for (row, b) in a.chunks_exact_mut(n).zip(drive.into_iter().flatten()) {
+            for (row, b) in a
+                .chunks_exact_mut(n.max(1))
+                .zip(drive.into_iter().flatten())
+            {
                 row[index] = *b;
             }
             a[index * n + index] = -rate;

@@ -26,8 +26,10 @@ mod search;
 mod tests;
 mod whiten;
 
+pub use disturbance::{Disturbance, Entry};
 pub use fit::{Fit, Free, Model};
 pub use likelihood::{Evaluation, Noise};
 pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};
 pub use rows::{Commands, Rows};
+pub use whiten::whiten;

@@ -111,7 +111,8 @@ impl Rows {
     }
 }
 
-fn check_times(what: &str, times: &[f64]) -> Result<(), Error> {
+/// An error unless times are finite and increase.
+pub(super) fn check_times(what: &str, times: &[f64]) -> Result<(), Error> {
     if let Some(time) = times.iter().find(|time| !time.is_finite()) {
         refuse!("a {what} is {time}: give finite numbers");
     }

@@ -1,0 +1,49 @@
+"""An estimate as text: first the delay and whether the model is adequate, then the rest."""
+
+from __future__ import annotations
+
+import re
+
+from deadtime._cli.show import print_text
+from deadtime.estimation import DelayEstimate
+
+#: What begins the reasons in the message of an estimate.
+_NOT_ADEQUATE = "; not adequate: "
+
+#: How a message advises to fit more.
+_ADVICE = re.compile(r"free=\(([^)]*)\)")
+
+
+def print_headline(fit: DelayEstimate) -> None:
+    """Print the delay with its interval, and whether the model is adequate or why it is not."""
+    text = f"delay {fit.delay:.4f} s"
+    if "delay" not in fit.free:
+        text += ", as it was given"
+    elif fit.calibrated:
+        text += ", 95 % interval {:.4f} to {:.4f} s".format(*fit.ci(0.95))
+    else:
+        text += ", without an interval"
+    print_text(f"{text} ({fit.method})", "bold")
+    if fit.adequate:
+        print_text("The model is adequate: no test of it fails at the 1 % level.")
+        return
+    _, _, why = fit.message.partition(_NOT_ADEQUATE)
+    why = why or (
+        f"the residuals are not white (lag-1 autocorrelation {fit.whiteness.autocorrelation:.2f})"
+    )
+    consequence = ", so the interval need not hold the true delay" if fit.calibrated else ""
+    print_text(f"The model is not adequate{consequence}: {_as_option(why)}.", "yellow")
+
+
+def print_details(fit: DelayEstimate) -> None:
+    """Print every fitted quantity, the method and the noise."""
+    first, *rest = fit.summary().splitlines()
+    print_text("\n".join(rest), wrapped=False)
+    print_text(_as_option(first.partition(_NOT_ADEQUATE)[0]), "dim")
+
+
+def _as_option(text: str) -> str:
+    """Advice in the words of the command line."""
+    return _ADVICE.sub(
+        lambda found: f"--free {found[1].replace(' ', '').replace(chr(39), '')}", text
+    )

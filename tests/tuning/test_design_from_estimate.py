@@ -1,0 +1,163 @@
+"""Design over the joint confidence region of an estimate."""
+
+import math
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.tuning._region import region_of
+from scipy import special
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
+
+from reality import table
+from reality.conditions import CONDITIONS, LIMIT, SAMPLE
+from reality.generator import record
+
+SMOOTH = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0))
+TRUTH = dtm.ControlLoop(
+    dtm.Integrator(0.85, 0.15), dtm.P(1.6), delay=0.3, sample_time=0.065, limit=1.0
+)
+KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=0.065, limit=1.0)
+FLIGHT = dtm.Experiment.step(8.0, rest=1.04).run(TRUTH, noise=0.005, seed=2)
+
+
+def estimate(*free):
+    return dtm.estimate_delay(FLIGHT, KNOWN, free=free)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    found = estimate("delay", "gain", "lag")
+    assert found.adequate
+    return found
+
+
+@pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
+def test_the_points_stand_around_the_ellipsoid(free):
+    """Every direction is served: the ellipsoid of the same axes lies within the points' hull."""
+    fit = estimate(*free)
+    region = region_of(fit, 0.95, allow_inadequate=True)
+    points = np.array([[one[name] for name in free] for one in region.points])
+    centre = np.array([region.estimate[name] for name in free])
+    quantile, radius = special.ndtri(0.975), math.sqrt(special.chdtri(len(free), 0.05))
+    sums = np.eye(len(free))
+    labels = list(free)
+    if "lag" in free:
+        sums[0, 2], labels[0] = 1.0, "delay+lag"
+    widths = []
+    for label, value in zip(labels, sums @ centre, strict=True):
+        low, high = fit.ci(0.95, label)
+        widths.append(max(high - value, value - low) / quantile)
+    cov = sums @ fit.cov @ sums.T
+    scale = np.array(widths) / np.sqrt(np.diag(cov))
+    spread = cov * np.outer(scale, scale)
+    rng = np.random.default_rng(1)
+    for way in rng.standard_normal((200, len(free))):
+        reach = radius * math.sqrt(way @ spread @ way)
+        farthest = ((points - centre) @ sums.T @ way).max()
+        assert reach * (1.0 - 1e-6) <= farthest <= 1.07 * reach
+    for i, name in enumerate(free):
+        low, high = region.intervals[name]
+        assert high - centre[i] >= (fit.ci(0.95, name)[1] - centre[i]) * 0.9
+        extremes = [one[name] for one in region.extremes]
+        assert low <= min(extremes) < max(extremes) <= high
+
+
+def test_times_are_not_below_zero_and_keep_their_sum():
+    vehicle = TRUTH.replace(lag=0.02)
+    flight = dtm.Experiment.step(8.0, rest=1.04).run(vehicle, noise=0.01, seed=1)
+    fit = dtm.estimate_delay(flight, KNOWN, free=("delay", "gain", "lag"))
+    region = region_of(fit, 0.95, allow_inadequate=True)
+    low, high = region.intervals["lag"]
+    assert low == 0.0 < high
+    total = [one["delay"] + one["lag"] for one in region.points]
+    low, high = fit.ci(0.95, "delay+lag")
+    assert np.ptp(total) < 1.8 * (high - low)
+    assert min(one["delay"] for one in region.points) >= 0.0
+
+
+def test_margins_hold_in_the_whole_region(fit):
+    best = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
+    assert best.region.adequate
+    assert best.region.level == 0.95
+    assert best.margins.gain_margin >= 3.0
+    assert best.proved == ()
+    assert best.loop.parameters["lag"] == fit.lag
+    for one in best.region.points[::7]:
+        margin = best.loop.replace(**one).margin().gain_margin
+        assert margin >= best.margins.gain_margin * (1.0 - 1e-3)
+    told = best.summary()
+    assert "worst over the joint 95 % region of the estimate (delay 0." in told
+    assert "the true loop has these margins with a probability of 95 %" in told
+    assert "were the estimate exact" in told
+    alone = dtm.design(fit.loop, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
+    assert alone.abscissa < best.abscissa
+    wider = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31), level=0.999)
+    assert alone.abscissa < best.abscissa < wider.abscissa
+
+
+def test_a_filter_is_chosen_for_a_region(fit):
+    choice = dtm.design_filter(fit, fixed={"Kp": 1.2}, omegas=[10, 40, 160], gain_margin=2.0)
+    assert choice.design.region is not None
+    assert choice.design.margins.gain_margin >= 2.0
+
+
+def test_an_inadequate_estimate_is_refused_by_name():
+    fit = estimate("delay", "gain")
+    assert not fit.adequate
+    with pytest.raises(
+        ValueError, match=r"not adequate.*the plant lacks it.*allow_inadequate=True"
+    ):
+        dtm.design(fit, controller=dtm.P)
+    best = dtm.design(fit, controller=dtm.P, gain_margin=2.5, allow_inadequate=True)
+    assert "with which probability the true loop has these margins is not known" in best.summary()
+
+
+def test_what_has_no_region_is_refused(fit):
+    for more in ({"delay": 0.3}, {"gain": (0.8, 0.9)}):
+        with pytest.raises(ValueError, match="leave delay= and gain= out"):
+            dtm.design(fit, **more)
+    unsure = dtm.estimate_delay(FLIGHT, KNOWN, method="gcc", free=("delay",))
+    with pytest.raises(ValueError, match=r"the estimate has no region: the gcc method"):
+        dtm.design(unsure)
+    with pytest.raises(ValueError, match=r"level=1\.5"):
+        dtm.design(fit, level=1.5)
+    weak = replace(fit, stderr={**fit.stderr, "gain": 1.0}, _profile=None)
+    with pytest.raises(ValueError, match=r"region of the gain, .* holds zero"):
+        dtm.design(weak)
+
+
+@pytest.mark.survey
+@pytest.mark.parametrize("name", ["gust 0.05 1 s"])
+def test_flights_in_gusts(name):
+    """Demanded is a gain margin of 2.5. A second number is what the design promised."""
+    condition = next(one for one in CONDITIONS if one.name == name)
+    found, promised = [], []
+    for number in range(40):
+        run = record(condition, number)
+        loop = table.given_loop(condition, run, condition.free)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            fit = dtm.estimate_delay(table.recording_of(condition, run), loop, free=condition.free)
+        if not fit.adequate:
+            continue
+        best = dtm.design(fit, controller=SMOOTH, gain_margin=2.5, shape=(31, 31))
+        vehicle = run.vehicle
+        truth = dtm.ControlLoop(
+            dtm.Integrator(vehicle.gain, sum(vehicle.lags)),
+            best.loop.controller,
+            delay=vehicle.delay,
+            sample_time=SAMPLE,
+            limit=LIMIT,
+        )
+        assert truth.is_stable()
+        found.append(truth.margin().gain_margin)
+        promised.append(best.margins.gain_margin)
+    assert len(found) >= 30
+    assert np.mean(np.array(found) >= 2.5) >= 0.9
+    assert np.mean(np.array(found) >= np.array(promised)) >= 0.9
