@@ -311,7 +311,7 @@ def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
     monkeypatch.setattr(learn_module, "design", undesigned)
 
     def gusts(state, since):
-        return replace(state, height=state.height + 0.004 * math.sin(2.5 * max(since, 0.0)))
+        return replace(state, height=state.height + 0.02 * math.sin(9.0 * max(since, 0.0)))
 
     def warn(doubt):
         warnings.append(doubt)

@@ -129,7 +129,7 @@ def test_the_list_of_types_is_complete():
     # Base classes that are never instantiated, tuples of arrays, and what has a test of its own.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW", "NoiseModel", "DisturbanceModel",
-        "Comparison",
+        "Comparison", "MethodDifference", "ConfidenceRegion", "RecordingCheck", "Finding", "Hole",
     }  # fmt: skip
 
 

@@ -108,7 +108,7 @@ def test_a_state_is_flying_only_under_control():
 @pytest.mark.parametrize(
     ("bit", "says"),
     [
-        (State.ULTRASOUND_DEAF, "deaf"),
+        (State.ULTRASOUND_DEAF, "no echo"),
         (State.MOTORS_PROBLEM, "motor"),
         (State.CUTOUT, "stopped"),
         (State.ANGLES_OUT_OF_RANGE, "tilted"),

@@ -11,7 +11,10 @@ from deadtime.estimation import DelayEstimate
 _NOT_ADEQUATE = "; not adequate: "
 
 #: How a message advises to fit more.
-_ADVICE = re.compile(r"free=\(([^)]*)\)")
+_FREE = re.compile(r"free=\(([^)]*)\)")
+
+#: Advice in a message, in the words of the command line.
+_ADVICE = re.compile(r" \(try [^)]*\)")
 
 
 def print_headline(fit: DelayEstimate) -> None:
@@ -27,12 +30,16 @@ def print_headline(fit: DelayEstimate) -> None:
     if fit.adequate:
         print_text("The model is adequate: no test of it fails at the 1 % level.")
         return
-    _, _, why = fit.message.partition(_NOT_ADEQUATE)
+    message = _as_option(fit.message)
+    _, _, why = message.partition(_NOT_ADEQUATE)
     why = why or (
         f"the residuals are not white (lag-1 autocorrelation {fit.whiteness.autocorrelation:.2f})"
     )
+    advice = _ADVICE.search(message)
+    if advice is not None and advice[0] not in why:
+        why += advice[0]
     consequence = ", so the interval need not hold the true delay" if fit.calibrated else ""
-    print_text(f"The model is not adequate{consequence}: {_as_option(why)}.", "yellow")
+    print_text(f"The model is not adequate{consequence}: {why}.", "yellow")
 
 
 def print_details(fit: DelayEstimate) -> None:
@@ -44,6 +51,4 @@ def print_details(fit: DelayEstimate) -> None:
 
 def _as_option(text: str) -> str:
     """Advice in the words of the command line."""
-    return _ADVICE.sub(
-        lambda found: f"--free {found[1].replace(' ', '').replace(chr(39), '')}", text
-    )
+    return _FREE.sub(lambda found: f"--free {found[1].replace(' ', '').replace(chr(39), '')}", text)

@@ -46,6 +46,9 @@ Array = NDArray[np.float64]
 #: Samples for each fitted parameter below which intervals are those of the profile likelihood.
 FEW = 12
 
+#: What a message says of residuals that are not white.
+COLOURED = "; the residuals are not white"
+
 #: A delay or lag is set to zero where this raises the cost by less than this share.
 VANISHING = 1e-6
 
@@ -154,7 +157,7 @@ def concluded(
         residuals=runs[0].residuals,
         whiteness=whiteness,
         adequate=adequate,
-        message=_message(message, held, reason, adequate, _advice(names, runs[0].loop)),
+        message=_message(message, held, reason, adequate, advice(names, runs[0].loop)),
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
         others=runs[1:],
         _profile=Profile(
@@ -214,7 +217,7 @@ def _widening(
     return found
 
 
-def _advice(names: Sequence[str], loop: ControlLoop) -> str:
+def advice(names: Sequence[str], loop: ControlLoop) -> str:
     """Advice for a model that is not adequate."""
     slow = [name for name in ("lag", "time_constant") if name in loop.parameters]
     if slow and slow[0] not in names:
@@ -233,7 +236,7 @@ def _message(done: str, held: list[str], reason: str, adequate: bool, advice: st
         text += f"; {reason}, so intervals are those of the profile likelihood"
     if not adequate:
         text += (
-            "; the residuals are not white, so the model only approximates the vehicle and "
+            f"{COLOURED}, so the model only approximates the vehicle and "
             f"the intervals are robust ones{advice}"
         )
     return text

@@ -21,6 +21,7 @@ from deadtime.estimation.likelihood._profile import (
 )
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise
+from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
@@ -175,10 +176,9 @@ def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate
     The likelihood takes what the plant lacks for air, and weighs the rows that show it least. Least
     squares weighs all alike, and finds the plant that comes closest to the recording.
     """
-    reasons = [reason for reason in adequacy.reasons if reason not in plain.message]
-    return replace(
-        plain, adequate=False, message=f"{plain.message}; not adequate: {'; '.join(reasons)}"
-    )
+    text = plain.message.split(COLOURED)[0]
+    text += f"; not adequate: {'; '.join(adequacy.reasons)}"
+    return replace(plain, adequate=False, message=text + advice(plain.free, plain.loop))
 
 
 def _message(
@@ -196,13 +196,5 @@ def _message(
     if held:
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:
-        text += f"; not adequate: {'; '.join(adequacy.reasons)}{_advice(names, run)}"
+        text += f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
     return text
-
-
-def _advice(names: Sequence[str], run: Run) -> str:
-    """Advice for a model that is not adequate."""
-    slow = [name for name in ("lag", "time_constant") if name in run.loop.parameters]
-    if slow and slow[0] not in names:
-        return f" (try free=('delay', 'gain', '{slow[0]}'))"
-    return " (try a window around one step, a smaller step, or another plant)"
