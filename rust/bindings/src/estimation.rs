@@ -1,8 +1,8 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    self, Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point,
-    Quantity, Rows, Timing,
+    Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity,
+    Rows, Timing, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -339,7 +339,7 @@ pub(crate) fn whitened_columns<'py>(
         .collect();
     let (time, columns) = (owned(&time)?, owned(&columns)?);
     let found = run_here(py, |task| {
-        estimation::whitened(&time, &columns, &plant, &disturbances, task)
+        whiten(&time, columns, &plant, &disturbances, task)
     })?;
     Ok(found.into_pyarray(py))
 }

@@ -62,7 +62,7 @@ impl Joint {
         let mut c = plant.c.clone();
         let (mut noise, mut start) = (vec![0.0; n * n], vec![0.0; n * n]);
         for (row, own) in a
-            .chunks_exact_mut(n)
+            .chunks_exact_mut(n.max(1))
             .zip(plant.a.chunks_exact(states.max(1)))
         {
             for (place, value) in row.iter_mut().zip(own) {
@@ -77,7 +77,10 @@ impl Joint {
                 Entry::Input => (Some(&plant.b), plant.d),
                 Entry::Output => (None, 1.0),
             };
-            for (row, b) in a.chunks_exact_mut(n).zip(drive.into_iter().flatten()) {
+            for (row, b) in a
+                .chunks_exact_mut(n.max(1))
+                .zip(drive.into_iter().flatten())
+            {
                 row[index] = *b;
             }
             a[index * n + index] = -rate;

@@ -463,7 +463,7 @@ mod tests {
 
     #[test]
     fn an_unstable_plant_of_first_order_has_a_negative_lag() {
-        let unstable = recorded(NOTHING, (0.31, 0.85, -4.0), 5e-3, 3);
+        let unstable = recorded(NOTHING, (0.31, 0.85, -4.0), 1e-3, 3);
         let model = model(NOTHING, vec![unstable]);
         let found = fitted(&model, point(0.25, -3.7, vec![QUIET]));
         assert!((found.point.delay() - 0.31).abs() < 0.01, "{found:?}");

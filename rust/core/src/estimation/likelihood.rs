@@ -17,7 +17,7 @@ use super::mean::{Derivatives, Gain, Mean, Values, sizes};
 use super::orthogonal::Triangle;
 use super::plant::{Plant, PlantSpace};
 use super::rows::Rows;
-use super::whiten::{Kick, whiten};
+use super::whiten::{Kick, whiten_in_place};
 use crate::dde::propagator::Propagator;
 use crate::{Error, Task, memory};
 
@@ -144,7 +144,7 @@ pub(super) fn evaluate(
     if !is_white {
         log_gram = -Triangle::new(&mean.columns, n, count, task)?.log_det(count);
         let joint = Joint::new(&space, &disturbances)?;
-        log_det = whiten(
+        log_det = whiten_in_place(
             &rows.time,
             &rows.used,
             &mut mean.columns,
@@ -192,17 +192,16 @@ pub(super) fn evaluate(
     found.inverse = triangle.inverse(count)?;
     // The derivatives by delay, lags and zero are those of a plant of unit gain.
     let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
-    for (place, entry) in found.inverse.iter_mut().enumerate() {
-        for index in [place / count, place % count] {
-            if index >= first {
+    for (row, entries) in found.inverse.chunks_exact_mut(count.max(1)).enumerate() {
+        for (column, entry) in entries.iter_mut().enumerate() {
+            for _ in [row, column].iter().filter(|place| **place >= first) {
                 *entry /= found.gain;
             }
         }
     }
     if by.delay {
-        let place = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
-        let mut unit = vec![0.0; place + 1];
-        unit[place] = 1.0;
+        let mut unit = vec![0.0; first + 1];
+        unit[first] = 1.0;
         found.score = memory::filled(WHAT, 0.0, n)?;
         subtract(&mut found.score, &triangle.solve(&unit), &mean.columns);
         found.score.iter_mut().for_each(|entry| *entry = -*entry);
@@ -473,7 +472,8 @@ mod tests {
                 -arrived.map_or(0.0, |(_, value)| *value) * score
             })
             .sum();
-        assert!((alone.inverse[24] * slope * slope - 1.0).abs() < 1e-9);
+        let stretch = slope * alone.gain;
+        assert!((alone.inverse[24] * stretch * stretch - 1.0).abs() < 1e-9);
     }
 
     #[test]

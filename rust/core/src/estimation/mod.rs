@@ -32,4 +32,4 @@ pub use likelihood::{Evaluation, Noise};
 pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};
 pub use rows::{Commands, Rows};
-pub use whiten::whitened;
+pub use whiten::whiten;

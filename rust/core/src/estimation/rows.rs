@@ -111,6 +111,7 @@ impl Rows {
     }
 }
 
+/// An error unless times are finite and increase.
 pub(super) fn check_times(what: &str, times: &[f64]) -> Result<(), Error> {
     if let Some(time) = times.iter().find(|time| !time.is_finite()) {
         refuse!("a {what} is {time}: give finite numbers");

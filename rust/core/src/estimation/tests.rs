@@ -136,7 +136,8 @@ pub(super) fn commands(rows: &Rows) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// A recording of this plant with white noise.
+/// A recording of this plant with white noise. A plant that does not integrate is in steady state
+/// under the first command.
 pub(super) fn recorded(
     plant: (&[f64], &[f64]),
     true_values: (f64, f64, f64),
@@ -145,10 +146,14 @@ pub(super) fn recorded(
 ) -> Rows {
     let (delay, gain, lag) = true_values;
     let mut rows = recording(200);
-    let space = Plant::new(plant.0, plant.1).unwrap().space(&[lag], 0.0);
+    let plant = Plant::new(plant.0, plant.1).unwrap();
+    let space = plant.space(&[lag], 0.0);
+    let sent = &rows.commands.value;
+    let base = if plant.integrates() { 0.0 } else { sent[0] };
+    let moved: Vec<f64> = sent.iter().map(|value| value - base).collect();
     let held = Held {
         time: &rows.commands.time,
-        value: &rows.commands.value,
+        value: &moved,
     };
     respond(
         &space,

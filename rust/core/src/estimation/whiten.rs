@@ -8,11 +8,11 @@
 //! and is kept.
 
 use super::disturbance::{Disturbance, Joint};
-use super::path::{SAME, SAME_STEP, dot};
+use super::path::{SAME, SAME_STEP, SETTLED, dot, settled};
 use super::plant::Plant;
 use super::propagation::{Propagation, Square};
 use super::rows::check_times;
-use crate::{Error, Task, memory};
+use crate::{Error, Task};
 
 /// Change of the covariance of the states from row to row, as a share of their deviations, below
 /// which the gain has converged. All states count: weak air shows in the variance of a row long
@@ -22,23 +22,15 @@ const CONVERGED: f64 = 1e-13;
 /// Rows between two checks for a stop.
 const CHECKED: usize = 4096;
 
-/// A random change of the states of the plant just before a row.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Kick {
-    pub(super) row: usize,
-    /// Its standard deviation, state by state: one random number moves all.
-    pub(super) state: Vec<f64>,
-}
-
-/// `columns`, one after the other and each as long as `time`, whitened by the covariance of their
-/// rows: that of disturbances of the plant, and of white noise of variance one.
+/// Columns, one after the other and each as long as `time`, whitened by disturbances of a plant and
+/// white noise of variance one.
 ///
 /// # Errors
 ///
 /// If sizes do not fit, times do not increase, or a number of a disturbance is out of its range.
-pub fn whitened(
+pub fn whiten(
     time: &[f64],
-    columns: &[f64],
+    mut columns: Vec<f64>,
     plant: &Plant,
     disturbances: &[Disturbance],
     task: &Task,
@@ -50,23 +42,28 @@ pub fn whitened(
         columns.len()
     );
     check_times("time", time)?;
-    for one in disturbances {
-        one.check()?;
-    }
     let joint = Joint::new(&plant.space(&[], 0.0), disturbances)?;
-    let mut columns = memory::copied("the whitened columns", columns)?;
-    let used = vec![true; time.len()];
+    // Without any state the noise is white.
     if !joint.c.is_empty() {
-        whiten(time, &used, &mut columns, &joint, &[], task)?;
+        let used = crate::memory::filled("marks of use", true, time.len())?;
+        whiten_in_place(time, &used, &mut columns, &joint, &[], task)?;
     }
     Ok(columns)
+}
+
+/// A random change of the states of the plant just before a row.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Kick {
+    pub(super) row: usize,
+    /// Its standard deviation, state by state: one random number moves all.
+    pub(super) state: Vec<f64>,
 }
 
 /// Columns that are whitened together.
 const LANES: usize = 8;
 
 /// Whiten the columns in place; rows that are not `used` become zero. Returns ln det V.
-pub(super) fn whiten(
+pub(super) fn whiten_in_place(
     time: &[f64],
     used: &[bool],
     columns: &mut [f64],
@@ -130,6 +127,9 @@ fn pass<const N: usize>(
     for row in 0..rows {
         if row % CHECKED == CHECKED - 1 {
             task.check()?;
+        }
+        if row % SETTLED as usize == 0 {
+            states = states.map(|lanes| lanes.map(settled));
         }
         if row > 0 {
             let between = time[row] - time[row - 1];
@@ -205,8 +205,7 @@ fn pass<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::disturbance::{Disturbance, Entry};
-    use super::super::plant::Plant;
+    use super::super::disturbance::Entry;
     use super::super::tests::{cholesky, coloured, forward, gaussian, integrated, log_det};
     use super::*;
 
@@ -253,7 +252,7 @@ mod tests {
         let (rows, count) = (time.len(), 11);
         let columns: Vec<Vec<f64>> = (0..count).map(|j| gaussian(j + 1, rows)).collect();
         let mut flat = columns.concat();
-        let found = whiten(time, used, &mut flat, joint, kicks, &Task::new()).unwrap();
+        let found = whiten_in_place(time, used, &mut flat, joint, kicks, &Task::new()).unwrap();
         let only = |x: &[f64]| -> Vec<f64> {
             x.iter()
                 .zip(used)
@@ -370,7 +369,7 @@ mod tests {
             .map(|t| integrated(1.5e-6, 1e4, t - time[0], t - time[0]))
             .sum();
         let mut column = gaussian(1, 3000);
-        let found = whiten(
+        let found = whiten_in_place(
             &time,
             &[true; 3000],
             &mut column,
@@ -409,9 +408,44 @@ mod tests {
     }
 
     #[test]
+    fn a_column_that_the_air_explains_decays_to_zero() {
+        let joint = joint(&[1.0, 0.0], &[AIR]);
+        let mut column = vec![0.0; 5000];
+        column[0] = 1.0;
+        whiten_in_place(
+            &even(5000),
+            &[true; 5000],
+            &mut column,
+            &joint,
+            &[],
+            &Task::new(),
+        )
+        .unwrap();
+        assert!(column.iter().all(|x| !x.is_subnormal()));
+        assert_eq!(column[4999], 0.0);
+    }
+
+    #[test]
+    fn columns_of_another_length_and_times_that_do_not_increase_are_refused() {
+        let plant = Plant::new(&[1.0], &[1.0, 0.0]).unwrap();
+        let refusal = |time: &[f64], columns: Vec<f64>| {
+            whiten(time, columns, &plant, &[AIR], &Task::new())
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(refusal(&[0.0, 1.0], vec![1.0; 3]).starts_with("2 times and columns of 3"));
+        assert!(refusal(&[], Vec::new()).starts_with("0 times"));
+        assert!(refusal(&[0.0, f64::NAN], vec![1.0; 2]).contains("a time is NaN"));
+        assert!(refusal(&[1.0, 1.0], vec![1.0; 2]).contains("the time 1 follows 1"));
+        let none = Plant::new(&[1.0], &[1.0]).unwrap();
+        let white = whiten(&[0.0, 1.0], vec![2.0, 3.0], &none, &[], &Task::new());
+        assert_eq!(white, Ok(vec![2.0, 3.0]));
+    }
+
+    #[test]
     fn more_states_than_the_kernel_takes_are_refused() {
         let joint = joint(&[1.0; 9], &[AIR]);
-        let found = whiten(
+        let found = whiten_in_place(
             &[0.0, 1.0],
             &[true; 2],
             &mut [1.0, 2.0],
