@@ -33,6 +33,7 @@ def test_noise_free_recordings_are_recovered_exactly(method, lag):
     assert "3 recordings together" in fit.summary()
 
 
+@pytest.mark.survey
 def test_two_recordings_halve_the_variance_of_one():
     # The bound with white noise is 1/sqrt(2) of that of one recording, and the errors agree.
     errors, bounds, single = [], [], []

@@ -81,6 +81,7 @@ def test_times_are_not_below_zero_and_keep_their_sum():
     assert min(one["delay"] for one in region.points) >= 0.0
 
 
+@pytest.mark.survey
 def test_margins_hold_in_the_whole_region(fit):
     best = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
     assert best.region.adequate
@@ -101,6 +102,7 @@ def test_margins_hold_in_the_whole_region(fit):
     assert alone.abscissa < best.abscissa < wider.abscissa
 
 
+@pytest.mark.survey
 def test_a_filter_is_chosen_for_a_region(fit):
     choice = dtm.design_filter(fit, fixed={"Kp": 1.2}, omegas=[10, 40, 160], gain_margin=2.0)
     assert choice.design.region is not None
