@@ -1,4 +1,7 @@
-"""The Cramér-Rao bound of a planned experiment: closed forms, and the errors of estimates."""
+"""The Cramér-Rao bound of a planned experiment: closed forms, and the errors of estimates.
+
+One file, because bounds in calm air and in wind are held against the same loops and experiments.
+"""
 
 import copy
 import math

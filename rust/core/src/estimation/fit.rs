@@ -1,4 +1,7 @@
 //! The numbers of plant and noise at which the likelihood of one or more recordings is largest.
+//!
+//! A quarter of the file is its tests; the rest is one search, whose variables, bounds and starts are
+//! read together.
 
 use super::likelihood::{Evaluation, Noise, Wanted, evaluate};
 use super::mean::{Derivatives, Gain, Values};
