@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::estimation::{
-    Commands, Fit, Free, Model, Noise, Plant, Point, Quantity, Rows, Timing,
+    Commands, Fit, Free, Model, Noise, Plant, Point, Quantity, Rows, Search, Timing,
 };
 use deadtime::{Error, Task};
 
@@ -99,7 +99,7 @@ fn point(lag: bool, air: bool) -> Point {
 
 /// The maximum, with its gain.
 fn best(model: &Model, start: &Point, task: &Task) -> Result<Fit, Error> {
-    let mut best = model.fit(start, None, 1e-6, task)?;
+    let mut best = model.fit(start, None, Search::All, 1e-6, task)?;
     best.point.gain = model.at(0, &best.point, task)?.gain;
     Ok(best)
 }
@@ -124,7 +124,7 @@ fn likelihood(criterion: &mut Criterion) {
                 bencher.iter(|| model.objective(black_box(&start), &task));
             });
             group.bench_function(format!("fit, {name}"), |bencher| {
-                bencher.iter(|| model.fit(black_box(&start), None, 1e-6, &task));
+                bencher.iter(|| model.fit(black_box(&start), None, Search::All, 1e-6, &task));
             });
             let Ok(best) = best(&model, &start, &task) else {
                 continue;
@@ -143,6 +143,10 @@ fn likelihood(criterion: &mut Criterion) {
     if let Ok(model) = model(1_000_000, true) {
         group.bench_function("objective, lag and air", |bencher| {
             bencher.iter(|| model.objective(black_box(&point(true, true)), &task));
+        });
+        group.bench_function("fit of the mean, lag and air", |bencher| {
+            let start = point(true, true);
+            bencher.iter(|| model.fit(black_box(&start), None, Search::Mean, 0.02, &task));
         });
     }
     group.finish();

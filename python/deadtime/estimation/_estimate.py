@@ -128,6 +128,10 @@ def estimate_delay(
     recordings are weighted by the inverse of their noise where residuals are white, and by that of
     their excitation where they are not.
 
+    In a recording of more than 5000 rows, ``"output_error"`` searches on as many rows in which the
+    command changes most (the longest delay is 0.6 of their time) and then finds the maximum of the
+    likelihood on all rows. Its intervals are then from the curvature of the likelihood.
+
     References
     ----------
     S. Armah and S. Yi, "Analysis of Time Delays in Quadrotor Systems and Design of Control".

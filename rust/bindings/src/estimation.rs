@@ -2,7 +2,7 @@
 
 use deadtime::estimation::{
     Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity,
-    Rows, Timing, whiten,
+    Rows, Search, Timing, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -242,11 +242,20 @@ impl FlightLikelihood {
         run_here(py, |task| self.model.objective(&point, task))
     }
 
-    /// The maximum from a starting point.
-    #[pyo3(signature = (start, tolerance=1e-6))]
-    fn fit(&self, py: Python<'_>, start: &PlantNumbers, tolerance: f64) -> PyResult<PlantNumbers> {
+    /// The maximum from a starting point; under its noise unless `noise` is searched too.
+    #[pyo3(signature = (start, tolerance=1e-6, noise=true))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        start: &PlantNumbers,
+        tolerance: f64,
+        noise: bool,
+    ) -> PyResult<PlantNumbers> {
         let start = self.known(start).point;
-        let found = run_here(py, |task| self.model.fit(&start, None, tolerance, task))?;
+        let search = if noise { Search::All } else { Search::Mean };
+        let found = run_here(py, |task| {
+            self.model.fit(&start, None, search, tolerance, task)
+        })?;
         Ok(PlantNumbers::from_fit(&found))
     }
 

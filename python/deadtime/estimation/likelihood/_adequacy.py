@@ -15,20 +15,25 @@ whitened residuals stay white. Beside their whiteness, these are tested:
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import PlantNumbers
+from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
+from deadtime.estimation.likelihood._start import is_long
 
 Array = NDArray[np.float64]
 
 #: Starts of the further lag, in rows.
 FURTHER = (0.7, 3.0)
+
+#: Rise of −2 ln L that is small beside that of a lag that is significant.
+CLEAR = 0.3
 
 #: The further lag that counts as none, in rows.
 NONE = 1e-3
@@ -127,31 +132,39 @@ def _holds(profile: LikelihoodProfile, total: float, level: float) -> bool:
 
 
 def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
-    """The likeliest numbers with a further lag, and the probability of such a ratio without."""
+    """The likeliest numbers with a further lag, and the probability of such a ratio without.
+
+    In long recordings the noise stays as it is.
+    """
     from scipy import special
 
     richer = replace(fit, model=replace(fit.model, extra=fit.model.extra + 1))
     likelihood = richer.likelihood
     between = float(np.median(np.diff(fit.runs[0].time)))
-    name = f"lag {len(fit.model.free_lags)}"
-    one = fit.numbers
-    without = likelihood.held(
-        PlantNumbers(one.delay, [*one.lags, NONE * between], one.noise, fit.gain),
-        name,
-        NONE * between,
+    one, long = fit.numbers, is_long(fit.runs)
+
+    def behind(lag: float, noise: Sequence[RowNoise]) -> PlantNumbers:
+        delay = max(one.delay - lag * between, 0.0)
+        return PlantNumbers(delay, [*one.lags, lag * between], noise, fit.gain)
+
+    without = behind(NONE, one.noise)
+    least = (
+        likelihood.objective(without)
+        if long
+        else likelihood.held(without, f"lag {len(one.lags)}", NONE * between).objective
     )
-    best = without
     noises = [one.noise]
-    if any(noise.air > 0.0 for noise in one.noise):
-        noises.append([type(noise)() for noise in one.noise])
-    for noise in noises:
-        for lag in FURTHER:
-            moved = PlantNumbers(
-                max(one.delay - lag * between, 0.0), [*one.lags, lag * between], noise, fit.gain
-            )
-            best = min(best, likelihood.fit(moved, ROUGH), key=lambda found: found.objective)
-    ratio = max(0.0, without.objective - best.objective)
-    return best, 0.5 * float(special.chdtrc(1, ratio)) if ratio > 0.0 else 1.0
+    if not long and any(noise.air > 0.0 for noise in one.noise):
+        noises.append([RowNoise()] * len(one.noise))
+    found = [
+        likelihood.fit(behind(lag, noise), CLEAR if long else ROUGH, noise=not long)
+        for noise in noises
+        for lag in (FURTHER[:1] if long else FURTHER)
+    ]
+    best = min(found, key=lambda one: one.objective)
+    if best.objective >= least:
+        return without, 1.0
+    return best, 0.5 * float(special.chdtrc(1, least - best.objective))
 
 
 def bridge(score: Array, whitened: Array) -> float:

@@ -23,11 +23,11 @@ Array = NDArray[np.float64]
 #: Longest delay of the search, as a share of the window.
 LONGEST = 0.6
 
-#: Steps of the grid over the delay: in rows, and as a share of the delay; most rows for a grid.
-GRID_STEP, GRID_GROWTH, GRID_ROWS = 1.0, 0.1, 5000
+#: Steps of the grid over the delay: in rows, and as a share of the delay.
+GRID_STEP, GRID_GROWTH = 1.0, 0.1
 
-#: Lags of the grid, in rows.
-LAGS = (0.5, 3.0, 8.0)
+#: Lags of the grid, in rows, and factors of it over a time constant.
+LAGS, FACTORS = (0.5, 3.0, 8.0), (0.3, 1.0, 3.0)
 
 #: Deviations of the air in the grid, and where it is added to a fit without: white deviations a
 #: row. Its time constant there, as a share of the window, and by how much slow air is slower.
@@ -158,6 +158,12 @@ class NoiseFit:
         """The gain at the maximum."""
         return self.parts[0].gain
 
+    @cached_property
+    def with_gain(self) -> PlantNumbers:
+        """The numbers with the gain, which is not searched in a single recording."""
+        one = self.numbers
+        return PlantNumbers(one.delay, one.lags, one.noise, self.gain, objective=one.objective)
+
     def moved(self, numbers: PlantNumbers) -> NoiseFit:
         """The same at other numbers."""
         return replace(self, numbers=numbers)
@@ -169,20 +175,17 @@ def with_noise(numbers: PlantNumbers, noise: Sequence[RowNoise]) -> PlantNumbers
 
 
 def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers) -> NoiseFit:
-    """The likeliest plant and noise, from the least squares fit `first` and a grid."""
+    """The likeliest plant and noise, from least squares (`first`) and a grid in strong air."""
     runs = tuple(runs)
     quiet = [RowNoise()] * len(runs)
     weak, strong = _airs(model, runs)
     found = []
-    starts = _grid(model, runs, first, (quiet, strong))
+    starts = _grid(model, runs, first, strong)
     for trim in (False, True) if model.integrates else (False,):
         likelihood = model.likelihood(runs, trim)
-        calm = min(
-            (likelihood.fit(one, ROUGH) for one in (with_noise(first, quiet), *starts[0])),
-            key=_objective,
-        )
+        calm = likelihood.fit(with_noise(first, quiet), ROUGH)
         slow = [RowNoise(SLOW * one.air_time, one.air) for one in weak]
-        airy = (with_noise(calm, weak), with_noise(calm, slow), *starts[1])
+        airy = (with_noise(calm, weak), with_noise(calm, slow), *starts)
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
@@ -231,40 +234,48 @@ def _airs(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise]]
 
 
 def _grid(
-    model: PlantModel,
-    runs: tuple[FlightRows, ...],
-    first: PlantNumbers,
-    noises: Sequence[list[RowNoise]],
-) -> list[list[PlantNumbers]]:
-    """For each noise the likeliest points of a grid over delay and lag."""
+    model: PlantModel, runs: tuple[FlightRows, ...], first: PlantNumbers, noise: list[RowNoise]
+) -> list[PlantNumbers]:
+    """The likeliest points of a grid over delay and lag under this noise."""
     rows = runs[0]
-    if "delay" not in model.names or rows.time.size > GRID_ROWS:
-        return [[with_noise(first, noise)] for noise in noises]
+    if "delay" not in model.names:
+        return [with_noise(first, noise)]
     likelihood = model.likelihood(runs, False)
     between = float(np.median(np.diff(rows.time)))
     delays = [0.0]
     while delays[-1] < LONGEST * float(rows.time[-1] - rows.time[0]):
         delays.append(delays[-1] + max(GRID_STEP * between, GRID_GROWTH * delays[-1]))
-    starts = []
-    for noise in noises:
-        minima: list[PlantNumbers] = []
-        for lags in _grid_lags(model, between):
-            points = [PlantNumbers(delay, lags, noise, first.gain) for delay in delays]
-            values = np.array([likelihood.objective(point) for point in points])
-            padded = np.r_[np.inf, values, np.inf]
-            places = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))
-            minima += [
-                PlantNumbers(delays[i], lags, noise, first.gain, objective=float(values[i]))
-                for i in places
-            ]
-        starts.append(sorted(minima, key=_objective)[:REFINED])
-    return starts
+    points = grid_minima(likelihood, delays, grid_lags(model, between), noise, first.gain)
+    return points[:REFINED]
 
 
-def _grid_lags(model: PlantModel, between: float) -> list[list[float]]:
+def grid_minima(
+    likelihood: FlightLikelihood,
+    delays: list[float],
+    lags: list[list[float]],
+    noise: list[RowNoise],
+    gain: float,
+) -> list[PlantNumbers]:
+    """Local minima over the delay at each set of lags, the lowest first."""
+    minima: list[PlantNumbers] = []
+    for some in lags:
+        points = [PlantNumbers(delay, some, noise, gain) for delay in delays]
+        values = np.array([likelihood.objective(point) for point in points])
+        padded = np.r_[np.inf, values, np.inf]
+        places = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))
+        minima += [
+            PlantNumbers(delays[i], some, noise, gain, objective=float(values[i])) for i in places
+        ]
+    return sorted(minima, key=_objective)
+
+
+def grid_lags(model: PlantModel, between: float) -> list[list[float]]:
+    """The lags of the grid, for rows so far apart."""
     free = model.free_lags
     if not any(free):
         return [list(model.lags)]
+    if "time_constant" in model.names:
+        return [[factor * model.lags[0]] for factor in FACTORS]
     signs = [*np.sign(model.lags), *[1.0] * model.extra]
     known = [*model.lags, *[0.0] * model.extra]
     return [

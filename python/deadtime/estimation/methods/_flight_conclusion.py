@@ -21,10 +21,10 @@ from deadtime.estimation.likelihood._profile import (
 )
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise
+from deadtime.estimation.likelihood._start import excited_part, is_long, on_all_rows
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
-from deadtime.loops import ControlLoop
 
 Array = NDArray[np.float64]
 
@@ -35,15 +35,11 @@ NO_LAG = 2.0
 ROUNDS = 3
 
 
-def fitted_flight(
-    names: tuple[str, ...],
-    loop: ControlLoop,
-    rows: Sequence[FlightRows],
-    first: Mapping[str, float],
-) -> NoiseFit:
-    """The likeliest plant and noise, without outliers."""
-    model = PlantModel.of(loop.plant, names)
-    fit = fit_noise(model, rows, _start(model, first, rows))
+def fitted_flight(model: PlantModel, rows: Sequence[FlightRows], first: PlantNumbers) -> NoiseFit:
+    """The likeliest plant and noise, without outliers; from a part of long recordings first."""
+    runs = tuple(excited_part(one) for one in rows)
+    start = _start(model, first, rows)
+    fit = fit_noise(model, runs, start)
     for _ in range(ROUNDS):
         found = [
             is_outlier(part.whitened, one.used)
@@ -56,7 +52,7 @@ def fitted_flight(
             for one, outliers in zip(fit.runs, found, strict=True)
         )
         fit = fit_noise(model, kept, fit.numbers)
-    return fit
+    return on_all_rows(fit, rows) if is_long(rows) else fit
 
 
 def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
@@ -70,18 +66,15 @@ def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
     return profile_of(fit, wanted)
 
 
-def _start(
-    model: PlantModel, first: Mapping[str, float], rows: Sequence[FlightRows]
-) -> PlantNumbers:
-    """The kernel's numbers for a least squares fit; a lag of zero becomes a short one."""
+def _start(model: PlantModel, first: PlantNumbers, rows: Sequence[FlightRows]) -> PlantNumbers:
+    """The numbers under white noise; a lag of about zero becomes a short one."""
     least = 0.5 * float(np.median(np.diff(rows[0].time)))
-    delay, lags = first["delay"], []
-    for name, free in zip(model.lag_names, model.free_lags, strict=True):
-        lag = first[name]
+    delay, lags = first.delay, []
+    for lag, free in zip(first.lags, model.free_lags, strict=True):
         if free and abs(lag) < least:
             delay, lag = max(0.0, delay - least + lag), least
         lags.append(lag)
-    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first["gain"])
+    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first.gain)
 
 
 def concluded_flight(

@@ -5,16 +5,16 @@
 F the exact response of 1/(s (lag s + 1)), or of another plant, to the command as it was held
 (`plant_path`), a the gain, b the output at the start. Because the command is known, a limit and
 noise that the controller acts on have no effect, and least squares is maximum likelihood for white
-noise: the standard error is the Cramér-Rao bound. For a given delay and lag the best a and b are
-linear least squares (variable projection, Golub & Pereyra 1973). The cost has several local minima
-over the delay, so a grid over delay and lag comes first.
+noise: the standard error is the Cramér-Rao bound. The likelihood with the noise of a flight starts
+from least squares, which is what is reported where a recording holds no noise, and where the plant
+lacks something.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,7 +28,13 @@ from deadtime.estimation.data._simulated import (
     known_commands,
     moves_between_rows,
 )
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
+from deadtime.estimation.fit._least_squares import (
+    Ends,
+    Minimum,
+    Model,
+    ModelOfOne,
+    solve_jointly,
+)
 from deadtime.estimation.likelihood._adequacy import adequacy_of
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
@@ -36,7 +42,8 @@ from deadtime.estimation.likelihood._missing import (
     with_missing,
 )
 from deadtime.estimation.likelihood._rows import FlightRows, spikes
-from deadtime.estimation.likelihood._search import NoiseFit
+from deadtime.estimation.likelihood._search import LONGEST, NoiseFit, PlantModel
+from deadtime.estimation.likelihood._start import excited_part, least_squares
 from deadtime.estimation.methods._conclusion import (
     check_fit,
     concluded,
@@ -63,19 +70,8 @@ Array = NDArray[np.float64]
 #: to be the best.
 REFILLS, MOST_STEPS, CLEARLY = 2, 5, 6.0
 
-#: Longest delay of the search, as a share of the window.
-LONGEST = 0.6
-
-#: Most points of the grid over the delay. It has four points a sample, or one where a lag is fitted
-#: too, whose response is smooth.
-MOST_POINTS = 600
-
-#: Lags of the grid, in samples, and factors of that over a time constant.
-LAGS = (0.0, 2.0, 8.0)
-FACTORS = (0.3, 1.0, 3.0)
-
-#: Values in one block of the grid: bounds the memory for long recordings.
-BLOCK = 200_000
+#: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
+NEARLY_EXACT = 1e-4
 
 #: Largest relative difference between the time of a row and the sample time at which a command can
 #: be computed from the rows.
@@ -115,8 +111,12 @@ def estimate_from_commands(
     """Fit the response to the command: logged, or `computed` from the recorded output."""
     names = checked_names(free, runs[0].loop)
     models = [_model(run, names, initial_output, computed) for run in runs]
-    model, found = solve_jointly(models)
-    found = without_vanishing(model, found)
+    fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
+    plant = PlantModel.of(fitted[0].loop.plant, names)
+    rows = [one.rows(initial_output, run.check) for one, run in zip(models, runs, strict=True)]
+    parts = [excited_part(one) for one in rows]
+    known = models[0].known
+    white = least_squares(plant, parts, known["delay"], known["gain"])
     sources = {one.source for one in models}
     message = f"over {', '.join(names)} on the response to the command"
     if computed:
@@ -127,9 +127,16 @@ def estimate_from_commands(
         "command": " or ".join(sorted(sources)),
         **({"noise": "loop"} if computed else {}),
     }
-    fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
 
-    def plain() -> DelayEstimate:
+    @cache
+    def plain() -> tuple[Model, Minimum]:
+        """Least squares with all its derivatives, from that of the likelihood."""
+        started = [one.started(white) for one in models]
+        model, found = solve_jointly(started)
+        return model, without_vanishing(model, found)
+
+    def concluded_plain() -> DelayEstimate:
+        model, found = plain()
         start = found.point[len(names) :] if initial_output is None else [initial_output]
         return concluded(
             method,
@@ -140,15 +147,14 @@ def estimate_from_commands(
             details={**details, "initial_output": float(start[0])},
         )
 
-    if is_exact(model, found, fitted):
-        return plain()
-    first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
-    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
-    rows = [
-        one.rows(initial_output, -piece / weight, run.check)
-        for one, piece, weight, run in zip(models, pieces, model.weights, runs, strict=True)
+    if _is_nearly_exact(white) and is_exact(*plain(), fitted):
+        return concluded_plain()
+    whole = replace(white, runs=tuple(rows))
+    kept = [
+        one._replace(used=one.used & ~spikes(part.residuals))
+        for one, part in zip(rows, whole.parts, strict=True)
     ]
-    fit = fitted_flight(names, fitted[0].loop, rows, first)
+    fit = fitted_flight(plant, kept, white.with_gain)
     doubts: tuple[str, ...] = ()
     if any(one.commands.computed for one in models):
         fit, doubts = _with_predicted_commands(names, fit, models, runs)
@@ -160,11 +166,11 @@ def estimate_from_commands(
             "no response to this command; check columns and units, or choose a longer window"
         )
     if not gain_is_certain(profile):
-        check_fit(model, found, fitted)
+        check_fit(*plain(), fitted)
     adequacy = adequacy_of(profile, len(names))
     adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
     if adequacy.lacks_lag:
-        return without_the_plant(plain(), adequacy)
+        return without_the_plant(concluded_plain(), adequacy)
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
@@ -199,9 +205,7 @@ def _with_predicted_commands(
                 one.refilled(run.recording, run.loop.replace(**values), step, kept, again.gain)
                 for one, run, kept in zip(models, runs, again.runs, strict=True)
             ]
-            again = fitted_flight(
-                names, runs[0].loop, rows, {**models[0].known, **values, "gain": again.gain}
-            )
+            again = fitted_flight(again.model, rows, again.with_gain)
         tried.append(again)
     tried.sort(key=lambda one: one.criterion)
     if len(tried) > 1 and tried[1].criterion - tried[0].criterion < CLEARLY:
@@ -221,6 +225,7 @@ class _Model(ModelOfOne):
     source: str
     logged: Array
     commands: HeldCommands
+    start: Array
 
     def refilled(
         self,
@@ -243,22 +248,35 @@ class _Model(ModelOfOne):
             ),
         )
 
-    def rows(
-        self, initial_output: float | None, residuals: Array, check: RecordingCheck | None
-    ) -> FlightRows:
-        """The rows for the likelihood, without outliers and repeated rows."""
-        useless = spikes(residuals)
+    def rows(self, initial_output: float | None, check: RecordingCheck | None) -> FlightRows:
+        """The rows for the likelihood, without repeated rows."""
+        used = np.ones(len(self.recording), dtype=bool)
         if check is not None:
-            useless[check.repeated] = True
+            used[check.repeated] = False
         return FlightRows(
             time=self.recording.time,
             output=self.recording.output - (initial_output or 0.0),
-            used=~useless,
+            used=used,
             command_time=self.commands.time,
             command=self.commands.command,
             unknown=self.commands.unknown,
             offset=initial_output is None,
         )
+
+    def started(self, fit: NoiseFit) -> _Model:
+        """The same with its search started from a fit of the likelihood."""
+        numbers = fit.with_gain
+        values = {"delay": numbers.delay, "gain": numbers.gain}
+        values |= dict(zip(fit.model.lag_names, numbers.lags, strict=True))
+        point = np.array([*(values[name] for name in self.names), 0.0])
+        if self.offset is not None:
+            return replace(self, start=point[:-1])
+        point[-1] = -float(np.mean(self.misfit(point)))
+        return replace(self, start=point)
+
+    def starts(self) -> list[Array]:
+        """The point that the search starts from."""
+        return [self.start]
 
     @cached_property
     def span(self) -> float:
@@ -293,63 +311,13 @@ class _Model(ModelOfOne):
         columns["initial output"] = np.ones(len(self.recording))
         return np.stack([columns[label] for label in self.labels], axis=1)
 
-    def starts(self) -> list[Array]:
-        """The best points of a grid over delay and lag, with the best gain and offset at each."""
-        found = []
-        for lags in self._lag_grid():
-            values = {**self.known, **lags}
-            delays = self._delays(4 if not lags else 1)
-            costs, gains, offsets = self._projected(delays, values)
-            padded = np.r_[np.inf, costs, np.inf]
-            minima = np.flatnonzero((costs <= padded[:-2]) & (costs <= padded[2:]))
-            for place in minima[np.argsort(costs[minima])][:2]:
-                values |= {"delay": float(delays[place]), "gain": float(gains[place])}
-                point = [values[name] for name in self.names]
-                tail = [float(offsets[place])] if self.offset is None else []
-                found.append((float(costs[place]), np.array([*point, *tail])))
-        return [point for _, point in sorted(found, key=lambda pair: pair[0])]
 
-    def _lag_grid(self) -> list[dict[str, float]]:
-        if "lag" in self.names:
-            return [{"lag": lag * self._sample} for lag in LAGS]
-        if "time_constant" in self.names:
-            size = self.known["time_constant"]
-            return [{"time_constant": factor * size} for factor in FACTORS]
-        return [{}]
-
-    def _delays(self, each: int) -> Array:
-        """The grid over the delay with `each` points a sample, or the known delay."""
-        if "delay" not in self.names:
-            return np.array([self.known["delay"]])
-        longest = LONGEST * self.span
-        points = int(min(MOST_POINTS, max(2.0, each * longest / self._sample)))
-        return np.linspace(0.0, longest, points + 1)
-
-    def _projected(self, delays: Array, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
-        """Least cost at each delay, with the best gain and offset there."""
-        rows = max(1, BLOCK // len(self.recording))
-        blocks = [
-            self._projected_block(delays[first : first + rows], values)
-            for first in range(0, delays.size, rows)
-        ]
-        costs, gains, offsets = (np.concatenate(part) for part in zip(*blocks, strict=True))
-        return costs, gains, offsets
-
-    def _projected_block(
-        self, delays: Array, values: Mapping[str, float]
-    ) -> tuple[Array, Array, Array]:
-        path = self.path.value(self.recording.time - delays[:, None], values)
-        target = self.recording.output - (self.offset or 0.0)
-        centres = path.mean(axis=1) if self.offset is None else np.zeros(delays.size)
-        level = float(target.mean()) if self.offset is None else 0.0
-        moved, target = path - centres[:, None], target - level
-        power = np.einsum("ij,ij->i", moved, moved)
-        if "gain" in self.names:
-            gains = np.divide(moved @ target, power, out=np.zeros(delays.size), where=power > 0.0)
-        else:
-            gains = np.full(delays.size, values["gain"])
-        left = target - gains[:, None] * moved
-        return np.einsum("ij,ij->i", left, left), gains, level - gains * centres
+def _is_nearly_exact(fit: NoiseFit) -> bool:
+    """Whether all that is left may be rounding."""
+    return all(
+        float(np.max(np.abs(part.residuals))) <= NEARLY_EXACT * float(np.ptp(rows.output))
+        for part, rows in zip(fit.parts, fit.runs, strict=True)
+    )
 
 
 def _model(
@@ -373,6 +341,7 @@ def _model(
         path=path_of(loop.plant, commands.time, commands.command),
         logged=command,
         commands=commands,
+        start=np.empty(0),
         names=names,
         known={"delay": 0.0, "gain": 1.0, **loop.parameters},
         offset=initial_output,

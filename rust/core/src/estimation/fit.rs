@@ -3,12 +3,12 @@
 //! A quarter of the file is its tests; the rest is one search, whose variables, bounds and starts are
 //! read together.
 
-use super::likelihood::{Evaluation, Noise, Wanted, evaluate};
+use super::likelihood::{Evaluation, Noise, Searched, Wanted, evaluate};
 use super::mean::{Derivatives, Gain, Values};
 use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
 use super::rows::Rows;
-use super::search::{Variable, minimise};
+use super::search::{Value, Variable, minimise};
 use crate::{Error, Task};
 
 /// Shortest lag of a search, as a share of the time between rows; shorter ones act as a delay.
@@ -27,6 +27,11 @@ const MOST_DEVIATION: f64 = 1e5;
 const TIME_STEP: f64 = 2e-3;
 const LOG_STEP: f64 = 0.02;
 const GAIN_STEP: f64 = 1e-4;
+
+/// Longest steps of the search: of times, in rows; of logarithms; of the gain, as a share of it.
+const LONGEST_TIME_STEP: f64 = 1.0;
+const LONGEST_LOG_STEP: f64 = 1.2;
+const LONGEST_GAIN_STEP: f64 = 0.5;
 
 /// Rise of the objective by a row of negative delay.
 const PENALTY: f64 = 1e4;
@@ -63,6 +68,15 @@ pub struct Fit {
     pub point: Point,
     /// −2 ln L there, but for a constant.
     pub objective: f64,
+}
+
+/// What a search moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Search {
+    /// The numbers of the mean alone.
+    Mean,
+    /// Those of the noise too.
+    All,
 }
 
 /// A number that a search moves.
@@ -221,7 +235,8 @@ impl Model {
 
     /// The maximum of the likelihood from a starting point, with one quantity held if given.
     ///
-    /// The search ends where a step promises less than `tolerance` of −2 ln L.
+    /// The search ends where a step promises less than `tolerance` of −2 ln L. The noise stays as it
+    /// is unless it is searched too.
     ///
     /// # Errors
     ///
@@ -230,6 +245,7 @@ impl Model {
         &self,
         start: &Point,
         held: Option<Quantity>,
+        searched: Search,
         tolerance: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
@@ -238,35 +254,37 @@ impl Model {
             !(tolerance.is_finite() && tolerance > 0.0),
             "a tolerance of {tolerance}: give a finite number above zero"
         );
-        let slots = self.slots(start, held);
+        let mut slots = self.slots(start, held);
+        if searched == Search::Mean {
+            slots.truncate(mean_slots(&slots));
+        }
         let variables: Vec<Variable> = slots
             .iter()
             .map(|slot| self.variable(*slot, start))
             .collect();
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
-        let mut kept: Vec<Option<(Point, f64)>> = vec![None; self.runs.len()];
+        let mut kept: Vec<Option<(Point, Value)>> = vec![None; self.runs.len()];
         let found = minimise(&variables, tolerance, |z| {
             for (slot, value) in slots.iter().zip(z) {
                 put(&mut trial, *slot, *value);
             }
-            let mut sum = self.penalty(&trial);
+            let mut sum = Value::new(self.penalty(&trial), mean_slots(&slots));
             for run in 0..self.runs.len() {
                 let mut own = trial.clone();
                 if self.runs.len() > 1 {
                     own.noise = trial.noise.get(run).copied().into_iter().collect();
                 }
-                let part = match kept.get(run) {
-                    Some(Some((point, value))) if *point == own => *value,
-                    _ => {
-                        self.part(run, &trial, held, Wanted::Objective, task)?
-                            .objective
+                if !matches!(kept.get(run), Some(Some((point, _))) if *point == own) {
+                    let part = self.part(run, &trial, held, Wanted::Objective, task)?;
+                    let by = self.by_slots(&slots, &trial, held, &part);
+                    if let Some(place) = kept.get_mut(run) {
+                        *place = Some((own, by));
                     }
-                };
-                if let Some(place) = kept.get_mut(run) {
-                    *place = Some((own, part));
                 }
-                sum += part;
+                if let Some(Some((_, part))) = kept.get(run) {
+                    sum.add(part);
+                }
             }
             Ok(sum)
         })?;
@@ -278,6 +296,53 @@ impl Model {
             point,
             objective: found.value,
         })
+    }
+
+    /// The part of one recording, with its derivatives by the variables of the mean, which come first.
+    fn by_slots(
+        &self,
+        slots: &[Slot],
+        point: &Point,
+        held: Option<Quantity>,
+        part: &Evaluation,
+    ) -> Value {
+        let count = mean_slots(slots);
+        let mut found = Value::new(part.objective, count);
+        let searched = matches!(self.gain_at(point, held), Gain::Searched(_));
+        let from_lags = usize::from(searched) + usize::from(self.free.delay);
+        let is_by = |i: usize| self.free.lags.get(i) == Some(&true) && point.lags[i] != 0.0;
+        let zero = from_lags + (0..point.lags.len()).filter(|i| is_by(*i)).count();
+        // By which of the searched numbers each variable moves the mean, and how much.
+        let moves: Vec<Vec<(usize, f64)>> = slots[..count]
+            .iter()
+            .map(|slot| match *slot {
+                Slot::Gain => vec![(0, 1.0)],
+                Slot::Time => vec![(usize::from(searched), 1.0)],
+                Slot::Lag(i) => {
+                    let lag = point.lags[i];
+                    let place = from_lags + (0..i).filter(|i| is_by(*i)).count();
+                    let mut moves = vec![(place, lag)];
+                    if matches!(point.timing, Timing::Total(_)) && self.free.delay {
+                        moves.push((usize::from(searched), -lag));
+                    }
+                    moves
+                }
+                _ => vec![(zero, 1.0)],
+            })
+            .collect();
+        let Searched { slope, curvature } = &part.searched;
+        for (i, moves_i) in moves.iter().enumerate() {
+            for (a, by_a) in moves_i {
+                found.slope[i] += by_a * slope[*a];
+                for (j, moves_j) in moves.iter().enumerate() {
+                    for (b, by_b) in moves_j {
+                        found.curvature[i * count + j] +=
+                            by_a * by_b * curvature[a * slope.len() + b];
+                    }
+                }
+            }
+        }
+        found
     }
 
     fn slots(&self, start: &Point, held: Option<Quantity>) -> Vec<Slot> {
@@ -317,6 +382,7 @@ impl Model {
             // A recording may be shorter than a row of the first.
             high: high.max(low).ln(),
             step: LOG_STEP,
+            longest: LONGEST_LOG_STEP,
         };
         let time =
             |run, start| logarithm(start, SHORTEST_TIME * row_time, LONGEST_TIME * span(run));
@@ -328,6 +394,7 @@ impl Model {
                 low: 0.0,
                 high: self.longest,
                 step: TIME_STEP * row_time,
+                longest: LONGEST_TIME_STEP * row_time,
             },
             Slot::Lag(i) => logarithm(
                 start.lags.get(i).copied().unwrap_or(row_time),
@@ -339,12 +406,14 @@ impl Model {
                 low: -self.longest,
                 high: self.longest,
                 step: TIME_STEP * row_time,
+                longest: LONGEST_TIME_STEP * row_time,
             },
             Slot::Gain => Variable {
                 start: start.gain,
                 low: f64::NEG_INFINITY,
                 high: f64::INFINITY,
                 step: GAIN_STEP * start.gain.abs().max(f64::MIN_POSITIVE),
+                longest: LONGEST_GAIN_STEP * start.gain.abs().max(f64::MIN_POSITIVE),
             },
             Slot::AirTime(run) => time(run, noise(run).air_time),
             Slot::SensorTime(run) => time(run, noise(run).sensor_time),
@@ -359,6 +428,13 @@ impl Model {
             Slot::Sensor(run) => logarithm(noise(run).sensor, LEAST_DEVIATION, MOST_DEVIATION),
         }
     }
+}
+
+/// Number of the variables that move the mean; they come first.
+fn mean_slots(slots: &[Slot]) -> usize {
+    let of_mean =
+        |slot: &&Slot| matches!(slot, Slot::Time | Slot::Lag(_) | Slot::Zero | Slot::Gain);
+    slots.iter().take_while(of_mean).count()
 }
 
 /// No noise but white noise.
@@ -421,7 +497,7 @@ mod tests {
 
     fn fitted(model: &Model, start: Point) -> Fit {
         model
-            .fit(&model.timed(start), None, 1e-6, &Task::new())
+            .fit(&model.timed(start), None, Search::All, 1e-6, &Task::new())
             .unwrap()
     }
 
@@ -563,7 +639,9 @@ mod tests {
             for found in [
                 model.at(0, &point, &Task::new()).map(|_| ()),
                 model.objective(&point, &Task::new()).map(|_| ()),
-                model.fit(&point, None, 1e-6, &Task::new()).map(|_| ()),
+                model
+                    .fit(&point, None, Search::All, 1e-6, &Task::new())
+                    .map(|_| ()),
             ] {
                 let found = found.unwrap_err().to_string();
                 assert!(
@@ -572,7 +650,13 @@ mod tests {
                 );
             }
         }
-        let found = model.fit(&point(0.2, 0.2, vec![QUIET]), None, 0.0, &Task::new());
+        let found = model.fit(
+            &point(0.2, 0.2, vec![QUIET]),
+            None,
+            Search::All,
+            0.0,
+            &Task::new(),
+        );
         assert!(found.unwrap_err().to_string().contains("a tolerance of 0"));
     }
 }

@@ -15,6 +15,7 @@
 use super::disturbance::{Disturbance, Entry, Joint};
 use super::mean::{Derivatives, Gain, Mean, Values, sizes};
 use super::orthogonal::Triangle;
+use super::path::dot;
 use super::plant::{Plant, PlantSpace};
 use super::rows::Rows;
 use super::whiten::{Kick, whiten_in_place};
@@ -90,6 +91,17 @@ pub struct Evaluation {
     pub residuals: Vec<f64>,
     /// Slope of the response of a plant of this gain at the rows.
     pub rate: Vec<f64>,
+    /// Derivatives by the searched numbers: gain, delay, lags, zero.
+    pub(super) searched: Searched,
+}
+
+/// Slope and curvature of m ln r, by far the largest part of −2 ln L, by the numbers of the mean that
+/// are searched; the curvature is that of Gauss and Newton.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Searched {
+    pub(super) slope: Vec<f64>,
+    /// Row-major.
+    pub(super) curvature: Vec<f64>,
 }
 
 /// What is asked of an evaluation.
@@ -168,13 +180,24 @@ pub(super) fn evaluate(
     let variance = (squares / m).max(f64::MIN_POSITIVE);
     let objective = m * variance.ln() + log_det + log_gram;
     let is_certain = objective.is_finite() && !triangle.is_dependent(count);
+    let solved = triangle.solve(parts);
+    let gain = match values.gain {
+        Gain::Eliminated => solved.first().copied().unwrap_or(0.0),
+        Gain::Searched(gain) | Gain::Known(gain) => gain,
+    };
+    // The derivatives by delay, lags and zero are those of a plant of unit gain.
+    let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
+    let factors: Vec<f64> = (linear..count)
+        .map(|column| if column < first { 1.0 } else { gain })
+        .collect();
     let mut found = Evaluation {
         objective: if is_certain { objective } else { f64::INFINITY },
         log_det,
         variance,
         freedom,
-        gain: 1.0,
+        gain,
         linear: Vec::new(),
+        searched: searched(&triangle, linear, &factors, 2.0 / variance),
         inverse: Vec::new(),
         score: Vec::new(),
         whitened: Vec::new(),
@@ -184,14 +207,8 @@ pub(super) fn evaluate(
     if wanted == Wanted::Objective {
         return Ok(found);
     }
-    found.linear = triangle.solve(parts);
-    found.gain = match values.gain {
-        Gain::Eliminated => found.linear.first().copied().unwrap_or(0.0),
-        Gain::Searched(gain) | Gain::Known(gain) => gain,
-    };
+    found.linear = solved;
     found.inverse = triangle.inverse(count)?;
-    // The derivatives by delay, lags and zero are those of a plant of unit gain.
-    let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
     for (row, entries) in found.inverse.chunks_exact_mut(count.max(1)).enumerate() {
         for (column, entry) in entries.iter_mut().enumerate() {
             for _ in [row, column].iter().filter(|place| **place >= first) {
@@ -218,6 +235,26 @@ pub(super) fn evaluate(
     found.rate = mean.rate;
     found.rate.iter_mut().for_each(|rate| *rate *= found.gain);
     Ok(found)
+}
+
+/// The derivatives from the triangle of the columns J and the output; `factors` scale those columns.
+fn searched(triangle: &Triangle, linear: usize, factors: &[f64], scale: f64) -> Searched {
+    let count = linear + factors.len();
+    // What the linear unknowns leave of a column.
+    let left = |column: usize| &triangle.column(column)[linear..];
+    let rest = left(count);
+    let mut slope = Vec::with_capacity(factors.len());
+    let mut curvature = Vec::with_capacity(factors.len() * factors.len());
+    for (i, factor) in factors.iter().enumerate() {
+        let own = left(linear + i);
+        slope.push(-scale * factor * dot(own, &rest[..own.len()]));
+        for (j, other) in factors.iter().enumerate() {
+            let column = left(linear + j);
+            let both = own.len().min(column.len());
+            curvature.push(scale * factor * other * dot(&own[..both], &column[..both]));
+        }
+    }
+    Searched { slope, curvature }
 }
 
 /// Subtract the first columns, as many as factors, each times its factor.

@@ -27,7 +27,7 @@ mod tests;
 mod whiten;
 
 pub use disturbance::{Disturbance, Entry};
-pub use fit::{Fit, Free, Model};
+pub use fit::{Fit, Free, Model, Search};
 pub use likelihood::{Evaluation, Noise};
 pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};

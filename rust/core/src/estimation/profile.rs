@@ -1,6 +1,6 @@
 //! The profile of the likelihood over one quantity, and the ends of an interval.
 
-use super::fit::{Fit, Model, SHORTEST_LAG};
+use super::fit::{Fit, Model, SHORTEST_LAG, Search};
 use super::point::{Point, Quantity, Timing};
 use crate::{Error, Task};
 
@@ -77,6 +77,7 @@ impl Model {
         self.fit(
             &quantity.held(&near.point, value, self),
             Some(quantity),
+            Search::All,
             RISE_TOLERANCE,
             task,
         )
@@ -206,7 +207,9 @@ mod tests {
                 ..QUIET
             }],
         };
-        let mut best = model.fit(&start, None, 1e-6, &Task::new()).unwrap();
+        let mut best = model
+            .fit(&start, None, Search::All, 1e-6, &Task::new())
+            .unwrap();
         best.point.gain = model.at(0, &best.point, &Task::new()).unwrap().gain;
         (model, best)
     }

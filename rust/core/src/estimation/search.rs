@@ -1,34 +1,75 @@
 //! Minimum of a function of a few variables within bounds, by a quasi-Newton method.
 //!
-//! The inverse Hessian is that of Broyden, Fletcher, Goldfarb and Shanno from a diagonal of
-//! difference quotients; variables at a bound that would leave it are held there (Bertsekas 1982).
-//! Gradients are central difference quotients, for which the function may have kinks in its second
-//! derivative.
+//! By its first variables the largest part of the function has a slope and a curvature of Gauss and
+//! Newton, which cost no evaluation: they are searched alone first, and their curvature is the first
+//! guess of the Hessian. That of the others is made of difference quotients. The inverse Hessian is
+//! then that of Broyden, Fletcher, Goldfarb and Shanno; variables at a bound that would leave it are
+//! held there (Bertsekas 1982). What the known slopes lack is a difference quotient at the start and
+//! at the end of the search. Difference quotients are central, for which the function may have kinks
+//! in its second derivative.
+
+use std::ops::Range;
 
 use crate::Error;
 
-/// Most iterations.
+/// Most iterations, and those over the first variables alone.
 const ITERATIONS: usize = 60;
+const FIRST_ITERATIONS: usize = 10;
 
-/// Most halvings of a step.
-const HALVINGS: usize = 12;
+/// Most shortenings of a step, and by how much.
+const SHORTENINGS: usize = 12;
+const SHORTER: f64 = 0.4;
 
 /// Share of the predicted decrease that a step has to reach (Armijo).
 const SUFFICIENT: f64 = 1e-4;
 
-/// Longest step of a variable, in its units of difference quotients.
-const LONGEST: f64 = 60.0;
-
 /// Smallest second derivative by the units of difference quotients.
 const FLATTEST: f64 = 1e-4;
 
-/// A variable: where it starts and may go, and the step of its difference quotients.
+/// Least pivot of a matrix that is positive definite, as a share of its diagonal.
+const DEFINITE: f64 = 1e-12;
+
+/// Decrease that a step over the first variables alone has to promise and bring.
+const WORTHWHILE: f64 = 0.02;
+
+/// A variable: where it starts and may go, the step of its difference quotients, and the longest of
+/// the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Variable {
     pub(super) start: f64,
     pub(super) low: f64,
     pub(super) high: f64,
     pub(super) step: f64,
+    pub(super) longest: f64,
+}
+
+/// The function, and the known part of its slope and curvature by the first variables.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Value {
+    pub(super) value: f64,
+    pub(super) slope: Vec<f64>,
+    /// Row-major.
+    pub(super) curvature: Vec<f64>,
+}
+
+impl Value {
+    /// Flat in the first `count` variables.
+    pub(super) fn new(value: f64, count: usize) -> Self {
+        Self {
+            value,
+            slope: vec![0.0; count],
+            curvature: vec![0.0; count * count],
+        }
+    }
+
+    /// Add another function of the same variables.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.value += other.value;
+        let to = self.slope.iter_mut().chain(&mut self.curvature);
+        for (to, from) in to.zip(other.slope.iter().chain(&other.curvature)) {
+            *to += from;
+        }
+    }
 }
 
 /// Where the function is least.
@@ -42,134 +83,263 @@ pub(super) struct Minimum {
 pub(super) fn minimise(
     variables: &[Variable],
     tolerance: f64,
-    mut function: impl FnMut(&[f64]) -> Result<f64, Error>,
+    mut function: impl FnMut(&[f64]) -> Result<Value, Error>,
 ) -> Result<Minimum, Error> {
-    let n = variables.len();
     let mut x: Vec<f64> = variables
         .iter()
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
-    let mut value = function(&x)?;
-    if n == 0 {
+    let mut found = function(&x)?;
+    let (n, known) = (x.len(), found.slope.len());
+    for _ in 0..FIRST_ITERATIONS {
+        let Some(inverse) = inverted(&found.curvature, known) else {
+            break;
+        };
+        let step = direction(variables, &x, &inverse, &found.slope);
+        if promised(&step, &found.slope) <= tolerance.max(WORTHWHILE) {
+            break;
+        }
+        let slope = found.slope.clone();
+        let Some((next, _)) =
+            line_search(variables, &mut x, found.value, &slope, &step, &mut function)?
+        else {
+            break;
+        };
+        let decrease = found.value - next.value;
+        found = next;
+        if decrease <= tolerance.max(WORTHWHILE) {
+            break;
+        }
+    }
+    // What the known slopes lack is less than a coarse tolerance.
+    if n == 0 || (n == known && tolerance >= WORTHWHILE) {
+        let value = found.value;
         return Ok(Minimum { place: x, value });
     }
-    let (mut gradient, mut curvature) = derivatives(variables, &x, value, &mut function)?;
-    let mut inverse = diagonal(&curvature);
-    let mut fresh = true;
+    let (mut gradient, mut inverse) = by_quotients(variables, &x, &found, &mut function)?;
+    let mut lacking = difference(&gradient, &found.slope);
+    // Are the gradient, and the Hessian, quotients made here?
+    let (mut exact, mut fresh) = (true, true);
     for _ in 0..ITERATIONS {
-        let moving: Vec<bool> = (0..n)
-            .map(|i| {
-                !((x[i] <= variables[i].low && gradient[i] > 0.0)
-                    || (x[i] >= variables[i].high && gradient[i] < 0.0))
-            })
-            .collect();
-        let direction = direction(variables, &inverse, &gradient, &moving);
-        let slope = product(&direction, &gradient);
-        if slope.is_nan() || -0.5 * slope <= tolerance {
-            if fresh {
+        let step = direction(variables, &x, &inverse, &gradient);
+        if promised(&step, &gradient) <= tolerance {
+            if exact {
                 break;
             }
-            inverse = diagonal(&curvature);
-            fresh = true;
+            // The slopes by the others are quotients already.
+            let quotients = Quotients::new(variables, &x, &found, 0..known, &mut function)?;
+            lacking = difference(&quotients.slope, &found.slope);
+            gradient[..known].copy_from_slice(&quotients.slope);
+            exact = true;
             continue;
         }
-        let mut share = 1.0;
-        let mut next = None;
-        for _ in 0..HALVINGS {
-            let trial: Vec<f64> = (0..n)
-                .map(|i| (x[i] + share * direction[i]).clamp(variables[i].low, variables[i].high))
-                .collect();
-            let moved: Vec<f64> = trial.iter().zip(&x).map(|(a, b)| a - b).collect();
-            let found = function(&trial)?;
-            if found < value + SUFFICIENT * product(&gradient, &moved) && found < value {
-                next = Some((trial, moved, found));
-                break;
-            }
-            share *= 0.4;
+        let next = line_search(
+            variables,
+            &mut x,
+            found.value,
+            &gradient,
+            &step,
+            &mut function,
+        )?;
+        if let Some((next, moved)) = next {
+            found = next;
+            let parts = found.slope.iter().zip(&lacking);
+            let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
+            slopes.extend(Quotients::new(variables, &x, &found, known..n, &mut function)?.slope);
+            update(&mut inverse, &moved, &difference(&slopes, &gradient));
+            gradient = slopes;
+            (exact, fresh) = (known == 0, false);
+        } else if fresh {
+            break;
+        } else {
+            (gradient, inverse) = by_quotients(variables, &x, &found, &mut function)?;
+            lacking = difference(&gradient, &found.slope);
+            (exact, fresh) = (true, true);
         }
-        let Some((trial, moved, found)) = next else {
-            if fresh {
-                break;
-            }
-            inverse = diagonal(&curvature);
-            fresh = true;
-            continue;
-        };
-        let (slopes, bends) = derivatives(variables, &trial, found, &mut function)?;
-        let change: Vec<f64> = slopes.iter().zip(&gradient).map(|(a, b)| a - b).collect();
-        update(&mut inverse, &moved, &change);
-        fresh = false;
-        (x, value, gradient, curvature) = (trial, found, slopes, bends);
     }
-    Ok(Minimum { place: x, value })
+    Ok(Minimum {
+        place: x,
+        value: found.value,
+    })
 }
 
-/// Gradient and second derivatives by difference quotients, one-sided at a bound.
-fn derivatives(
+/// The first point along a step, ever shorter, at which the function is lower; x moves there.
+fn line_search(
+    variables: &[Variable],
+    x: &mut [f64],
+    value: f64,
+    gradient: &[f64],
+    step: &[f64],
+    function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
+) -> Result<Option<(Value, Vec<f64>)>, Error> {
+    let mut share = 1.0;
+    let mut trial = x.to_vec();
+    for _ in 0..SHORTENINGS {
+        let places = trial.iter_mut().zip(x.iter()).zip(variables).zip(step);
+        for (((trial, x), variable), step) in places {
+            *trial = (x + share * step).clamp(variable.low, variable.high);
+        }
+        let moved = difference(&trial, x);
+        let found = function(&trial)?;
+        if found.value < value + SUFFICIENT * product(gradient, &moved) && found.value < value {
+            x.copy_from_slice(&trial);
+            return Ok(Some((found, moved)));
+        }
+        share *= SHORTER;
+    }
+    Ok(None)
+}
+
+/// Difference quotients by some of the variables, one-sided at a bound.
+struct Quotients {
+    slope: Vec<f64>,
+    curvature: Vec<f64>,
+}
+
+impl Quotients {
+    fn new(
+        variables: &[Variable],
+        x: &[f64],
+        found: &Value,
+        which: Range<usize>,
+        function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
+    ) -> Result<Self, Error> {
+        let value = found.value;
+        let (mut slope, mut curvature) = (Vec::new(), Vec::new());
+        let mut at = x.to_vec();
+        for (i, variable) in variables
+            .iter()
+            .enumerate()
+            .take(which.end)
+            .skip(which.start)
+        {
+            let flattest = FLATTEST / (variable.step * variable.step);
+            let (up, down) = (
+                variable.step.min(variable.high - x[i]),
+                variable.step.min(x[i] - variable.low),
+            );
+            let mut away = |step: f64| -> Result<f64, Error> {
+                at[i] = x[i] + step;
+                let found = function(&at)?.value;
+                at[i] = x[i];
+                Ok(found)
+            };
+            let higher = if up > 0.0 { away(up)? } else { value };
+            let lower = if down > 0.0 { away(-down)? } else { value };
+            if up > 0.0 && down > 0.0 && higher.is_finite() && lower.is_finite() {
+                let (right, left) = ((higher - value) / up, (value - lower) / down);
+                slope.push((right * down + left * up) / (up + down));
+                curvature.push((2.0 * (right - left) / (up + down)).max(flattest));
+            } else {
+                let (far, distance) = if up > 0.0 && higher.is_finite() {
+                    (higher, up)
+                } else {
+                    (lower, -down)
+                };
+                let one_sided = (far - value) / distance;
+                slope.push(if one_sided.is_finite() {
+                    one_sided
+                } else {
+                    0.0
+                });
+                curvature.push((one_sided.abs() / variable.step).max(flattest));
+            }
+        }
+        Ok(Self { slope, curvature })
+    }
+}
+
+/// The gradient, and the inverse of the Hessian: the known curvature of the first variables, and that
+/// of the quotients by each of the others alone; by each of all where the known one is not positive.
+///
+/// Mixed derivatives by the others are left to the update: where two of them have almost the same
+/// effect, steps of Newton's run along the valley, past minima.
+fn by_quotients(
     variables: &[Variable],
     x: &[f64],
-    value: f64,
-    function: &mut impl FnMut(&[f64]) -> Result<f64, Error>,
+    found: &Value,
+    function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
-    let mut gradient = Vec::with_capacity(x.len());
-    let mut curvature = Vec::with_capacity(x.len());
-    let mut at = x.to_vec();
-    for (i, variable) in variables.iter().enumerate() {
-        let flattest = FLATTEST / (variable.step * variable.step);
-        let (up, down) = (
-            variable.step.min(variable.high - x[i]),
-            variable.step.min(x[i] - variable.low),
-        );
-        at[i] = x[i] + up;
-        let higher = if up > 0.0 { function(&at)? } else { value };
-        at[i] = x[i] - down;
-        let lower = if down > 0.0 { function(&at)? } else { value };
-        at[i] = x[i];
-        if up > 0.0 && down > 0.0 && higher.is_finite() && lower.is_finite() {
-            let (right, left) = ((higher - value) / up, (value - lower) / down);
-            gradient.push((right * down + left * up) / (up + down));
-            curvature.push((2.0 * (right - left) / (up + down)).max(flattest));
-        } else {
-            let (far, distance) = if up > 0.0 && higher.is_finite() {
-                (higher, up)
-            } else {
-                (lower, -down)
-            };
-            let slope = (far - value) / distance;
-            gradient.push(if slope.is_finite() { slope } else { 0.0 });
-            curvature.push((slope.abs() / variable.step).max(flattest));
+    let (n, known) = (x.len(), found.slope.len());
+    let quotients = Quotients::new(variables, x, found, 0..n, function)?;
+    let mut inverse = vec![0.0; n * n];
+    for (i, bend) in quotients.curvature.iter().enumerate() {
+        inverse[i * n + i] = 1.0 / bend;
+    }
+    if let Some(first) = inverted(&found.curvature, known) {
+        for (to, from) in inverse
+            .chunks_exact_mut(n)
+            .zip(first.chunks_exact(known.max(1)))
+        {
+            to[..known].copy_from_slice(from);
         }
     }
-    Ok((gradient, curvature))
+    Ok((quotients.slope, inverse))
 }
 
-fn diagonal(curvature: &[f64]) -> Vec<f64> {
-    let n = curvature.len();
-    let mut out = vec![0.0; n * n];
-    for (i, bend) in curvature.iter().enumerate() {
-        out[i * n + i] = 1.0 / bend;
+/// The inverse of a matrix of this size that is positive definite, else nothing.
+fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
+    // Its Cholesky factor, column by column, then the solutions for the unit vectors.
+    let mut l = vec![0.0; n * n];
+    for j in 0..n {
+        for i in j..n {
+            let done: f64 = (0..j).map(|k| l[i * n + k] * l[j * n + k]).sum();
+            let left = matrix[i * n + j] - done;
+            if i > j {
+                l[i * n + j] = left / l[j * n + j];
+            } else if left > DEFINITE * matrix[i * n + i] && left.is_finite() {
+                l[i * n + i] = left.sqrt();
+            } else {
+                return None;
+            }
+        }
     }
-    out
+    let mut inverse = vec![0.0; n * n];
+    for unit in 0..n {
+        let mut column = vec![0.0; n];
+        for i in unit..n {
+            let done: f64 = (unit..i).map(|k| l[i * n + k] * column[k]).sum();
+            column[i] = (f64::from(u8::from(i == unit)) - done) / l[i * n + i];
+        }
+        for i in (0..n).rev() {
+            let done: f64 = (i + 1..n).map(|k| l[k * n + i] * column[k]).sum();
+            column[i] = (column[i] - done) / l[i * n + i];
+        }
+        inverse[unit * n..][..n].copy_from_slice(&column);
+    }
+    Some(inverse)
 }
 
-/// −H g over the moving variables, no longer than allowed.
-fn direction(
-    variables: &[Variable],
-    inverse: &[f64],
-    gradient: &[f64],
-    moving: &[bool],
-) -> Vec<f64> {
+/// −H g over the variables that may move, no longer than allowed; zero for those at a bound that
+/// would leave it.
+fn direction(variables: &[Variable], x: &[f64], inverse: &[f64], gradient: &[f64]) -> Vec<f64> {
     let n = gradient.len();
+    let moving: Vec<bool> = (0..n)
+        .map(|i| {
+            !((x[i] <= variables[i].low && gradient[i] > 0.0)
+                || (x[i] >= variables[i].high && gradient[i] < 0.0))
+        })
+        .collect();
     let mut out = vec![0.0; n];
     let mut scale: f64 = 1.0;
     for i in (0..n).filter(|i| moving[*i]) {
         for j in (0..n).filter(|j| moving[*j]) {
             out[i] -= inverse[i * n + j] * gradient[j];
         }
-        scale = scale.min(LONGEST * variables[i].step / out[i].abs());
+        scale = scale.min(variables[i].longest / out[i].abs());
     }
     out.iter_mut().for_each(|entry| *entry *= scale);
     out
+}
+
+/// The decrease that a step of a quasi-Newton method promises; none where it is not a number.
+fn promised(step: &[f64], gradient: &[f64]) -> f64 {
+    let slope = product(step, gradient);
+    if slope.is_nan() { 0.0 } else { -0.5 * slope }
+}
+
+fn difference(x: &[f64], y: &[f64]) -> Vec<f64> {
+    x.iter().zip(y).map(|(x, y)| x - y).collect()
 }
 
 fn product(x: &[f64], y: &[f64]) -> f64 {
@@ -206,12 +376,19 @@ mod tests {
             low,
             high,
             step: 1e-3,
+            longest: 0.06,
         }
+    }
+
+    /// A function of which no slope is known.
+    fn unknown(value: f64) -> Result<Value, Error> {
+        Ok(Value::new(value, 0))
     }
 
     #[test]
     fn a_curved_valley_is_followed_to_its_minimum() {
-        let rosenbrock = |x: &[f64]| Ok((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
+        let rosenbrock =
+            |x: &[f64]| unknown((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
         let around = [variable(-0.5, -9.0, 9.0), variable(0.5, -9.0, 9.0)];
         let found = minimise(&around, 1e-12, rosenbrock);
         assert!(found.is_ok_and(|found| (found.place[0] - 1.0).abs() < 1e-3 && found.value < 1e-6));
@@ -219,7 +396,7 @@ mod tests {
 
     #[test]
     fn a_minimum_beyond_a_bound_is_found_on_it() {
-        let bowl = |x: &[f64]| Ok((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
+        let bowl = |x: &[f64]| unknown((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
         let found = minimise(
             &[variable(1.0, 0.0, 9.0), variable(1.5, -9.0, 9.0)],
             1e-12,
@@ -228,5 +405,48 @@ mod tests {
         assert!(
             found.is_ok_and(|found| found.place[0] == 0.0 && (found.place[1] - 2.0).abs() < 1e-4)
         );
+    }
+
+    #[test]
+    fn a_known_slope_saves_evaluations_and_what_it_lacks_is_found() {
+        // The sum of squares of a line and a curve, and a part whose slope is not known.
+        let mut evaluations = 0;
+        let function = |x: &[f64]| {
+            evaluations += 1;
+            let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
+            let by = [[1.0, -2.0 * x[0]], [2.0, 10.0]];
+            let mut found = Value::new(line * line + curve * curve + 0.1 * x[0], 2);
+            for i in 0..2 {
+                found.slope[i] = 2.0 * (by[i][0] * line + by[i][1] * curve);
+                for j in 0..2 {
+                    found.curvature[2 * i + j] = 2.0 * (by[i][0] * by[j][0] + by[i][1] * by[j][1]);
+                }
+            }
+            Ok(found)
+        };
+        let free = |start| Variable {
+            longest: 10.0,
+            ..variable(start, -9.0, 9.0)
+        };
+        let found = minimise(&[free(0.0), free(2.0)], 1e-10, function);
+        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, |x| {
+            let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
+            unknown(line * line + curve * curve + 0.1 * x[0])
+        });
+        let (Ok(found), Ok(expected)) = (found, from_nothing) else {
+            unreachable!("the function has a value everywhere")
+        };
+        assert!((found.value - expected.value).abs() < 1e-8);
+        assert!(evaluations < 25, "{evaluations} evaluations");
+    }
+
+    #[test]
+    fn the_inverse_is_one_and_only_of_definite_matrices() {
+        let found = inverted(&[4.0, 2.0, 2.0, 3.0], 2).unwrap();
+        for (found, expected) in found.iter().zip([0.375, -0.25, -0.25, 0.5]) {
+            assert!((found - expected).abs() < 1e-15);
+        }
+        assert_eq!(inverted(&[1.0, 2.0, 2.0, 1.0], 2), None);
+        assert_eq!(inverted(&[f64::NAN], 1), None);
     }
 }

@@ -1,0 +1,122 @@
+"""Least squares, from which the search of the noise starts, and the part of long recordings for it.
+
+Least squares is the likelihood without air and coloured noise. Its cost has several local minima
+over the delay, so a grid over delay and lag comes first, for each recording alone.
+
+A search takes a few thousand evaluations, each linear in the rows. In a recording of more than
+`PART` rows it is made on as many of them in which the command changes most; the maximum on all rows
+is near, and takes some tens of evaluations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
+from deadtime.estimation.likelihood._search import (
+    LONGEST,
+    ROUGH,
+    NoiseFit,
+    PlantModel,
+    grid_lags,
+    grid_minima,
+)
+
+#: Most rows of a search.
+PART = 5000
+
+#: Accuracy of −2 ln L of the maximum on all rows.
+CLOSE = 5e-3
+
+#: Parts overlap so that each row is in so many of them.
+OVERLAP = 4
+
+#: Most points of the grid over the delay, and its step in rows where a lag makes the response
+#: smooth; it is a row elsewhere.
+MOST_POINTS, SMOOTH_STEP = 600, 2.0
+
+#: Minima of the grid of a recording that are refined.
+REFINED = 3
+
+
+def is_long(runs: Sequence[FlightRows]) -> bool:
+    """Whether a search on all rows would take too long."""
+    return any(rows.time.size > PART for rows in runs)
+
+
+def excited_part(rows: FlightRows) -> FlightRows:
+    """The rows of a search: all, or those in which the command changes most.
+
+    They keep the commands of as long a time before them. What those before have left is a part of
+    the offset.
+    """
+    count = rows.time.size
+    if count <= PART:
+        return rows
+    changes = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows.command)))])
+    firsts = np.arange(0, count - PART + 1, PART // OVERLAP)
+    begin, end = rows.time[firsts], rows.time[firsts + PART - 1]
+    ends = [np.searchsorted(rows.command_time, at, side="right") - 1 for at in (begin, end)]
+    best = int(np.argmax(changes[ends[1]] - changes[np.maximum(ends[0], 0)]))
+    first, start, stop = int(firsts[best]), float(begin[best]), float(end[best])
+    kept = slice(first, first + PART)
+    since = max(2.0 * start - stop, float(rows.command_time[0]))
+    sent = slice(
+        max(0, int(np.searchsorted(rows.command_time, since, side="right")) - 1),
+        max(1, int(ends[1][best]) + 1),
+    )
+    return rows._replace(
+        time=rows.time[kept],
+        output=rows.output[kept],
+        used=rows.used[kept],
+        command_time=rows.command_time[sent],
+        command=rows.command[sent],
+        unknown=tuple(one for one in rows.unknown if since < one[1] and one[0] < stop),
+        uncertain=tuple(one for one in rows.uncertain if since < one[1] and one[0] < stop),
+        offset=rows.offset or first > 0,
+    )
+
+
+def least_squares(
+    model: PlantModel, runs: Sequence[FlightRows], delay: float, gain: float
+) -> NoiseFit:
+    """The fit under white noise alone; `delay` and `gain` where they are known."""
+    quiet = [RowNoise()] * len(runs)
+    likelihood = model.likelihood(runs, False)
+    found = []
+    for rows in runs:
+        alone = model.likelihood([rows], False)
+        for point in _minima(model, rows, delay, gain):
+            its_gain = alone.at(0, point).gain
+            start = PlantNumbers(point.delay, point.lags, quiet, its_gain)
+            found.append(likelihood.fit(start, ROUGH))
+    best = min(found, key=lambda one: one.objective)
+    return NoiseFit(model, tuple(runs), False, likelihood.fit(best))
+
+
+def _minima(model: PlantModel, rows: FlightRows, delay: float, gain: float) -> list[PlantNumbers]:
+    """The lowest local minima of a grid over delay and lag."""
+    between = float(np.median(np.diff(rows.time)))
+    delays = [delay]
+    if "delay" in model.names:
+        longest = LONGEST * float(rows.time[-1] - rows.time[0])
+        step = (SMOOTH_STEP if any(model.free_lags) else 1.0) * between
+        count = int(min(MOST_POINTS, max(2.0, longest / step)))
+        delays = np.linspace(0.0, longest, count + 1).tolist()
+    likelihood = model.likelihood([rows], False)
+    found = grid_minima(likelihood, delays, grid_lags(model, between), [RowNoise()], gain)
+    return found[:REFINED]
+
+
+def on_all_rows(fit: NoiseFit, runs: Sequence[FlightRows]) -> NoiseFit:
+    """The maximum on all rows of recordings, near the `fit` to parts of them, without outliers."""
+    whole = NoiseFit(fit.model, tuple(runs), fit.trim, fit.numbers)
+    kept = [
+        rows._replace(used=rows.used & ~is_outlier(part.whitened, rows.used))
+        for rows, part in zip(runs, whole.parts, strict=True)
+    ]
+    whole = NoiseFit(fit.model, tuple(kept), fit.trim, fit.numbers)
+    return whole.moved(whole.likelihood.fit(fit.with_gain, CLOSE))

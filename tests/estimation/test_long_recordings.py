@@ -1,0 +1,79 @@
+"""Long recordings: the search on a part, the maximum on all rows, intervals from the curvature."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation.likelihood import _start as start
+from deadtime.estimation.likelihood._rows import FlightRows
+
+TRUTH = dtm.ControlLoop(
+    dtm.Integrator(0.85, 0.1), dtm.P(1.6), delay=0.3, sample_time=0.05, limit=1.0
+)
+FREE = ("delay", "gain", "lag")
+
+
+def recorded(count, quiet=0, seed=3):
+    """Steps of the reference every 5 s, after `quiet` rows at rest, with noise in the loop."""
+    random = np.random.default_rng(seed)
+    time = np.arange(count) * TRUTH.sample_time
+    reference = np.repeat(random.choice([0.0, 1.0], count // 100 + 1), 100)[:count]
+    reference[:quiet] = 0.0
+    noise = random.normal(0.0, 0.005, count)
+    run = TRUTH.simulate(time, reference - noise, reference_time=time, initial_output=0.0)
+    return dtm.Recording(time, reference, run.outputs + noise, run.inputs)
+
+
+def test_a_long_recording_tells_delay_gain_and_lag():
+    fit = dtm.estimate_delay(recorded(20_000), TRUTH.replace(delay=None), free=FREE)
+    assert fit.adequate, fit.message
+    for name, true in (("delay", 0.3), ("gain", 0.85), ("lag", 0.1), ("delay+lag", 0.4)):
+        low, high = fit.ci(0.99, name)
+        assert low < true < high
+        # As wide as four times as many rows as those of the search allow.
+        assert high - low == pytest.approx(2 * 2.576 * fit.stderr[name], rel=1e-3)
+    part = dtm.estimate_delay(
+        recorded(20_000), TRUTH.replace(delay=None), free=FREE, window=(0.0, 249.0)
+    )
+    assert fit.stderr["delay"] == pytest.approx(0.5 * part.stderr["delay"], rel=0.15)
+
+
+def test_the_search_on_a_part_ends_at_the_maximum_of_all_rows(monkeypatch):
+    recording = recorded(3000)
+    whole = dtm.estimate_delay(recording, TRUTH.replace(delay=None), free=FREE)
+    monkeypatch.setattr(start, "PART", 1000)
+    from_part = dtm.estimate_delay(recording, TRUTH.replace(delay=None), free=FREE)
+    for name in FREE:
+        error = whole.stderr[name]
+        assert getattr(from_part, name) == pytest.approx(getattr(whole, name), abs=0.05 * error)
+        # The interval is that of the profile where the likelihood is a parabola.
+        np.testing.assert_allclose(from_part.ci(0.95, name), whole.ci(0.95, name), atol=0.1 * error)
+
+
+def test_the_search_uses_the_rows_in_which_the_command_changes():
+    recording = recorded(20_000, quiet=12_000)
+    rows = FlightRows(
+        recording.time,
+        recording.output,
+        np.ones(20_000, dtype=bool),
+        recording.time,
+        recording.command,
+        ((10.0, 11.0), (700.0, 701.0)),
+        False,
+    )
+    part = start.excited_part(rows)
+    assert part.time.size == start.PART
+    assert part.time[0] >= 12_000 * TRUTH.sample_time - 1.0
+    # Commands of as long a time before it act on it; the output at its start is unknown.
+    assert part.command_time[0] == pytest.approx(2 * part.time[0] - part.time[-1], abs=0.1)
+    assert part.command_time[-1] == part.time[-1]
+    assert part.unknown == ((700.0, 701.0),)
+    assert part.offset
+    short = FlightRows(*(one[:4000] if isinstance(one, np.ndarray) else one for one in rows))
+    assert start.excited_part(short) is short
+
+
+def test_a_long_recording_whose_plant_lacks_a_lag_is_inadequate():
+    known = TRUTH.replace(delay=None, lag=0.0)
+    fit = dtm.estimate_delay(recorded(20_000), known)
+    assert not fit.adequate
+    assert "a further lag" in fit.message
