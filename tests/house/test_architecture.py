@@ -39,6 +39,7 @@ LIKELIHOOD = {
     "estimation.likelihood._adequacy",
     "estimation.likelihood._profile",
     "estimation.likelihood._search",
+    "estimation.likelihood._start",
     "estimation.methods._flight_conclusion",
     "estimation.planning._whitening",
 }
