@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         FirstOrder,
         Integrator,
         P,
+        RateLimited,
         RationalPlant,
         kit_plant,
         simulate_fixed_step,
@@ -76,8 +77,8 @@ _ROOMS = {
     "roots": "QuasiPolynomial crossings dde_roots delay delay_margin parameters s",
     "systems": "DelaySystem TransferFunction feedback",
     "loops": (
-        "ControlLoop DerivativeFilter FirstOrder Integrator P PD PI PID PV RationalPlant kit_plant "
-        "simulate_fixed_step sweep"
+        "ControlLoop DerivativeFilter FirstOrder Integrator P PD PI PID PV RateLimited "
+        "RationalPlant kit_plant simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
     "recordings": "Recording read_recording",
@@ -119,6 +120,7 @@ __all__ = [
     "P",
     "PacketError",
     "QuasiPolynomial",
+    "RateLimited",
     "RationalPlant",
     "Recording",
     "RecordingError",

@@ -12,6 +12,7 @@ from deadtime.loops._derivative_filter import DerivativeFilter
 from deadtime.loops._fixed_step import simulate_fixed_step
 from deadtime.loops._given_plants import PlantWithDelays
 from deadtime.loops._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
+from deadtime.loops._rate_limits import RateLimited
 from deadtime.loops._sweep import Sweep, SweepStatus, sweep
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "P",
     "Plant",
     "PlantWithDelays",
+    "RateLimited",
     "RationalPlant",
     "Sweep",
     "SweepStatus",
