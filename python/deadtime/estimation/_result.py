@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Quantities that are not times; a limit has the unit of the command.
-UNITLESS = ("gain", "limit")
+UNITLESS = ("gain", "limit", "rate", "rate_of_rate")
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.loops import FirstOrder, Integrator, Plant
+from deadtime.loops import FirstOrder, Integrator, Plant, RateLimited
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,9 @@ class PlantModel:
 
     @classmethod
     def of(cls, plant: Plant, names: tuple[str, ...]) -> PlantModel:
-        """The plant with `names` free."""
+        """The plant with `names` free; one that limits rates, after its limits."""
+        if isinstance(plant, RateLimited):
+            plant = plant.plant
         if isinstance(plant, Integrator):
             used = ("lag",) if "lag" in names or plant.lag else ()
             return cls((1.0,), (1.0, 0.0), used, (plant.lag,)[: len(used)], names)

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
+from deadtime.estimation.fit._least_squares import Minimum, Model
 from deadtime.estimation.likelihood._adequacy import Adequacy
+from deadtime.estimation.likelihood._free_limits import LimitsProfile
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -30,6 +32,9 @@ Array = NDArray[np.float64]
 
 #: A lag below so many times its lower bound is none.
 NO_LAG = 2.0
+
+#: Ratio of the residuals to those of least squares from which the noise stands for the plant.
+LESS = 1.5
 
 #: Rounds of leaving out outliers.
 ROUNDS = 3
@@ -100,6 +105,11 @@ def concluded_flight(
     cov = common_covariance(fit)
     order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
     place = [order.index(name) for name in names]
+    cov = cov[np.ix_(place, place)]
+    if isinstance(profile, LimitsProfile):
+        cov = profile.limits.joined(names, cov)
+        values |= profile.limits.values
+        names = tuple(values)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
     left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
     fitted = tuple(
@@ -115,7 +125,7 @@ def concluded_flight(
         loop=fitted[0].loop,
         free=names,
         stderr=stderr,
-        cov=cov[np.ix_(place, place)],
+        cov=cov,
         crb=CramerRaoBound(labels, noise[0], dict(stderr)),
         recording=fitted[0].recording,
         residuals=fitted[0].residuals,
@@ -168,6 +178,15 @@ def gain_is_certain(profile: LikelihoodProfile) -> bool:
     if "gain" not in profile.names:
         return False
     return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * profile.stderr["gain"]
+
+
+def explains_less(fit: NoiseFit, found: Minimum, model: Model) -> bool:
+    """Whether the plant beside the noise explains far less of a recording than by least squares."""
+    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
+    return any(
+        float(np.std(part.residuals)) > LESS * float(np.std(piece)) / weight
+        for part, piece, weight in zip(fit.parts, pieces, model.weights, strict=True)
+    )
 
 
 def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,6 +30,7 @@ from deadtime.estimation.data._simulated import (
 )
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
 from deadtime.estimation.likelihood._adequacy import adequacy_of
+from deadtime.estimation.likelihood._free_limits import LimitsProfile, fit_limits
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
     predicted_commands,
@@ -45,6 +46,7 @@ from deadtime.estimation.methods._conclusion import (
 )
 from deadtime.estimation.methods._flight_conclusion import (
     concluded_flight,
+    explains_less,
     fitted_flight,
     gain_is_certain,
     profile_for,
@@ -52,8 +54,8 @@ from deadtime.estimation.methods._flight_conclusion import (
     without_the_plant,
 )
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
-from deadtime.estimation.models._held import Path, path_of
-from deadtime.loops import ControlLoop
+from deadtime.estimation.models._held import RATE_LIMITS, Path, path_of
+from deadtime.loops import ControlLoop, Plant, RateLimited
 from deadtime.recordings import Recording, RecordingCheck
 
 Array = NDArray[np.float64]
@@ -148,11 +150,25 @@ def estimate_from_commands(
         one.rows(initial_output, -piece / weight, run.check)
         for one, piece, weight, run in zip(models, pieces, model.weights, runs, strict=True)
     ]
-    fit = fitted_flight(names, fitted[0].loop, rows, first)
+    linear = tuple(name for name in names if name not in RATE_LIMITS)
+
+    def within(limits: Mapping[str, float], of: Sequence[FlightRows] = rows) -> list[FlightRows]:
+        return [one.limited(part, limits) for one, part in zip(models, of, strict=True)]
+
+    fit = fitted_flight(linear, fitted[0].loop, within(first), first)
+    free_limits = None
+    if linear != names:
+        started = {name: first[name] for name in names if name in RATE_LIMITS}
+        fit, free_limits = fit_limits(fit, partial(within, of=fit.runs), started)
+        fitted = [run._replace(loop=run.loop.replace(**free_limits.values)) for run in fitted]
     doubts: tuple[str, ...] = ()
     if any(one.commands.computed for one in models):
         fit, doubts = _with_predicted_commands(names, fit, models, runs)
-    profile = profile_for(fit, names)
+    profile = profile_for(fit, linear)
+    if free_limits is not None:
+        profile = LimitsProfile(
+            profile.fit, profile.names, profile.preferred, profile._ends, free_limits
+        )
     longest = min(LONGEST * one.span for one in models)
     if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
@@ -163,14 +179,14 @@ def estimate_from_commands(
         check_fit(model, found, fitted)
     adequacy = adequacy_of(profile, len(names))
     adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
-    if adequacy.lacks_lag:
+    if adequacy.lacks_lag or (adequacy.reasons and explains_less(profile.fit, found, model)):
         return without_the_plant(plain(), adequacy)
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
     return concluded_flight(
         method,
-        names,
+        linear,
         fitted,
         profile,
         models[0].known,
@@ -217,6 +233,7 @@ class _Model(ModelOfOne):
     """Residuals of one recording."""
 
     path: Path
+    plant: Plant
     known: Mapping[str, float]
     source: str
     logged: Array
@@ -260,6 +277,14 @@ class _Model(ModelOfOne):
             offset=initial_output is None,
         )
 
+    def limited(self, rows: FlightRows, values: Mapping[str, float]) -> FlightRows:
+        """The rows with the command that the plant gets within these limits of its rate."""
+        if not isinstance(self.plant, RateLimited):
+            return rows
+        limits = {name: values[name] for name in RATE_LIMITS if name in values}
+        held = self.plant._replace(limits).limited(self.commands.time, self.commands.command)
+        return rows._replace(command_time=held[0], command=held[1])
+
     @cached_property
     def span(self) -> float:
         return float(self.recording.time[-1] - self.recording.time[0])
@@ -274,6 +299,8 @@ class _Model(ModelOfOne):
             "delay": Ends(0.0, LONGEST * self.span, self._sample),
             "lag": Ends(0.0, self.span, self._sample),
             "time_constant": Ends(1e-3 * size, 1e3 * size, size),
+            "rate": Ends(1e-3 * size, 1e3 * size, size),
+            "rate_of_rate": Ends(1e-3 * size, 1e3 * size, size),
             "initial output": Ends(-np.inf, np.inf, self.size),
         }.get(label, Ends(-np.inf, np.inf, size))
 
@@ -310,6 +337,15 @@ class _Model(ModelOfOne):
         return [point for _, point in sorted(found, key=lambda pair: pair[0])]
 
     def _lag_grid(self) -> list[dict[str, float]]:
+        found = self._lags()
+        for name in RATE_LIMITS:
+            if name in self.names:
+                found = [
+                    one | {name: factor * self.known[name]} for one in found for factor in FACTORS
+                ]
+        return found
+
+    def _lags(self) -> list[dict[str, float]]:
         if "lag" in self.names:
             return [{"lag": lag * self._sample} for lag in LAGS]
         if "time_constant" in self.names:
@@ -368,9 +404,16 @@ def _model(
         )
     check_moves(data.output, command)
     commands = with_missing(recording, loop, command)
+    if isinstance(loop.plant, RateLimited) and commands.time.size > command.size:
+        raise NotIdentifiableError(
+            "rows are further apart than the samples of the controller, and what a plant that "
+            "limits the rate of its command got depends on every command: choose a window without "
+            "missing rows"
+        )
     return _Model(
         recording=data,
         path=path_of(loop.plant, commands.time, commands.command),
+        plant=loop.plant,
         logged=command,
         commands=commands,
         names=names,
