@@ -7,7 +7,7 @@ waited for different times before they were sent.
 
 An estimate should be adequate where the unexplained part of the rise is below twice the noise of
 the quiet rows: the root mean square of the residuals in the first `RISE` seconds after each step,
-beside that of the output around its mean in the last `QUIET` seconds before the next.
+beside that of the residuals around their mean in the last `QUIET` seconds before the next.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def estimated(folder: Path, flight: Flight, limited: bool) -> Estimated:
     since = recording.time - np.array(steps)[np.searchsorted(steps, recording.time) - 1]
     rising = (recording.time > steps[0]) & (since < RISE)
     quiet = [
-        recording.output[(recording.time > step + HOLD - QUIET) & (recording.time < step + HOLD)]
+        fit.residuals[(recording.time > step + HOLD - QUIET) & (recording.time < step + HOLD)]
         for step in steps
     ]
     lag = fit.loop.parameters["lag"]

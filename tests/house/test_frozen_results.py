@@ -75,6 +75,7 @@ MADE = {
     "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
     "QuasiPolynomial": lambda: h,
     "PlantWithDelays": lambda: dtm.loops.PlantWithDelays(1.0 / (dtm.s + dtm.delay(1.0))),
+    "RateLimited": lambda: dtm.RateLimited(dtm.Integrator(), rate=1.0, rate_of_rate=5.0),
     "RationalPlant": lambda: dtm.RationalPlant([1.0], [1.0, 1.0]),
     "Recording": lambda: dtm.Recording(
         np.arange(9.0), np.zeros(9), np.zeros(9), units={"output": "m"}
