@@ -13,6 +13,7 @@ beside that of the residuals around their mean in the last `QUIET` seconds befor
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -124,7 +125,14 @@ def estimated(folder: Path, flight: Flight, limited: bool) -> Estimated:
     if limited:
         plant = dtm.RateLimited(plant, rate=0.01 * acceleration, rate_of_rate=jerk)
     loop = dtm.ControlLoop(plant, dtm.P(GAINS[flight.axis]), sample_time=SAMPLE, limit=LIMIT)
-    fit = dtm.estimate_delay(recording, loop, free=FREE)
+    try:
+        fit = dtm.estimate_delay(recording, loop, free=FREE)
+    except dtm.NotIdentifiableError as error:
+        nothing = math.nan
+        ends = (nothing, nothing)
+        return Estimated(
+            flight, limited, nothing, ends, nothing, False, nothing, nothing, f"refused: {error}"
+        )
     steps = [step.time for step in recording.steps()]
     since = recording.time - np.array(steps)[np.searchsorted(steps, recording.time) - 1]
     rising = (recording.time > steps[0]) & (since < RISE)
@@ -173,7 +181,8 @@ def print_table(folder: Path, flights: Sequence[Flight], processes: int) -> None
 def line(one: Estimated) -> str:
     """One estimate."""
     low, high = one.interval
-    reasons = one.message.partition("not adequate: ")[2].rpartition(" (try")[0]
+    _, found, reasons = one.message.partition("not adequate: ")
+    reasons = reasons.rpartition(" (try")[0] if found else one.message
     return (
         f"{one.flight.name:24}{'yes' if one.limited else 'no':>7}{one.total:8.3f}"
         f"{low:10.3f} –{high:7.3f}{one.gain:7.3f}{1e3 * one.unexplained:9.1f}"

@@ -100,3 +100,15 @@ def test_missing_rows_are_refused():
     )
     with pytest.raises(dtm.NotIdentifiableError, match="missing rows"):
         dtm.estimate_delay(holed, loop_with(LIMITED))
+
+
+def test_a_late_row_is_not_a_missing_one():
+    exact = recorded(2)
+    time = exact.time.copy()
+    time[175] += 0.8 * SAMPLE  # at rest
+    late = dtm.Recording(time, exact.reference, exact.output, exact.command)
+    found, plain = (
+        dtm.estimate_delay(one, loop_with(LIMITED), free=("delay", "gain", "lag"))
+        for one in (late, exact)
+    )
+    assert found.delay_plus_lag == pytest.approx(plain.delay_plus_lag, abs=0.003)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit
+from deadtime.estimation.likelihood._search import NoiseFit, weak_air, with_noise
 
 Array = NDArray[np.float64]
 
@@ -144,7 +144,12 @@ def fit_limits(
 
     def at(logs: Array, near: NoiseFit = fit) -> NoiseFit:
         rows = tuple(rows_within(dict(zip(names, np.exp(logs).tolist(), strict=True))))
-        found = near.model.likelihood(rows, near.trim).fit(near.numbers)
+        likelihood = near.model.likelihood(rows, near.trim)
+        starts = [near.numbers]
+        if any(noise.air == 0.0 for noise in near.numbers.noise):
+            # Without air there is none after a search either.
+            starts.append(with_noise(near.numbers, weak_air(near.model, rows)))
+        found = min((likelihood.fit(one) for one in starts), key=lambda one: one.objective)
         return NoiseFit(near.model, rows, near.trim, found)
 
     middle = np.log([first[name] for name in names])
@@ -160,8 +165,7 @@ def fit_limits(
         options: Any = {"initial_simplex": corners, "xatol": ACCURACY, "maxfev": MOST}
         middle = minimize(objective, middle, method="Nelder-Mead", options=options).x
     best = at(middle)
-    steps = np.array([_step(at, middle, best, i) for i in range(middle.size)])
-    curvature, slopes = _parabola(at, middle, best, steps)
+    curvature, slopes = _parabola(at, middle, best)
     sizes, directions = np.linalg.eigh(0.5 * curvature)
     if not np.all(sizes > LEAST_CURVATURE):
         raise NotIdentifiableError(
@@ -172,36 +176,35 @@ def fit_limits(
     return best, FreeLimits(values, (directions / sizes) @ directions.T, slopes)
 
 
-def _step(at: Callable[..., NoiseFit], middle: Array, best: NoiseFit, i: int) -> float:
-    """A step in one logarithm by which -2 ln L rises visibly."""
-    step = QUOTIENT
-    while step < LONGEST:
-        away = at(middle + step * np.eye(middle.size)[i], best)
-        if away.numbers.objective - best.numbers.objective > LEAST_RISE:
-            break
-        step *= 2.0
-    return step
-
-
 def _parabola(
-    at: Callable[..., NoiseFit], middle: Array, best: NoiseFit, steps: Array
+    at: Callable[..., NoiseFit], middle: Array, best: NoiseFit
 ) -> tuple[Array, dict[str, Array]]:
-    """Second derivatives of -2 ln L, and first ones of the other numbers."""
+    """Second derivatives of -2 ln L, and first ones of the other numbers.
+
+    Where the two sides differ, as where there is air on one side only, the flatter one counts.
+    """
     count, base = middle.size, best.numbers.objective
     curvature = np.zeros((count, count))
     slopes = {name: np.zeros(count) for name in numbers_of(best)}
-    rises = []
-    for i, step in enumerate(steps):
-        move = step * np.eye(count)[i]
-        higher, lower = at(middle + move, best), at(middle - move, best)
-        rises.append(higher.numbers.objective - base)
-        curvature[i, i] = (rises[-1] + lower.numbers.objective - base) / step**2
-        above, below = numbers_of(higher), numbers_of(lower)
+    moves, rises = [], []
+    for i in range(count):
+        step = QUOTIENT
+        while True:
+            move = step * np.eye(count)[i]
+            higher, lower = at(middle + move, best), at(middle - move, best)
+            above, below = (side.numbers.objective - base for side in (higher, lower))
+            if min(above, below) > LEAST_RISE or step > LONGEST:
+                break
+            step *= 2.0
+        moves.append(move)
+        rises.append(above)
+        curvature[i, i] = 2.0 * min(above, below) / step**2
+        ahead, behind = numbers_of(higher), numbers_of(lower)
         for name, slope in slopes.items():
-            slope[i] = (above[name] - below[name]) / (2.0 * step)
+            slope[i] = (ahead[name] - behind[name]) / (2.0 * step)
     for i in range(count):
         for j in range(i):
-            both = at(middle + steps[i] * np.eye(count)[i] + steps[j] * np.eye(count)[j], best)
-            mixed = both.numbers.objective - base - rises[i] - rises[j]
-            curvature[i, j] = curvature[j, i] = mixed / (steps[i] * steps[j])
+            both = at(middle + moves[i] + moves[j], best).numbers.objective - base
+            product_of_steps = moves[i].sum() * moves[j].sum()
+            curvature[i, j] = curvature[j, i] = (both - rises[i] - rises[j]) / product_of_steps
     return curvature, slopes

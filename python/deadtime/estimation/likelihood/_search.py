@@ -219,6 +219,11 @@ def _criterion(fit: NoiseFit) -> float:
     return fit.criterion
 
 
+def weak_air(model: PlantModel, runs: Sequence[FlightRows]) -> list[RowNoise]:
+    """Weak air for each recording, from which a search finds whether there is any."""
+    return _airs(model, runs)[0]
+
+
 def _airs(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise]]:
     """Weak and strong air for each recording."""
     found = []
