@@ -118,7 +118,7 @@ impl RateLimits {
                 continue;
             }
             let sign = (wanted - state.rate).signum();
-            let until = self.to_curve(sign * state.rate, sign * error).min(left);
+            let until = self.until_curve(sign * state.rate, sign * error).min(left);
             let (value, rate) = (state.value, state.rate);
             integral += until * (value + until * (0.5 * rate + sign * jerk * until / 6.0));
             state.value = value + until * (rate + 0.5 * sign * jerk * until);
@@ -129,7 +129,7 @@ impl RateLimits {
     }
 
     /// Time until a rising rate `a` meets clip(e/T), e the error, where it is below that now.
-    fn to_curve(&self, a: f64, error: f64) -> f64 {
+    fn until_curve(&self, a: f64, error: f64) -> f64 {
         let (most, jerk) = (self.rate, self.rate_of_rate);
         let settling = most / jerk;
         let to_most = (most - a) / jerk;
