@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit, weak_air, with_noise
+from deadtime.estimation.likelihood._search import NoiseFit, airs_of, with_noise
 
 Array = NDArray[np.float64]
 
@@ -148,7 +148,7 @@ def fit_limits(
         starts = [near.numbers]
         if any(noise.air == 0.0 for noise in near.numbers.noise):
             # Without air there is none after a search either.
-            starts.append(with_noise(near.numbers, weak_air(near.model, rows)))
+            starts.append(with_noise(near.numbers, airs_of(near.model, rows)[1]))
         found = min((likelihood.fit(one) for one in starts), key=lambda one: one.objective)
         return NoiseFit(near.model, rows, near.trim, found)
 
