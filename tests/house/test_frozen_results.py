@@ -59,6 +59,7 @@ MADE = {
     "FittedRun": lambda: dtm.estimate_delay(
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ).runs[0],
+    "FactoredPlant": lambda: dtm.FactoredPlant([0.2, 0.1], zero=0.05),
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),

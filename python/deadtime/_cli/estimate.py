@@ -76,8 +76,8 @@ def command(
         str | None,
         typer.Option(
             help="What is fitted, for one method: of delay, gain, lag of an integrator, "
-            "time_constant of a first-order plant; for waveform also limit and start. Without: "
-            "delay,gain.",
+            "time_constant of a first-order plant, lag_1, lag_2, … and zero of one of more real "
+            "poles; for waveform also limit and start. Without: delay,gain.",
             show_default=False,
         ),
     ] = None,

@@ -16,7 +16,7 @@ from deadtime.estimation.fit._profile import Profile, floor_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, FactoredPlant, Integrator
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
@@ -142,8 +142,12 @@ class DelayEstimate(ReadOnlyArrays):
 
     @property
     def lag(self) -> float | None:
-        """Lag of the plant, s, fitted or as given; None if the plant has no such parameter."""
-        return self.loop.parameters.get("lag")
+        """Lag of the plant, s, fitted or as given; None if the plant has no such parameter.
+
+        Of a `FactoredPlant` the total lag: the sum of its lags less its zero.
+        """
+        plant = self.loop.plant
+        return plant.lag if isinstance(plant, (Integrator, FactoredPlant)) else None
 
     @property
     def delay_plus_lag(self) -> float:
@@ -244,6 +248,8 @@ class DelayEstimate(ReadOnlyArrays):
 
     def _value(self, name: str) -> float:
         """The fitted value of a quantity."""
+        if name == "delay+lag":
+            return self.delay_plus_lag
         known = {**self.loop.parameters, **self.details}
         return float(sum(known.get(part, 0.0) for part in name.split("+")))
 

@@ -65,7 +65,9 @@ class LikelihoodProfile:
     def centre(self) -> PlantNumbers:
         """The fit with its gain, from which one quantity is moved."""
         one = self.fit.numbers
-        return PlantNumbers(one.delay, one.lags, one.noise, self.fit.gain, objective=one.objective)
+        return PlantNumbers(
+            one.delay, one.lags, one.noise, self.fit.gain, one.zero, objective=one.objective
+        )
 
     @property
     def initial_output(self) -> float:
@@ -86,20 +88,16 @@ class LikelihoodProfile:
 
     @cached_property
     def _weights(self) -> dict[str, Array]:
-        """Each quantity as a sum of the common numbers: gain, delay, lags."""
-        model = self.fit.model
-        order: list[str] = [name for name in ("gain", "delay") if name in model.names]
-        order += [f"lag {i}" for i, free in enumerate(model.free_lags) if free]
-        found = {}
-        for name, kernel in self.names.items():
-            wanted = order if kernel == "total" else [kernel]
-            found[name] = np.array(
-                [
-                    float(one in wanted and not (kernel == "total" and one == "gain"))
-                    for one in order
-                ]
+        """Each quantity as a sum of the common numbers: gain, delay, lags, zero."""
+        order = [kernel for _, kernel in self.fit.model.order]
+        total = {"gain": 0.0, "zero": -1.0}
+        return {
+            name: np.array(
+                [total.get(one, 1.0) if kernel == "total" else one == kernel for one in order],
+                dtype=np.float64,
             )
-        return found
+            for name, kernel in self.names.items()
+        }
 
     @cached_property
     def freedom(self) -> dict[str, float]:
@@ -133,7 +131,7 @@ class LikelihoodProfile:
     def ends(self, name: str, level: float) -> tuple[tuple[float, float], PlantNumbers]:
         """The interval, and the lowest minimum that was seen on the way."""
         kernel = self.names[name]
-        floor = -math.inf if kernel == "gain" else 0.0
+        floor = -math.inf if kernel in ("gain", "zero") else 0.0
         if kernel.startswith("lag"):
             floor = 1e-3 * float(np.median(np.diff(self.fit.runs[0].time)))
         rise = self.rise(name, level)
@@ -141,7 +139,7 @@ class LikelihoodProfile:
         found, lowest = [], self.centre
         for sign in (-1.0, 1.0):
             end, low = self.fit.likelihood.end(self.centre, kernel, sign * reach, rise, floor)
-            found.append(0.0 if end == floor and kernel != "gain" else end)
+            found.append(0.0 if end == floor else end)
             lowest = min(lowest, low, key=lambda one: one.objective)
         return (found[0], found[1]), lowest
 
@@ -163,7 +161,7 @@ def profile_of(fit: NoiseFit, names: Mapping[str, str], level: float = 0.95) -> 
 
 
 def common_covariance(fit: NoiseFit) -> Array:
-    """Covariance of the numbers that all recordings share: gain, delay, lags."""
+    """Covariance of the numbers that all recordings share: gain, delay, lags, zero."""
     blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
     if len(blocks) == 1:
         return blocks[0]

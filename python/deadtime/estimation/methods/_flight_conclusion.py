@@ -20,7 +20,7 @@ from deadtime.estimation.likelihood._profile import (
     profile_of,
 )
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
-from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise
+from deadtime.estimation.likelihood._search import SHORTER, NoiseFit, PlantModel, fit_noise
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
@@ -61,8 +61,7 @@ def fitted_flight(
 
 def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
     """The profile over the names, and over the sum of delay and lag."""
-    kernel = {"delay": "delay", "gain": "gain"}
-    kernel |= {name: f"lag {i}" for i, name in enumerate(fit.model.lag_names)}
+    kernel = dict(fit.model.order)
     wanted = {name: kernel[name] for name in names}
     if "delay" in names:
         slow = "time_constant" if "time_constant" in names else "lag"
@@ -73,15 +72,20 @@ def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
 def _start(
     model: PlantModel, first: Mapping[str, float], rows: Sequence[FlightRows]
 ) -> PlantNumbers:
-    """The kernel's numbers for a least squares fit; a lag of zero becomes a short one."""
+    """The kernel's numbers for a least squares fit; a lag of zero becomes a short one.
+
+    Free lags that are equal would stay equal, since they have the same effect: they are spread.
+    """
     least = 0.5 * float(np.median(np.diff(rows[0].time)))
     delay, lags = first["delay"], []
     for name, free in zip(model.lag_names, model.free_lags, strict=True):
         lag = first[name]
         if free and abs(lag) < least:
             delay, lag = max(0.0, delay - least + lag), least
+        while free and lag in lags:
+            lag *= SHORTER
         lags.append(lag)
-    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first["gain"])
+    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first["gain"], model.zero)
 
 
 def concluded_flight(
@@ -98,7 +102,7 @@ def concluded_flight(
     fit = profile.fit
     values = values_of(fit, names, known)
     cov = common_covariance(fit)
-    order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
+    order = [name for name, _ in fit.model.order]
     place = [order.index(name) for name in names]
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
     left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
@@ -106,7 +110,7 @@ def concluded_flight(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals)
         for run, part in zip(runs, fit.parts, strict=True)
     )
-    held = [name for name in names if name in ("lag", "delay") and values[name] == 0.0]
+    held = [name for name in names if name.startswith(("lag", "delay")) and values[name] == 0.0]
     stderr = {name: 0.0 if name in held else error for name, error in profile.stderr.items()}
     labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
     labels += ("trim",) * fit.trim
@@ -135,9 +139,9 @@ def values_of(
     """The fitted parameters of the loop; a lag at its lower bound is none."""
     numbers = fit.numbers
     least = NO_LAG * 1e-3 * float(np.median(np.diff(fit.runs[0].time)))
-    found = {"delay": numbers.delay, "gain": fit.gain}
+    found = {"delay": numbers.delay, "gain": fit.gain, "zero": numbers.zero}
     for name, lag in zip(fit.model.lag_names, numbers.lags, strict=True):
-        if name == "lag" and lag <= least:
+        if name.startswith("lag") and lag <= least:
             found["delay"], lag = found["delay"] + lag, 0.0
         found[name] = lag
     found["delay"] = max(0.0, found["delay"])
