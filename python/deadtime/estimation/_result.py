@@ -100,7 +100,9 @@ class DelayEstimate(ReadOnlyArrays):
     uncalibrated : str
         Why there is no interval; empty where there is one.
     details : dict
-        Further results of the method, such as the overshoot.
+        Further results of the method, such as the overshoot. Those of a likelihood have
+        ``"unseen_lag"``: a further lag of that size, s, would have been found with a probability
+        of 90 %, and one below it may be there unseen.
     others : tuple of FittedRun
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.

@@ -93,7 +93,7 @@ class FactoredPlant(Plant):
     def _replace(self, numbers: Mapping[str, float]) -> FactoredPlant:
         values = {**self.parameters, **numbers}
         lags = [values.pop(f"lag_{i}") for i in range(1, len(self.lags) + 1)]
-        return replace(self, lags=lags, **values)
+        return replace(self, lags=lags, gain=values["gain"], zero=values.get("zero", 0.0))
 
     def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
         den: list[Any] = [1.0]

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.errors import NotIdentifiableError
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._search import NoiseFit, with_noise
 
@@ -84,7 +85,13 @@ class LikelihoodProfile:
     def stderr(self) -> dict[str, float]:
         """Standard errors for the fitted noise."""
         cov = common_covariance(self.fit)
-        return {name: math.sqrt(w @ cov @ w) for name, w in self._weights.items()}
+        squares = {name: float(w @ cov @ w) for name, w in self._weights.items()}
+        if not all(square > 0.0 for square in squares.values()):
+            raise NotIdentifiableError(
+                f"{', '.join(self.fit.model.names)} cannot be told apart by this recording: give "
+                "the plant fewer lags, or let deadtime.estimation.choose_plant choose"
+            )
+        return {name: math.sqrt(square) for name, square in squares.items()}
 
     @cached_property
     def _weights(self) -> dict[str, Array]:
@@ -131,7 +138,8 @@ class LikelihoodProfile:
     def ends(self, name: str, level: float) -> tuple[tuple[float, float], PlantNumbers]:
         """The interval, and the lowest minimum that was seen on the way."""
         kernel = self.names[name]
-        floor = -math.inf if kernel in ("gain", "zero") else 0.0
+        leads = kernel == "total" and ("zero" in self.fit.model.names or self.fit.model.zero > 0.0)
+        floor = -math.inf if kernel in ("gain", "zero") or leads else 0.0
         if kernel.startswith("lag"):
             floor = 1e-3 * float(np.median(np.diff(self.fit.runs[0].time)))
         rise = self.rise(name, level)

@@ -91,8 +91,8 @@ class PlantModel:
         if isinstance(plant, FactoredPlant):
             lags = {name: lag for name, lag in plant.parameters.items() if name.startswith("lag")}
             lags = {name: lag for name, lag in lags.items() if lag or name in names}
-            den = (1.0, 0.0) if plant.integrator else (1.0,)
-            return cls((1.0,), den, tuple(lags), tuple(lags.values()), names, zero=plant.zero)
+            rest = (1.0, 0.0) if plant.integrator else (1.0,)
+            return cls((1.0,), rest, tuple(lags), tuple(lags.values()), names, zero=plant.zero)
         num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
         return cls(tuple(map(float, num)), tuple(map(float, den)), (), (), names)
 

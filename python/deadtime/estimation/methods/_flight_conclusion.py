@@ -14,6 +14,7 @@ from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
+from deadtime.estimation.likelihood._power import unseen_lag
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -105,6 +106,7 @@ def concluded_flight(
     order = [name for name, _ in fit.model.order]
     place = [order.index(name) for name in names]
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
+    unseen = unseen_lag(fit)
     left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
     fitted = tuple(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals)
@@ -125,8 +127,8 @@ def concluded_flight(
         residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         adequate=not adequacy.reasons,
-        message=_message(message, names, held, noise[0], left_out, adequacy, runs[0]),
-        details={**details, "rows_left_out": left_out},
+        message=_message(message, names, held, noise[0], left_out, adequacy, runs[0], unseen),
+        details={**details, "rows_left_out": left_out, "unseen_lag": unseen},
         others=fitted[1:],
         noise=noise[0],
         _profile=profile,
@@ -193,6 +195,7 @@ def _message(
     left_out: int,
     adequacy: Adequacy,
     run: Run,
+    unseen: float,
 ) -> str:
     text = f"{done}; {noise}"
     if left_out:
@@ -200,5 +203,5 @@ def _message(
     if held:
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:
-        text += f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
-    return text
+        return text + f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
+    return f"{text}; a further lag below {unseen:.2g} s would not have been seen"

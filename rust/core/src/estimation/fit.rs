@@ -332,7 +332,12 @@ impl Model {
                 start: match start.timing {
                     Timing::Delay(time) | Timing::Total(time) => time,
                 },
-                low: 0.0,
+                // A zero may be longer than delay and lags.
+                low: if start.zero > 0.0 || self.free.zero {
+                    -self.longest
+                } else {
+                    0.0
+                },
                 high: self.longest,
                 step: TIME_STEP * row_time,
             },
