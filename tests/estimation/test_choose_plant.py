@@ -29,7 +29,7 @@ def test_two_lags_are_found_and_a_third_is_not():
 
 
 def test_a_zero_is_found():
-    choice = choose_plant(record_attitude(1, **VEHICLE, zero=0.3), FLAT, most_lags=2)
+    choice = choose_plant(record_attitude(2, **VEHICLE, zero=0.3), FLAT, most_lags=2)
     assert choice.chosen == "2 lags, zero"
     low, high = choice.ci()
     # The output leads a ramp: the zero is longer than delay and lags.

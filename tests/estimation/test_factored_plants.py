@@ -47,6 +47,18 @@ def test_the_zero_takes_from_the_total_lag():
     assert fit.stderr["delay+lag"] == pytest.approx(np.sqrt(weights @ fit.cov @ weights), rel=1e-6)
 
 
+def test_intervals_of_each_number_are_as_wide_as_their_errors():
+    recording = record_attitude(2, **VEHICLE, zero=0.3)
+    known = KNOWN.replace(plant=dtm.FactoredPlant([0.1, 0.04], zero=0.1))
+    fit = dtm.estimate_delay(recording, known, free=(*FREE, "zero"))
+    for name, error in fit.stderr.items():
+        low, high = fit.ci(0.95, name)
+        assert 2.5 * error < high - low < 6.0 * error, name
+    # The zero is longer than delay and lags, so that the output leads a ramp.
+    low, high = fit.ci(0.95, "delay+lag")
+    assert low < -0.053 < high < 0.0
+
+
 def test_the_sum_is_covered_where_the_split_is_open():
     held = 0
     for seed in range(20):
@@ -61,6 +73,12 @@ def test_two_recordings_are_fitted_together():
     flights = [record_attitude(seed, **VEHICLE) for seed in (1, 2)]
     one = dtm.estimate_delay(flights[0], KNOWN, free=FREE)
     both = dtm.estimate_delay(flights, KNOWN, free=FREE)
+    assert [run.noise.white for run in both.runs] == pytest.approx([0.003, 0.003], rel=0.2)
+    assert both.runs[0].noise is both.noise
+    assert both.runs[1].noise != both.noise
+    models = both.to_dict()["noise_models"]
+    assert [one["white"] for one in models] == [run.noise.white for run in both.runs]
+    assert str(both.runs[1].noise) in both.summary()
     assert both.stderr["delay+lag"] < 0.85 * one.stderr["delay+lag"]
     assert both.delay_plus_lag == pytest.approx(0.247, abs=4.0 * both.stderr["delay+lag"])
 

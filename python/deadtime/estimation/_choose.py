@@ -35,8 +35,8 @@ LONG, SHORT, ZERO = 3.0, 0.5, 0.3
 #: Headings of the table.
 COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
 
-#: Points of the distribution of delay and lag together.
-PLACES = 4001
+#: Points of the distribution of delay and lag together, and the least weight of a plant in it.
+PLACES, LEAST = 4001, 1e-3
 
 
 @dataclass(frozen=True)
@@ -87,17 +87,16 @@ class PlantChoice:
         from scipy import special
 
         one = float(special.erf(math.sqrt(0.5)))
-        parts = []
-        for name, weight in self.weights.items():
-            fit = self.estimates[name]
-            low, high = fit.ci(one, "delay+lag")
-            parts.append((weight, fit.delay_plus_lag, fit.delay_plus_lag - low, high))
-        ends = [self.estimates[name].ci(level, "delay+lag") for name in self.weights]
+        weights = {name: weight for name, weight in self.weights.items() if weight > LEAST}
+        fits = {name: self.estimates[name] for name in weights}
+        ends = [fit.ci(level, "delay+lag") for fit in fits.values()]
         places = np.linspace(min(low for low, _ in ends), max(high for _, high in ends), PLACES)
         below = np.zeros(PLACES)
-        for weight, middle, left, high in parts:
-            sizes = np.where(places < middle, left, high - middle)
-            below += weight * special.ndtr((places - middle) / np.maximum(sizes, 1e-12))
+        for name, fit in fits.items():
+            middle = fit.delay_plus_lag
+            low, high = fit.ci(one, "delay+lag")
+            sizes = np.maximum(np.where(places < middle, middle - low, high - middle), 1e-12)
+            below += weights[name] / sum(weights.values()) * special.ndtr((places - middle) / sizes)
         low, high = np.interp([0.5 - level / 2, 0.5 + level / 2], below, places)
         return float(low), float(high)
 
@@ -108,7 +107,7 @@ class PlantChoice:
         for name in sorted(self.criteria, key=lambda name: self.criteria[name]):
             fit = self.estimates[name]
             low, high = fit.ci(0.95, "delay+lag")
-            open_ended = high > fit.recording.time[-1] - fit.recording.time[0]
+            span = fit.recording.time[-1] - fit.recording.time[0]
             found.append(
                 [
                     f"{name} *" if name == self.chosen else name,
@@ -118,7 +117,7 @@ class PlantChoice:
                     f"{fit.delay:.3f}",
                     f"{fit.lag or 0.0:.3f}",
                     f"{fit.delay_plus_lag:.3f}",
-                    f"above {low:.3f}" if open_ended else f"{low:.3f} – {high:.3f}",
+                    f"{low:.3f} – {high:.3f}" if high - low < span else "unknown",
                 ]
             )
         return found + [[name, f"refused: {why}"] for name, why in self.refusals.items()]

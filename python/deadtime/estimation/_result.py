@@ -37,7 +37,7 @@ class CramerRaoBound(ReadOnlyArrays):
     free : tuple of str
         The parameters that are taken as unknown; the bound depends on them.
     noise : FlightNoise
-        The noise it is for.
+        The noise it is for; in a joint fit that of the first recording.
     stderr : dict of str to float
         The bound for each free quantity, and for ``delay+lag`` where both are free.
     """
@@ -59,11 +59,14 @@ class FittedRun(ReadOnlyArrays):
         The recorded loop with the fitted parameters.
     residuals : ndarray, shape (n,)
         Recorded minus simulated output.
+    noise : FlightNoise or None
+        The noise that was fitted to this recording, where the method does that.
     """
 
     recording: Recording
     loop: ControlLoop
     residuals: Array
+    noise: FlightNoise | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,7 +110,8 @@ class DelayEstimate(ReadOnlyArrays):
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.
     noise : FlightNoise or None
-        The noise that was fitted beside the plant, where the method does that.
+        The noise that was fitted beside the plant, where the method does that; in a joint fit that
+        of the first recording. `runs` has that of each.
     """
 
     method: str
@@ -130,7 +134,7 @@ class DelayEstimate(ReadOnlyArrays):
     @property
     def runs(self) -> tuple[FittedRun, ...]:
         """All recordings that were fitted together, the first one included."""
-        return (FittedRun(self.recording, self.loop, self.residuals), *self.others)
+        return (FittedRun(self.recording, self.loop, self.residuals, self.noise), *self.others)
 
     @property
     def delay(self) -> float:
@@ -284,11 +288,11 @@ class DelayEstimate(ReadOnlyArrays):
             "adequate": self.adequate,
             "message": self.message,
         }
-        if self.noise is not None:
-            found["noise_model"] = {
-                name: value if math.isfinite(value) else None
-                for name, value in vars(self.noise).items()
-            }
+        models = [_plain(run.noise) for run in self.runs if run.noise is not None]
+        if models:
+            found["noise_model"] = models[0]
+        if len(models) > 1:
+            found["noise_models"] = models
         if self.uncalibrated:
             found["no_interval_because"] = self.uncalibrated
         return found | dict(self.details)
@@ -310,9 +314,10 @@ class DelayEstimate(ReadOnlyArrays):
         if not self.calibrated:
             lines.append(f"  no interval: {self.uncalibrated}")
         if self.crb is not None and "delay" in self.crb.stderr:
+            noises = [str(run.noise) for run in self.runs if run.noise is not None]
             lines.append(
-                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for {self.crb.noise} "
-                f"with {', '.join(self.crb.free)} free"
+                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for "
+                f"{' | '.join(noises) or self.crb.noise} with {', '.join(self.crb.free)} free"
             )
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(
@@ -352,3 +357,8 @@ class DelayEstimate(ReadOnlyArrays):
             f"<DelayEstimate {self.method}: delay {self.delay:.4g}{spread} s, "
             f"adequate: {self.adequate}>"
         )
+
+
+def _plain(noise: FlightNoise) -> dict[str, float | None]:
+    """The noise for JSON, which has no infinite numbers."""
+    return {name: value if math.isfinite(value) else None for name, value in vars(noise).items()}

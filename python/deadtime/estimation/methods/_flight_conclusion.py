@@ -109,8 +109,8 @@ def concluded_flight(
     unseen = unseen_lag(fit)
     left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
     fitted = tuple(
-        FittedRun(run.recording, run.loop.replace(**values), part.residuals)
-        for run, part in zip(runs, fit.parts, strict=True)
+        FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)
+        for run, part, one in zip(runs, fit.parts, noise, strict=True)
     )
     held = [name for name in names if name.startswith(("lag", "delay")) and values[name] == 0.0]
     stderr = {name: 0.0 if name in held else error for name, error in profile.stderr.items()}

@@ -36,7 +36,7 @@ impl Point {
     }
 
     /// Lags less the zero, s.
-    fn lag(&self) -> f64 {
+    pub(super) fn lag(&self) -> f64 {
         self.lags.iter().sum::<f64>() - self.zero
     }
 

@@ -47,12 +47,11 @@ impl Quantity {
             Self::Gain => held.gain = value,
             Self::Zero => held.zero = value,
             Self::Lag(i) => {
-                held.timing = match held.timing {
-                    Timing::Delay(delay) => Timing::Delay(delay),
-                    Timing::Total(_) => Timing::Total(point.total().max(value)),
-                };
                 if let Some(lag) = held.lags.get_mut(i) {
                     *lag = value;
+                }
+                if let Timing::Total(total) = held.timing {
+                    held.timing = Timing::Total(total.max(held.lag()));
                 }
             }
         }
