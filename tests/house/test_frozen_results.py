@@ -30,6 +30,10 @@ def designed():
     return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
 
 
+def estimated():
+    return dtm.estimate_delay(*record_step(rest=1.0, noise=0.01), free=("delay",))
+
+
 def planned(**more):
     return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
 
@@ -73,6 +77,9 @@ MADE = {
     "Parameter": lambda: Kp,
     "ParametricQuasiPolynomial": lambda: FAMILY,
     "PlannedBound": lambda: planned().bound,
+    "PlantChoice": lambda: dtm.estimation.PlantChoice(
+        {"1 lag": estimated()}, {"1 lag": 0.0}, {}, "1 lag"
+    ),
     "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
     "QuasiPolynomial": lambda: h,
     "PlantWithDelays": lambda: dtm.loops.PlantWithDelays(1.0 / (dtm.s + dtm.delay(1.0))),

@@ -20,6 +20,7 @@ from typing import Any, cast
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
@@ -29,8 +30,8 @@ from deadtime.loops import ControlLoop, FactoredPlant
 #: Most lags that are tried.
 MOST_LAGS = 3
 
-#: Where the first lag and each further one begin, in rows, and the zero, as a share of the lags.
-LONG, SHORT, ZERO = 3.0, 0.5, 0.3
+#: Where the first lag and each further one begin, in rows, and the zero, as shares of the lags.
+LONG, SHORT, ZEROS = 3.0, 0.5, (0.3, 3.0)
 
 #: Headings of the table.
 COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
@@ -39,8 +40,8 @@ COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % int
 PLACES, LEAST = 4001, 1e-3
 
 
-@dataclass(frozen=True)
-class PlantChoice:
+@dataclass(frozen=True, eq=False, repr=False)
+class PlantChoice(ReadOnlyArrays):
     """Plants of a family fitted to the same recordings, and the one that the evidence is for.
 
     Attributes
@@ -143,6 +144,9 @@ class PlantChoice:
             "refusals": dict(self.refusals),
         }
 
+    def __repr__(self) -> str:
+        return f"<PlantChoice {self.chosen} of {len(self.estimates)} plants: {self.best!r}>"
+
     def __str__(self) -> str:
         rows = [list(COLUMNS), *self.rows()]
         full = [row for row in rows if len(row) == len(COLUMNS)]
@@ -235,19 +239,25 @@ def choose_plant(
             further = SHORT * runs[0].recording.sample_time
             plant = replace(plant, lags=(*plant.lags, further), zero=0.0)
         # Without a zero its effect would be that of the delay, so that a search stays there.
-        for zero in (0.0, ZERO * sum(plant.lags)) if count else (0.0,):
-            name = f"{count or 'no'} {'lag' if count == 1 else 'lags'}{', zero' if zero else ''}"
-            free = ["delay", *plant.parameters]
-            if count and not zero:
-                free.remove("zero")
-            tried = [one.replace(plant=replace(plant, zero=zero)) for one in loops]
-            try:
-                fit = estimate_delay(recording, tried, method=method, free=free, window=window)
-            except NotIdentifiableError as error:
-                refusals[name] = str(error)
+        for shares in ((0.0,), ZEROS) if count else ((0.0,),):
+            with_zero = shares is ZEROS
+            name = f"{count or 'no'} {'lag' if count == 1 else 'lags'}{', zero' * with_zero}"
+            free = ["delay", *(one for one in plant.parameters if with_zero or one != "zero")]
+            fits = []
+            for share in shares:
+                started = replace(plant, zero=share * sum(plant.lags))
+                tried = [one.replace(plant=started) for one in loops]
+                try:
+                    fits.append(
+                        estimate_delay(recording, tried, method=method, free=free, window=window)
+                    )
+                except NotIdentifiableError as error:
+                    refusals[name] = str(error)
+            if not fits:
                 continue
-            estimates[name] = fit
-            if not zero:  # where the search of the next plants begins
+            refusals.pop(name, None)
+            estimates[name] = fit = min(fits, key=_bic)
+            if not with_zero:  # where the search of the next plants begins
                 plant = cast(FactoredPlant, fit.loop.plant)
     if not estimates:
         raise NotIdentifiableError(next(iter(refusals.values())))
