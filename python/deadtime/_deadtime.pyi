@@ -468,6 +468,8 @@ class _RecordedRows(Protocol):
     @property
     def output(self) -> _Reals: ...
     @property
+    def speed(self) -> _Reals: ...
+    @property
     def used(self) -> NDArray[np.bool_]: ...
     @property
     def command_time(self) -> _Reals: ...
@@ -488,14 +490,18 @@ class RowNoise:
     air: Final[float]
     sensor_time: Final[float]
     sensor: Final[float]
+    stamps: Final[float]
+    arrivals: Final[float]
     def __new__(
         cls,
         air_time: float = 1.0,
         air: float = 0.0,
         sensor_time: float = 1.0,
         sensor: float = 0.0,
+        stamps: float = 0.0,
+        arrivals: float = 0.0,
     ) -> RowNoise: ...
-    def __getnewargs__(self) -> tuple[float, float, float, float]: ...
+    def __getnewargs__(self) -> tuple[float, float, float, float, float, float]: ...
 
 @final
 class PlantNumbers:

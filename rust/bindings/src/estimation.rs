@@ -19,6 +19,7 @@ struct RecordedRows<'py> {
     time: Floats<'py>,
     output: Floats<'py>,
     used: PyReadonlyArrayDyn<'py, bool>,
+    speed: Floats<'py>,
     command_time: Floats<'py>,
     command: Floats<'py>,
     unknown: Vec<(f64, f64)>,
@@ -33,6 +34,7 @@ impl RecordedRows<'_> {
             time: owned(&self.time)?,
             output: owned(&self.output)?,
             used: owned(&self.used)?,
+            speed: owned(&self.speed)?,
             commands: Commands {
                 time: owned(&self.command_time)?,
                 value: owned(&self.command)?,
@@ -54,23 +56,41 @@ pub(crate) struct RowNoise {
     air: f64,
     sensor_time: f64,
     sensor: f64,
+    stamps: f64,
+    arrivals: f64,
 }
 
 #[pymethods]
 impl RowNoise {
     #[new]
-    #[pyo3(signature = (air_time=1.0, air=0.0, sensor_time=1.0, sensor=0.0))]
-    fn new(air_time: f64, air: f64, sensor_time: f64, sensor: f64) -> Self {
+    #[pyo3(signature = (air_time=1.0, air=0.0, sensor_time=1.0, sensor=0.0, stamps=0.0, arrivals=0.0))]
+    fn new(
+        air_time: f64,
+        air: f64,
+        sensor_time: f64,
+        sensor: f64,
+        stamps: f64,
+        arrivals: f64,
+    ) -> Self {
         Self {
             air_time,
             air,
             sensor_time,
             sensor,
+            stamps,
+            arrivals,
         }
     }
 
-    fn __getnewargs__(&self) -> (f64, f64, f64, f64) {
-        (self.air_time, self.air, self.sensor_time, self.sensor)
+    fn __getnewargs__(&self) -> (f64, f64, f64, f64, f64, f64) {
+        (
+            self.air_time,
+            self.air,
+            self.sensor_time,
+            self.sensor,
+            self.stamps,
+            self.arrivals,
+        )
     }
 }
 
@@ -127,6 +147,8 @@ impl PlantNumbers {
             air: one.air,
             sensor_time: one.sensor_time,
             sensor: one.sensor,
+            stamps: one.stamps,
+            arrivals: one.arrivals,
         });
         Fit {
             point: Point {
@@ -146,6 +168,8 @@ impl PlantNumbers {
             air: one.air,
             sensor_time: one.sensor_time,
             sensor: one.sensor,
+            stamps: one.stamps,
+            arrivals: one.arrivals,
         });
         Self {
             delay: fit.point.delay(),

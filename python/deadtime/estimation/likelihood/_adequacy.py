@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from deadtime._deadtime import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
+from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
 
 Array = NDArray[np.float64]
@@ -38,6 +39,9 @@ MOVES = 0.05
 
 #: Most deviations of the sensor noise by which air that changes within a row may move the output.
 RESTLESS = 15.0
+
+#: Deviation of residuals, in that of rounding, up to which they are those of rounding.
+MOST_ROUNDING = 1.5
 
 #: Largest difference of the cumulated score at the 1 % level (Kolmogorov).
 BRIDGE = 1.628
@@ -72,7 +76,10 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
     whitened = [part.whitened[mask] for part, mask in zip(fit.parts, used, strict=True)]
     whiteness = whiteness_of(np.concatenate(whitened), numbers, [piece.size for piece in whitened])
     reasons = []
-    if not whiteness.white:
+    if not whiteness.white and not all(
+        rounding_explains(part.residuals[mask], rows)
+        for part, mask, rows in zip(fit.parts, used, fit.runs, strict=True)
+    ):
         reasons.append(
             "the residuals are not white beside the fitted noise (lag-1 autocorrelation "
             f"{whiteness.autocorrelation:.2f})"
@@ -107,6 +114,11 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
                 "the noise of the sensor, as no air does: it stands for something else"
             )
     return Adequacy(whiteness, further, tuple(reasons), lacks_lag)
+
+
+def rounding_explains(residuals: Array, rows: FlightRows) -> bool:
+    """Whether these residuals are those of rounding, which is not white: it follows the output."""
+    return float(np.std(residuals)) < MOST_ROUNDING * rows.rounding / math.sqrt(12.0)
 
 
 def restless_air(fit: NoiseFit, run: int) -> float:

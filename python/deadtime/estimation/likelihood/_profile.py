@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._deadtime import PlantNumbers, RowNoise
-from deadtime.estimation.likelihood._search import NoiseFit, with_noise
+from deadtime.estimation.likelihood._search import (
+    PARTS,
+    NoiseFit,
+    airs_of,
+    changed,
+    with_noise,
+)
 
 Array = NDArray[np.float64]
 
@@ -31,11 +37,11 @@ LEAST_CURVATURE = 0.25
 #: Fewest degrees of freedom: fewer are a failure of the parabola, not of the recording.
 LEAST_FREEDOM = 4.0
 
-#: The numbers of the noise of one recording.
-PARTS = ("air_time", "air", "sensor_time", "sensor")
-
 #: A held fit that is lower than the best by this much is another, better minimum.
 BETTER = 0.02
+
+#: Air that may be there unseen, in the weak air of the search.
+UNSEEN = tuple(2.0**k for k in range(-6, 5))
 
 #: Most restarts from better minima that intervals find.
 RESTARTS = 4
@@ -82,7 +88,7 @@ class LikelihoodProfile:
         return sum(part.freedom for part in self.fit.parts)
 
     @cached_property
-    def stderr(self) -> dict[str, float]:
+    def bounds(self) -> dict[str, float]:
         """Standard errors for the fitted noise."""
         cov = common_covariance(self.fit)
         squares = {name: float(w @ cov @ w) for name, w in self._weights.items()}
@@ -92,6 +98,16 @@ class LikelihoodProfile:
                 "the plant fewer lags, or let deadtime.estimation.choose_plant choose"
             )
         return {name: math.sqrt(square) for name, square in squares.items()}
+
+    @cached_property
+    def stderr(self) -> dict[str, float]:
+        """Standard errors for the fitted noise, and for air that may be there unseen."""
+        return {name: one * math.sqrt(self.unseen[name]) for name, one in self.bounds.items()}
+
+    @cached_property
+    def unseen(self) -> dict[str, float]:
+        """Factor on the variance of each quantity for air that is too weak to be seen."""
+        return unseen_air(self.fit, self._weights)
 
     @cached_property
     def _weights(self) -> dict[str, Array]:
@@ -120,13 +136,13 @@ class LikelihoodProfile:
         from scipy import special
 
         quantile = float(special.stdtrit(self.freedom[name], 0.5 + level / 2))
-        return self.rows * math.log1p(quantile**2 / self.rows)
+        return self.rows * math.log1p(self.unseen[name] * quantile**2 / self.rows)
 
     def statistic(self, name: str, value: float) -> float:
         """The squared t for which `value` is the end of an interval."""
         held = self.fit.likelihood.held(self.centre, self.names[name], value)
         rise = max(0.0, held.objective - self.centre.objective)
-        return self.rows * math.expm1(rise / self.rows)
+        return self.rows * math.expm1(rise / self.rows) / self.unseen[name]
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
         """Ends of the interval around the fitted `value`."""
@@ -186,14 +202,42 @@ def _common(inverse: Array, linear: int, fit: NoiseFit) -> Array:
     return square[np.ix_(own, own)]
 
 
+def unseen_air(fit: NoiseFit, weights: Mapping[str, Array]) -> dict[str, float]:
+    """Mean variance of each quantity over slow air, weighted by its likelihood, over that without.
+
+    An estimate of no air does not mean that there is none. All deviations of the air are as likely
+    beforehand.
+    """
+    none = dict.fromkeys(weights, 1.0)
+    if not fit.model.integrates or any(one.air > 0.0 for one in fit.numbers.noise):
+        return none
+    middle = fit.numbers.objective
+    base = common_covariance(fit)
+    _, slow = airs_of(fit.model, fit.runs)
+    total, sums = 0.0, dict.fromkeys(weights, 0.0)
+    for step in UNSEEN:
+        noise = [
+            changed(one, air=step * air.air, air_time=air.air_time)
+            for one, air in zip(fit.numbers.noise, slow, strict=True)
+        ]
+        moved = fit.moved(with_noise(fit.numbers, noise))
+        rise = sum(part.objective for part in moved.parts) - middle
+        weight = step * math.exp(-0.5 * max(rise, -1.0))
+        cov = common_covariance(moved)
+        total += weight
+        for name, w in weights.items():
+            sums[name] += weight * float(w @ cov @ w)
+    return {name: max(1.0, sums[name] / total / float(w @ base @ w)) for name, w in weights.items()}
+
+
 def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -> dict[str, float]:
     """ν = 2/var(ln V) of the variance V of each quantity, over the numbers of the noise."""
     base = fit.numbers.noise
     places = [
         (run, part)
         for run, noise in enumerate(base)
-        for part in ("air_time", "air", "sensor_time", "sensor")
-        if (noise.air if part.startswith("air") else noise.sensor) > 0.0
+        for part in PARTS
+        if getattr(noise, part.removesuffix("_time")) > 0.0
     ]
     if not places:
         return dict.fromkeys(weights, float(rows))

@@ -17,6 +17,14 @@ SPIKE, MOST_SPIKES, HALF_WINDOW = 6.0, 0.15, 2
 MAD, LEAST_ROBUST = 0.6745, 0.1
 
 
+#: Steps of a rounded output are multiples of the least, within this share of it, and at least this
+#: share of the rows is equal to the row before.
+ROUNDING, ROUNDED = 1e-6, 0.2
+
+#: Rows whose times do not scatter.
+NO_SPEED = np.empty(0)
+
+
 class FlightRows(NamedTuple):
     """What the kernel is given of one recording."""
 
@@ -29,6 +37,8 @@ class FlightRows(NamedTuple):
     offset: bool
     uncertain: tuple[tuple[float, float, float], ...] = ()
     trim: bool = False
+    speed: Array = NO_SPEED
+    rounding: float = 0.0
 
 
 def spikes(residuals: Array) -> NDArray[np.bool_]:
@@ -58,3 +68,24 @@ def is_outlier(whitened: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
         return np.zeros(used.size, dtype=bool)
     # The rows after an outlier are predicted from it: only the first of a run is one.
     return np.asarray(found & ~np.r_[False, found[:-1]])
+
+
+def rounding_of(output: Array) -> float:
+    """The step to which an output was rounded, if its rows often stay on one step; else zero."""
+    steps = np.diff(np.unique(output))
+    step = float(np.min(steps, initial=np.inf))
+    is_rounded = np.all(np.abs(steps - step * np.rint(steps / step)) < ROUNDING * step)
+    return step if steps.size and is_rounded and np.mean(np.diff(output) == 0.0) >= ROUNDED else 0.0
+
+
+def on_same_step(output: Array) -> NDArray[np.bool_]:
+    """Rows of a rounded output that tell nothing besides another row on the same step.
+
+    Neighbours on one step of the sensor have the same rounding error. Of those the middle row
+    stays, where that error is least.
+    """
+    first = np.flatnonzero(np.r_[True, np.diff(output) != 0.0])
+    ends = np.r_[first[1:], output.size]
+    found = np.ones(output.size, dtype=bool)
+    found[(first + ends - 1) // 2] = False
+    return found

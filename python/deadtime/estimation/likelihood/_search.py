@@ -7,6 +7,7 @@ air and coloured sensor noise are kept where Akaike's criterion asks for them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -49,7 +50,14 @@ SENSOR, SENSOR_TIME = 1.0, 2.0
 #: Prices in the criterion: of the two numbers of the coloured sensor noise that of Akaike (1974),
 #: of the trim twice that, because it would cost accuracy on a calm flight. Air has none: no air is
 #: the lower bound of its deviation.
-PRICE_OF_SENSOR, PRICE_OF_TRIM = 4.0, 4.0
+PRICE_OF_SENSOR, PRICE_OF_TRIM, PRICE_OF_SCATTER = 4.0, 9.0, 4.0
+
+
+#: Times that scatter by more rows than this are no scatter.
+MOST_SCATTER = 1.0
+
+#: The numbers of the noise of one recording.
+PARTS = ("air_time", "air", "sensor_time", "sensor", "stamps", "arrivals")
 
 
 @dataclass(frozen=True)
@@ -164,6 +172,7 @@ class NoiseFit:
             count = int(np.sum(rows.used))
             total += count * np.log(part.variance * part.freedom / count) + part.log_det
             total += PRICE_OF_SENSOR * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
+            total += PRICE_OF_SCATTER * ((noise.stamps > 0.0) + (noise.arrivals > 0.0))
         return float(total)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -188,7 +197,8 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
     """The likeliest plant and noise, from the least squares fit `first` and a grid."""
     runs = tuple(runs)
     quiet = [RowNoise()] * len(runs)
-    weak, strong = _airs(model, runs)
+    strong, slow = airs_of(model, runs)
+    weak = [RowNoise(one.air_time / SLOW, one.air) for one in slow]
     found = []
     starts = _grid(model, runs, first, (quiet, strong))
     for trim in (False, True) if model.integrates else (False,):
@@ -197,12 +207,12 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
             (likelihood.fit(one, ROUGH) for one in (with_noise(first, quiet), *starts[0])),
             key=_objective,
         )
-        slow = [RowNoise(SLOW * one.air_time, one.air) for one in weak]
         airy = (with_noise(calm, weak), with_noise(calm, slow), *starts[1])
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
     best = min([best, *_with_sensor(best)], key=_criterion)
+    best = min([best, *_with_scatter(best)], key=_criterion)
     return best.moved(best.likelihood.fit(best.numbers))
 
 
@@ -225,6 +235,41 @@ def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
     return found
 
 
+def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
+    """The fit with scattered times of the rows, and of the commands."""
+    found: list[NoiseFit] = []
+    for part in ("stamps", "arrivals"):
+        runs, noise = [], []
+        for rows, like, one in zip(best.runs, best.parts, best.numbers.noise, strict=True):
+            speed = like.rate / like.gain
+            moves = speed if part == "stamps" else np.diff(rows.command)
+            size = float(np.max(np.abs(moves), initial=0.0))
+            if size == 0.0:
+                return found
+            runs.append(rows._replace(speed=speed))
+            noise.append(changed(one, **{part: getattr(one, part) or 1.0 / size}))
+        moved = replace(best, runs=tuple(runs))
+        fit = moved.moved(moved.likelihood.fit(with_noise(best.numbers, noise), ROUGH))
+        if all(
+            scatter_of(fit, run, part) < MOST_SCATTER * float(np.median(np.diff(rows.time)))
+            for run, rows in enumerate(runs)
+        ):
+            found.append(fit)
+    return found
+
+
+def scatter_of(fit: NoiseFit, run: int, part: str) -> float:
+    """Scatter of the times of the rows (``"stamps"``) or of the commands (``"arrivals"``), s."""
+    like = fit.parts[run]
+    scatter: float = getattr(fit.numbers.noise[run], part)
+    return scatter * math.sqrt(like.variance) / abs(like.gain)
+
+
+def changed(noise: RowNoise, **parts: float) -> RowNoise:
+    """The noise with some of its numbers changed."""
+    return RowNoise(**{name: getattr(noise, name) for name in PARTS} | parts)
+
+
 def _objective(numbers: PlantNumbers) -> float:
     return numbers.objective
 
@@ -233,15 +278,15 @@ def _criterion(fit: NoiseFit) -> float:
     return fit.criterion
 
 
-def _airs(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise]]:
-    """Weak and strong air for each recording."""
+def airs_of(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise]]:
+    """Strong air, and weak air that is slow, for each recording."""
     found = []
-    for a_row, flat in ((WEAK_AIR, WEAK_INPUT), (STRONG_AIR, STRONG_INPUT)):
+    for a_row, flat, slow in ((STRONG_AIR, STRONG_INPUT, 1.0), (WEAK_AIR, WEAK_INPUT, SLOW)):
         noise = []
         for rows in runs:
             between = float(np.median(np.diff(rows.time)))
             size = a_row / between if model.integrates else flat
-            noise.append(RowNoise(AIR_TIME * float(rows.time[-1] - rows.time[0]), size))
+            noise.append(RowNoise(slow * AIR_TIME * float(rows.time[-1] - rows.time[0]), size))
         found.append(noise)
     return found
 

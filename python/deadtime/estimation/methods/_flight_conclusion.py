@@ -21,7 +21,13 @@ from deadtime.estimation.likelihood._profile import (
     profile_of,
 )
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
-from deadtime.estimation.likelihood._search import SHORTER, NoiseFit, PlantModel, fit_noise
+from deadtime.estimation.likelihood._search import (
+    SHORTER,
+    NoiseFit,
+    PlantModel,
+    fit_noise,
+    scatter_of,
+)
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
@@ -113,7 +119,15 @@ def concluded_flight(
         for run, part, one in zip(runs, fit.parts, noise, strict=True)
     )
     held = [name for name in names if name.startswith(("lag", "delay")) and values[name] == 0.0]
-    stderr = {name: 0.0 if name in held else error for name, error in profile.stderr.items()}
+    stderr, least = (
+        {name: 0.0 if name in held else error for name, error in errors.items()}
+        for errors in (profile.stderr, profile.bounds)
+    )
+    scatter = {
+        f"scatter_of_{what}": max(times)
+        for what, part in (("rows", "stamps"), ("commands", "arrivals"))
+        if any(times := [scatter_of(fit, run, part) for run in range(len(runs))])
+    }
     labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
     labels += ("trim",) * fit.trim
     return DelayEstimate(
@@ -122,13 +136,15 @@ def concluded_flight(
         free=names,
         stderr=stderr,
         cov=cov[np.ix_(place, place)],
-        crb=CramerRaoBound(labels, noise[0], dict(stderr)),
+        crb=CramerRaoBound(labels, noise[0], least),
         recording=fitted[0].recording,
         residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         adequate=not adequacy.reasons,
-        message=_message(message, names, held, noise[0], left_out, adequacy, runs[0], unseen),
-        details={**details, "rows_left_out": left_out, "unseen_lag": unseen},
+        message=_message(
+            message, names, held, noise[0], left_out, scatter, adequacy, runs[0], unseen
+        ),
+        details={**details, "rows_left_out": left_out, "unseen_lag": unseen, **scatter},
         others=fitted[1:],
         noise=noise[0],
         _profile=profile,
@@ -193,6 +209,7 @@ def _message(
     held: list[str],
     noise: FlightNoise,
     left_out: int,
+    scatter: Mapping[str, float],
     adequacy: Adequacy,
     run: Run,
     unseen: float,
@@ -200,6 +217,8 @@ def _message(
     text = f"{done}; {noise}"
     if left_out:
         text += f"; {left_out} rows left out as outliers"
+    for what, size in scatter.items():
+        text += f"; the times of the {what.removeprefix('scatter_of_')} scatter by {size:.2g} s"
     if held:
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:

@@ -12,6 +12,7 @@ over the delay, so a grid over delay and lag comes first.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,6 +29,7 @@ from deadtime.estimation.data._simulated import (
     known_commands,
     moves_between_rows,
 )
+from deadtime.estimation.data._stamps import on_regular_times
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
 from deadtime.estimation.likelihood._adequacy import adequacy_of
 from deadtime.estimation.likelihood._missing import (
@@ -35,7 +37,8 @@ from deadtime.estimation.likelihood._missing import (
     predicted_commands,
     with_missing,
 )
-from deadtime.estimation.likelihood._rows import FlightRows, spikes
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
+from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of, spikes
 from deadtime.estimation.likelihood._search import NoiseFit
 from deadtime.estimation.methods._conclusion import (
     check_fit,
@@ -112,7 +115,37 @@ def estimate_from_commands(
     initial_output: float | None = None,
     computed: bool = False,
 ) -> DelayEstimate:
-    """Fit the response to the command: logged, or `computed` from the recorded output."""
+    """Fit the response to the command: logged, or `computed` from the recorded output.
+
+    Rows whose stamps scatter around regular times are fitted at both, and the likelier ones kept.
+    """
+    stamped = _estimated(method, runs, free, initial_output, computed)
+    regular = [on_regular_times(run) or run for run in runs]
+    if all(one is run for one, run in zip(regular, runs, strict=True)):
+        return stamped
+    even = _estimated(method, regular, free, initial_output, computed)
+    better = _criterion(stamped) - _criterion(even)
+    if not better > CLEARLY:
+        return stamped
+    text = "the rows are taken as evenly spaced, which is likelier than the times of their stamps"
+    return replace(
+        even, message=f"{even.message}; {text}", details={**even.details, "times": "even"}
+    )
+
+
+def _criterion(estimate: DelayEstimate) -> float:
+    """Akaike's criterion of a fit with noise; infinite of least squares."""
+    profile = estimate._profile
+    return profile.fit.criterion if isinstance(profile, LikelihoodProfile) else math.inf
+
+
+def _estimated(
+    method: str,
+    runs: Sequence[Run],
+    free: Sequence[str],
+    initial_output: float | None,
+    computed: bool,
+) -> DelayEstimate:
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *runs[0].loop.plant.parameters]))
     names = checked_names(free, runs[0].loop, known)
     # Least squares begins with these; the likelihood searches the numbers of other plants itself.
@@ -254,6 +287,9 @@ class _Model(ModelOfOne):
         useless = spikes(residuals)
         if check is not None:
             useless[check.repeated] = True
+        rounding = rounding_of(self.recording.output)
+        if rounding:
+            useless |= on_same_step(self.recording.output)
         return FlightRows(
             time=self.recording.time,
             output=self.recording.output - (initial_output or 0.0),
@@ -262,6 +298,7 @@ class _Model(ModelOfOne):
             command=self.commands.command,
             unknown=self.commands.unknown,
             offset=initial_output is None,
+            rounding=rounding,
         )
 
     @cached_property

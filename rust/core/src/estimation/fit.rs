@@ -23,6 +23,9 @@ const LONGEST_TIME: f64 = 20.0;
 const LEAST_DEVIATION: f64 = 1e-3;
 const MOST_DEVIATION: f64 = 1e5;
 
+/// Ends of the scatter of times, as a share of where the search begins, and its inverse.
+const SCATTER: f64 = 1e-3;
+
 /// Steps of difference quotients: of times, in rows; of logarithms; of the gain, as a share of it.
 const TIME_STEP: f64 = 2e-3;
 const LOG_STEP: f64 = 0.02;
@@ -76,6 +79,8 @@ pub(super) enum Slot {
     Air(usize),
     SensorTime(usize),
     Sensor(usize),
+    Stamps(usize),
+    Arrivals(usize),
 }
 
 impl Model {
@@ -310,6 +315,12 @@ impl Model {
             if noise.sensor > 0.0 {
                 slots.extend([Slot::SensorTime(run), Slot::Sensor(run)]);
             }
+            if noise.stamps > 0.0 {
+                slots.push(Slot::Stamps(run));
+            }
+            if noise.arrivals > 0.0 {
+                slots.push(Slot::Arrivals(run));
+            }
         }
         slots
     }
@@ -369,6 +380,17 @@ impl Model {
                 logarithm(noise(run).air, low, high)
             }
             Slot::Sensor(run) => logarithm(noise(run).sensor, LEAST_DEVIATION, MOST_DEVIATION),
+            // Both move the output by a deviation where speed times scatter is one.
+            Slot::Stamps(run) => logarithm(
+                noise(run).stamps,
+                SCATTER * noise(run).stamps,
+                noise(run).stamps / SCATTER,
+            ),
+            Slot::Arrivals(run) => logarithm(
+                noise(run).arrivals,
+                SCATTER * noise(run).arrivals,
+                noise(run).arrivals / SCATTER,
+            ),
         }
     }
 }
@@ -379,6 +401,8 @@ const QUIET: Noise = Noise {
     air: 0.0,
     sensor_time: 1.0,
     sensor: 0.0,
+    stamps: 0.0,
+    arrivals: 0.0,
 };
 
 /// Put the value of a variable into a point.
@@ -397,6 +421,8 @@ fn put(point: &mut Point, slot: Slot, value: f64) {
         Slot::Air(run) => point.noise[run].air = value.exp(),
         Slot::SensorTime(run) => point.noise[run].sensor_time = value.exp(),
         Slot::Sensor(run) => point.noise[run].sensor = value.exp(),
+        Slot::Stamps(run) => point.noise[run].stamps = value.exp(),
+        Slot::Arrivals(run) => point.noise[run].arrivals = value.exp(),
     }
 }
 

@@ -1,23 +1,24 @@
 //! Likelihood of the rows of one recording, with all linear unknowns eliminated.
 //!
-//! With V the covariance of the rows for white noise of unit variance, X the columns of the linear
-//! unknowns and D the derivatives of the mean by the searched ones (delay, lags), J = [X D],
+//! With V the covariance of the rows for white noise of unit variance and X the columns of the linear
+//! unknowns,
 //!
 //! ```text
-//! −2 ln L = m ln(r/m) + ln det V + ln det JᵀV⁻¹J − ln det JᵀJ,   m = n − columns of J,
+//! −2 ln L = m ln(r/m) + ln det V + ln det XᵀV⁻¹X − ln det XᵀX,   m = n − columns of X,
 //! ```
 //!
 //! r the least sum of squares of the whitened rows over the linear unknowns. It is the likelihood of
-//! the residuals (Patterson & Thompson 1971, Harville 1977) extended to the searched unknowns (Cox &
-//! Reid 1987), so that the numbers of the noise are not biased by the fit. The last term makes it
-//! independent of the scale of the columns, which changes with the lags.
+//! the residuals (Patterson & Thompson 1971, Harville 1977), so that the numbers of the noise are not
+//! biased by the linear unknowns. The last term makes it independent of the scale of the columns,
+//! which changes with the lags. The variance of the white noise counts delay and lags as unknowns
+//! too.
 
 use super::disturbance::{Disturbance, Entry, Joint};
 use super::mean::{Derivatives, Gain, Mean, Values, sizes};
 use super::orthogonal::Triangle;
 use super::plant::{Plant, PlantSpace};
-use super::rows::Rows;
-use super::whiten::{Kick, whiten_in_place};
+use super::rows::{Commands, Rows};
+use super::whiten::{Kick, Known, whiten_in_place};
 use crate::dde::propagator::Propagator;
 use crate::{Error, Task, memory};
 
@@ -38,6 +39,10 @@ pub struct Noise {
     pub sensor_time: f64,
     /// Its standard deviation.
     pub sensor: f64,
+    /// Scatter of the times of the rows and of their commands, s, times the gain.
+    pub stamps: f64,
+    /// Scatter of the times at which commands arrive, s, times the gain.
+    pub arrivals: f64,
 }
 
 impl Noise {
@@ -55,12 +60,27 @@ impl Noise {
 
     /// An error unless the numbers are those of noise.
     pub(super) fn check(&self) -> Result<(), Error> {
+        for (what, scatter) in [("rows", self.stamps), ("commands", self.arrivals)] {
+            refuse_if!(
+                !(scatter.is_finite() && scatter >= 0.0),
+                "the times of {what} scatter by {scatter}: give a finite number of at least zero"
+            );
+        }
         self.parts().iter().try_for_each(Disturbance::check)
     }
 
     fn disturbances(&self) -> Vec<Disturbance> {
         let parts = self.parts().into_iter();
         parts.filter(|part| part.deviation > 0.0).collect()
+    }
+
+    /// Variance of the white noise of each row; empty where it is one.
+    fn variances(&self, rows: &Rows) -> Result<Vec<f64>, Error> {
+        if self.stamps == 0.0 {
+            return Ok(Vec::new());
+        }
+        let variance = |speed: &f64| (self.stamps * speed).mul_add(self.stamps * speed, 1.0);
+        memory::collected(WHAT, rows.speed.iter().map(variance))
     }
 }
 
@@ -123,6 +143,8 @@ pub(super) fn evaluate(
     let space = plant.space(&values.lags, values.zero);
     let mut mean = Mean::new(rows, plant, &space, values, by, task)?;
     let (linear, all) = (mean.linear, count + 1);
+    // A gain that is searched is linear too; the derivatives of the others follow it.
+    let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
     let mut raw = Vec::new();
     if wanted == Wanted::All {
         // The linear columns and the output, to compute residuals from.
@@ -140,16 +162,25 @@ pub(super) fn evaluate(
         .map(|(y, _)| y * y)
         .sum();
     let disturbances = noise.disturbances();
-    let kicks = kicks(rows, &space, values.delay)?;
+    let kicks = kicks(
+        rows,
+        &space,
+        values.delay,
+        noise.arrivals.hypot(noise.stamps),
+    )?;
+    let variances = noise.variances(rows)?;
     let mut log_det = 0.0;
     let mut log_gram = 0.0;
-    let is_white = disturbances.is_empty() && kicks.is_empty();
+    let is_white = disturbances.is_empty() && kicks.is_empty() && variances.is_empty();
     if !is_white {
-        log_gram = -Triangle::new(&mean.columns, n, count, task)?.log_det(count);
+        log_gram = -Triangle::new(&mean.columns, n, first, task)?.log_det(first);
         let joint = Joint::new(&space, &disturbances)?;
         log_det = whiten_in_place(
             &rows.time,
-            &rows.used,
+            Known {
+                used: &rows.used,
+                variances: &variances,
+            },
             &mut mean.columns,
             &joint,
             &kicks,
@@ -158,7 +189,7 @@ pub(super) fn evaluate(
     }
     let triangle = Triangle::new(&mean.columns, n, all, task)?;
     if !is_white {
-        log_gram += triangle.log_det(count);
+        log_gram += triangle.log_det(first);
     }
     let (parts, rest) = triangle.column(count).split_at(linear);
     let squares = rest
@@ -167,9 +198,9 @@ pub(super) fn evaluate(
         .sum::<f64>()
         .max(ROUNDING * power);
     let freedom = used - count;
-    let m = freedom as f64;
-    let variance = (squares / m).max(f64::MIN_POSITIVE);
-    let objective = m * variance.ln() + log_det + log_gram;
+    let variance = (squares / freedom as f64).max(f64::MIN_POSITIVE);
+    let m = (used - first) as f64;
+    let objective = m * (squares / m).max(f64::MIN_POSITIVE).ln() + log_det + log_gram;
     let is_certain = objective.is_finite() && !triangle.is_dependent(count);
     let mut found = Evaluation {
         objective: if is_certain { objective } else { f64::INFINITY },
@@ -195,7 +226,6 @@ pub(super) fn evaluate(
     };
     found.inverse = triangle.inverse(count)?;
     // The derivatives by delay, lags and zero are those of a plant of unit gain.
-    let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
     for (row, entries) in found.inverse.chunks_exact_mut(count.max(1)).enumerate() {
         for (column, entry) in entries.iter_mut().enumerate() {
             for _ in [row, column].iter().filter(|place| **place >= first) {
@@ -242,32 +272,48 @@ fn subtract(from: &mut [f64], factors: &[f64], columns: &[f64]) {
     }
 }
 
-/// What the errors of computed commands do to the states of the plant by the next row.
-fn kicks(rows: &Rows, space: &PlantSpace, delay: f64) -> Result<Vec<Kick>, Error> {
+/// What the errors of computed commands, and the scatter of the times at which commands arrive, do
+/// to the states of the plant by the next row, in the order of the rows.
+fn kicks(rows: &Rows, space: &PlantSpace, delay: f64, arrivals: f64) -> Result<Vec<Kick>, Error> {
     let n = space.b.len();
-    let uncertain = &rows.commands.uncertain;
-    let mut found = memory::reserved("the errors of commands", uncertain.len())?;
+    let Commands {
+        time,
+        value,
+        uncertain,
+        ..
+    } = &rows.commands;
+    let jumps = if arrivals > 0.0 { time.len() - 1 } else { 0 };
+    let mut found = memory::reserved("the errors of commands", uncertain.len() + jumps)?;
     if n == 0 {
         return Ok(found);
     }
-    for (start, end, deviation) in uncertain {
+    let mut add = |end: f64, moved: Vec<f64>| {
         let arrival = end + delay;
         let row = rows.time.partition_point(|time| *time < arrival);
         let Some(time) = rows.time.get(row).filter(|_| row > 0) else {
-            continue;
+            return;
         };
         let mut state = vec![0.0; n];
+        Propagator::new(&space.a, &[], time - arrival).apply(&moved, &[], &mut state);
+        found.push(Kick { row, state });
+    };
+    for (start, end, deviation) in uncertain {
         let mut moved = vec![0.0; n];
         Propagator::new(&space.a, &[&space.b], end - start).apply(
-            &state,
+            &vec![0.0; n],
             &[*deviation],
             &mut moved,
         );
-        if *time > arrival {
-            std::mem::swap(&mut state, &mut moved);
-            Propagator::new(&space.a, &[], time - arrival).apply(&state, &[], &mut moved);
+        add(*end, moved);
+    }
+    if arrivals > 0.0 {
+        for (end, pair) in time.iter().skip(1).zip(value.windows(2)) {
+            let jump = arrivals * (pair[1] - pair[0]);
+            if jump != 0.0 {
+                add(*end, space.b.iter().map(|b| b * jump).collect());
+            }
         }
-        found.push(Kick { row, state: moved });
+        found.sort_by_key(|kick| kick.row);
     }
     Ok(found)
 }
@@ -293,12 +339,16 @@ mod tests {
         air: 0.0,
         sensor_time: 1.0,
         sensor: 0.0,
+        stamps: 0.0,
+        arrivals: 0.0,
     };
     const WINDY: Noise = Noise {
         air_time: 0.8,
         air: 3.0,
         sensor_time: 0.2,
         sensor: 0.5,
+        stamps: 0.0,
+        arrivals: 0.0,
     };
     const DELAY: f64 = 0.31;
 
@@ -373,10 +423,6 @@ mod tests {
         if known.is_none() {
             x.insert(0, response.clone());
         }
-        let slope = column(&|t| {
-            let arrived = sent.iter().rev().find(|(from, _)| from + DELAY <= t);
-            -arrived.map_or(0.0, |(_, value)| *value)
-        });
         let y: Vec<f64> = place
             .iter()
             .zip(&response)
@@ -388,7 +434,8 @@ mod tests {
                 let entry = |j: &usize| {
                     let (s, t) = (rows.time[*i] - rows.time[0], rows.time[*j] - rows.time[0]);
                     let kicked = kicks.iter().filter(|(row, _)| row <= i && row <= j);
-                    f64::from(u8::from(i == j))
+                    let moved = noise.stamps * rows.speed.get(*i).copied().unwrap_or(0.0);
+                    f64::from(u8::from(i == j)) * (1.0 + moved * moved)
                         + integrated(noise.air, noise.air_time, s, t)
                         + coloured(noise.sensor, noise.sensor_time, s, t)
                         + kicked.map(|(_, size)| size * size).sum::<f64>()
@@ -400,19 +447,17 @@ mod tests {
         let white = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             columns.iter().map(|column| forward(&l, column)).collect()
         };
-        let mut j = x.clone();
-        j.push(slope);
         let target = forward(&l, &y);
         let whitened = white(&x);
         let product = |a: &[f64]| -> f64 { a.iter().zip(&target).map(|(a, b)| a * b).sum() };
         let right: Vec<f64> = whitened.iter().map(|column| product(column)).collect();
         let linear = solve(&gram(&whitened), &right);
         let explained: f64 = linear.iter().zip(&right).map(|(a, b)| a * b).sum();
-        let m = (place.len() - j.len()) as f64;
+        let m = (place.len() - x.len()) as f64;
         let objective = m * ((product(&target) - explained) / m).ln()
             + log_det(&l)
-            + log_det(&cholesky(&gram(&white(&j))))
-            - log_det(&cholesky(&gram(&j)));
+            + log_det(&cholesky(&gram(&whitened)))
+            - log_det(&cholesky(&gram(&x)));
         (objective, linear)
     }
 
@@ -444,6 +489,32 @@ mod tests {
             let found = at(&rows, &values(Gain::Eliminated, &[]), &noise);
             let size = 0.5 * (2.6 - DELAY - 2.0);
             let (objective, _) = dense(&rows, &noise, &[(40, size)], None);
+            assert!((found.objective - objective).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn scattered_times_are_in_the_objective() {
+        let mut rows = rows(90);
+        rows.speed = rows.time.iter().map(|t| (3.0 * t).sin()).collect();
+        let rows = rows.checked().unwrap();
+        let sent = commands(&rows);
+        for noise in [QUIET, WINDY] {
+            let noise = Noise {
+                stamps: 1.5,
+                arrivals: 2.0,
+                ..noise
+            };
+            // Every command that changes moves the rows after its arrival, both scatters together.
+            let kicks: Vec<(usize, f64)> = sent
+                .windows(2)
+                .map(|pair| {
+                    let row = rows.time.partition_point(|time| *time < pair[1].0 + DELAY);
+                    (row, 2.5 * (pair[1].1 - pair[0].1))
+                })
+                .collect();
+            let found = at(&rows, &values(Gain::Eliminated, &[]), &noise);
+            let (objective, _) = dense(&rows, &noise, &kicks, None);
             assert!((found.objective - objective).abs() < 1e-7);
         }
     }

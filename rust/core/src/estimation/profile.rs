@@ -13,6 +13,10 @@ const TOLERANCE: f64 = 2e-3;
 /// Accuracy of −2 ln L where a quantity is held.
 const RISE_TOLERANCE: f64 = 1e-3;
 
+/// A lag of at most so many times the shortest is none; a second search starts at this one, in rows.
+const AT_LEAST: f64 = 2.0;
+const SECOND_LAG: f64 = 1.5;
+
 /// Most refinements of an end.
 const REFINEMENTS: usize = 12;
 
@@ -79,12 +83,25 @@ impl Model {
                 "lag {i} of {lags}: give the number of one of them, from zero"
             );
         }
-        self.fit(
-            &quantity.held(&near.point, value, self),
-            Some(quantity),
-            RISE_TOLERANCE,
-            task,
-        )
+        let start = quantity.held(&near.point, value, self);
+        let fit = |start: &Point| self.fit(start, Some(quantity), RISE_TOLERANCE, task);
+        let found = fit(&start)?;
+        // A search does not come back from a lag of zero.
+        let least = AT_LEAST * SHORTEST_LAG * self.row_time;
+        let vanished = |(i, lag): &(usize, &f64)| {
+            self.free.lags[*i] && quantity != Quantity::Lag(*i) && lag.abs() <= least
+        };
+        let Some((i, _)) = found.point.lags.iter().enumerate().find(vanished) else {
+            return Ok(found);
+        };
+        let mut start = found.point.clone();
+        start.lags[i] = (SECOND_LAG * self.row_time).copysign(start.lags[i]);
+        let second = fit(&start)?;
+        Ok(if second.objective < found.objective {
+            second
+        } else {
+            found
+        })
     }
 
     /// The end of the interval of a quantity: where −2 ln L has risen by `rise`.
@@ -186,6 +203,8 @@ mod tests {
         air: 0.0,
         sensor_time: 1.0,
         sensor: 0.0,
+        stamps: 0.0,
+        arrivals: 0.0,
     };
 
     /// The fit of an integrator behind 0.31 s and these lags, which are free.

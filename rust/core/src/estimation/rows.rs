@@ -26,6 +26,9 @@ pub struct Rows {
     pub output: Vec<f64>,
     /// Rows that are not used have no part in the likelihood.
     pub used: Vec<bool>,
+    /// Slope of the response of the plant of unit gain at each row, by which a scatter of its time
+    /// counts; may be empty.
+    pub speed: Vec<f64>,
     /// The commands.
     pub commands: Commands,
     /// Is the output at the start unknown?
@@ -48,6 +51,14 @@ impl Rows {
             self.output.len(),
             self.used.len()
         );
+        refuse_if!(
+            !self.speed.is_empty() && self.speed.len() != n,
+            "{n} times and {} speeds: give a speed for each row, or none",
+            self.speed.len()
+        );
+        if let Some(speed) = self.speed.iter().find(|speed| !speed.is_finite()) {
+            refuse!("the speed of a row is {speed}: give finite numbers");
+        }
         let commands = &self.commands;
         refuse_if!(
             commands.time.is_empty() || commands.time.len() != commands.value.len(),

@@ -112,6 +112,7 @@ pub(super) fn recording(count: usize) -> Rows {
         .collect();
     Rows {
         output: vec![0.0; count],
+        speed: Vec::new(),
         used: vec![true; count],
         commands: Commands {
             time: time.clone(),

@@ -46,7 +46,11 @@ pub fn whiten(
     // Without any state the noise is white.
     if !joint.c.is_empty() {
         let used = crate::memory::filled("marks of use", true, time.len())?;
-        whiten_in_place(time, &used, &mut columns, &joint, &[], task)?;
+        let known = Known {
+            used: &used,
+            variances: &[],
+        };
+        whiten_in_place(time, known, &mut columns, &joint, &[], task)?;
     }
     Ok(columns)
 }
@@ -59,13 +63,22 @@ pub(super) struct Kick {
     pub(super) state: Vec<f64>,
 }
 
+/// What is known of each row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known<'a> {
+    /// Rows that are not used have no part.
+    pub(super) used: &'a [bool],
+    /// Variance of the white noise; empty where it is one.
+    pub(super) variances: &'a [f64],
+}
+
 /// Columns that are whitened together.
 const LANES: usize = 8;
 
 /// Whiten the columns in place; rows that are not `used` become zero. Returns ln det V.
 pub(super) fn whiten_in_place(
     time: &[f64],
-    used: &[bool],
+    known: Known<'_>,
     columns: &mut [f64],
     joint: &Joint,
     kicks: &[Kick],
@@ -74,14 +87,15 @@ pub(super) fn whiten_in_place(
     let mut log_det = 0.0;
     for group in columns.chunks_mut(LANES * time.len()) {
         log_det = match joint.c.len() {
-            1 => pass::<1>(time, used, group, joint, kicks, task)?,
-            2 => pass::<2>(time, used, group, joint, kicks, task)?,
-            3 => pass::<3>(time, used, group, joint, kicks, task)?,
-            4 => pass::<4>(time, used, group, joint, kicks, task)?,
-            5 => pass::<5>(time, used, group, joint, kicks, task)?,
-            6 => pass::<6>(time, used, group, joint, kicks, task)?,
-            7 => pass::<7>(time, used, group, joint, kicks, task)?,
-            8 => pass::<8>(time, used, group, joint, kicks, task)?,
+            0 => pass::<0>(time, known, group, joint, kicks, task)?,
+            1 => pass::<1>(time, known, group, joint, kicks, task)?,
+            2 => pass::<2>(time, known, group, joint, kicks, task)?,
+            3 => pass::<3>(time, known, group, joint, kicks, task)?,
+            4 => pass::<4>(time, known, group, joint, kicks, task)?,
+            5 => pass::<5>(time, known, group, joint, kicks, task)?,
+            6 => pass::<6>(time, known, group, joint, kicks, task)?,
+            7 => pass::<7>(time, known, group, joint, kicks, task)?,
+            8 => pass::<8>(time, known, group, joint, kicks, task)?,
             n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
         };
     }
@@ -105,7 +119,7 @@ fn has_converged<const N: usize>(p: &Square<N>, before: &Square<N>) -> bool {
 /// One pass over up to `LANES` columns with N states.
 fn pass<const N: usize>(
     time: &[f64],
-    used: &[bool],
+    known: Known<'_>,
     columns: &mut [f64],
     joint: &Joint,
     kicks: &[Kick],
@@ -139,7 +153,7 @@ fn pass<const N: usize>(
                 by_step = Propagation::new(&a, &noise, between);
                 (step, steady, before) = (between, false, None);
             }
-            if !used[row] || kicks.peek().is_some_and(|kick| kick.row <= row) {
+            if !known.used[row] || kicks.peek().is_some_and(|kick| kick.row <= row) {
                 (steady, before) = (false, None);
             }
             if !steady {
@@ -162,17 +176,19 @@ fn pass<const N: usize>(
             }
             states = moved;
         }
-        if !used[row] {
+        if !known.used[row] {
             for column in 0..count {
                 columns[column * rows + row] = 0.0;
             }
             continue;
         }
+        let white = known.variances.get(row).copied().unwrap_or(1.0);
         if !steady {
-            steady = before.is_some_and(|before| has_converged(&p, &before));
+            steady = known.variances.is_empty()
+                && before.is_some_and(|before| has_converged(&p, &before));
             before = Some(p);
             let pc: [f64; N] = std::array::from_fn(|i| dot(&p[i], &c));
-            let variance = 1.0 + dot(&pc, &c);
+            let variance = white + dot(&pc, &c);
             (factor, log_variance) = (1.0 / variance.sqrt(), variance.ln());
             gain = pc.map(|pc| pc / variance);
             for (p, left) in p.iter_mut().zip(&pc) {
@@ -252,7 +268,11 @@ mod tests {
         let (rows, count) = (time.len(), 11);
         let columns: Vec<Vec<f64>> = (0..count).map(|j| gaussian(j + 1, rows)).collect();
         let mut flat = columns.concat();
-        let found = whiten_in_place(time, used, &mut flat, joint, kicks, &Task::new()).unwrap();
+        let known = Known {
+            used,
+            variances: &[],
+        };
+        let found = whiten_in_place(time, known, &mut flat, joint, kicks, &Task::new()).unwrap();
         let only = |x: &[f64]| -> Vec<f64> {
             x.iter()
                 .zip(used)
@@ -371,7 +391,10 @@ mod tests {
         let mut column = gaussian(1, 3000);
         let found = whiten_in_place(
             &time,
-            &[true; 3000],
+            Known {
+                used: &[true; 3000],
+                variances: &[],
+            },
             &mut column,
             &joint(&[1.0, 0.0], &[weak]),
             &[],
@@ -414,7 +437,10 @@ mod tests {
         column[0] = 1.0;
         whiten_in_place(
             &even(5000),
-            &[true; 5000],
+            Known {
+                used: &[true; 5000],
+                variances: &[],
+            },
             &mut column,
             &joint,
             &[],
@@ -447,7 +473,10 @@ mod tests {
         let joint = joint(&[1.0; 9], &[AIR]);
         let found = whiten_in_place(
             &[0.0, 1.0],
-            &[true; 2],
+            Known {
+                used: &[true; 2],
+                variances: &[],
+            },
             &mut [1.0, 2.0],
             &joint,
             &[],
