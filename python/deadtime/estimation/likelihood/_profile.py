@@ -205,8 +205,9 @@ def _common(inverse: Array, linear: int, fit: NoiseFit) -> Array:
 def unseen_air(fit: NoiseFit, weights: Mapping[str, Array]) -> dict[str, float]:
     """Mean variance of each quantity over slow air, weighted by its likelihood, over that without.
 
-    An estimate of no air does not mean that there is none. All deviations of the air are as likely
-    beforehand.
+    An estimate of no air does not mean that there is none. The prior density of its deviation falls
+    with the square root of it: with a constant one intervals cover too much without air, with one
+    that falls with the deviation too little in the weakest air.
     """
     none = dict.fromkeys(weights, 1.0)
     if not fit.model.integrates or any(one.air > 0.0 for one in fit.numbers.noise):
@@ -222,7 +223,7 @@ def unseen_air(fit: NoiseFit, weights: Mapping[str, Array]) -> dict[str, float]:
         ]
         moved = fit.moved(with_noise(fit.numbers, noise))
         rise = sum(part.objective for part in moved.parts) - middle
-        weight = step * math.exp(-0.5 * max(rise, -1.0))
+        weight = math.sqrt(step) * math.exp(-0.5 * max(rise, -1.0))
         cov = common_covariance(moved)
         total += weight
         for name, w in weights.items():
@@ -270,6 +271,9 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
             both = at({i: h, j: h})[0]
             mixed = both - single[i][0][0] - single[j][0][0] + middle
             hessian[i, j] = hessian[j, i] = mixed / h**2
+    if not np.all(np.isfinite(hessian)):
+        # At some noise near by one unknown cannot be told from others.
+        return dict.fromkeys(weights, LEAST_FREEDOM)
     values, vectors = np.linalg.eigh(0.5 * hessian)
     spread = (vectors / np.maximum(values, LEAST_CURVATURE)) @ vectors.T
     return {
