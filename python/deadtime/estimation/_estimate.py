@@ -91,9 +91,10 @@ def estimate_delay(
           MATLAB's `delayest` does.
     free : sequence of str
         What is fitted, any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``, as the
-        plant has them, and ``"rate"`` and ``"rate_of_rate"`` of a `RateLimited` plant;
-        ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than
-        that of the reference the clock of the output runs. ``"decrement"`` fits delay and gain;
+        plant has them, with `FactoredPlant` also ``"lag_1"`` and so on and ``"zero"``,
+        with `RateLimited` also ``"rate"`` and ``"rate_of_rate"``;
+        ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than that of the
+        reference the clock of the output runs. ``"decrement"`` fits delay and gain;
         ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and ``"arx_scan"``
         the delay alone, and take what else they need as given.
     window : (low, high) or list of them, optional

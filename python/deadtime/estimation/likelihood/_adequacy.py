@@ -86,15 +86,16 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
         )
     richer, p_value = further_lag(fit)
     further = richer.lags[-1]
+    total = richer.delay + sum(richer.lags) - richer.zero
     plain = len(reasons)
     if p_value < SIGNIFICANCE:
         reasons.append(
             f"a further lag of {further:.3g} s makes the recording likelier: the plant lacks it"
         )
-    elif p_value < MOVES and not _holds(profile, richer.delay + sum(richer.lags), level):
+    elif p_value < MOVES and not _holds(profile, total, level):
         reasons.append(
-            f"a further lag of {further:.3g} s would move delay and lag together to "
-            f"{richer.delay + sum(richer.lags):.3g} s, out of their interval"
+            f"a further lag of {further:.3g} s would move delay and lag together to {total:.3g} s, "
+            "out of their interval"
         )
     lacks_lag = len(reasons) > plain
     for index, part in enumerate(fit.parts):
@@ -148,7 +149,7 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
     name = f"lag {len(fit.model.free_lags)}"
     one = fit.numbers
     without = likelihood.held(
-        PlantNumbers(one.delay, [*one.lags, NONE * between], one.noise, fit.gain),
+        PlantNumbers(one.delay, [*one.lags, NONE * between], one.noise, fit.gain, one.zero),
         name,
         NONE * between,
     )
@@ -159,7 +160,11 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
     for noise in noises:
         for lag in FURTHER:
             moved = PlantNumbers(
-                max(one.delay - lag * between, 0.0), [*one.lags, lag * between], noise, fit.gain
+                max(one.delay - lag * between, 0.0),
+                [*one.lags, lag * between],
+                noise,
+                fit.gain,
+                one.zero,
             )
             best = min(best, likelihood.fit(moved, ROUGH), key=lambda found: found.objective)
     ratio = max(0.0, without.objective - best.objective)

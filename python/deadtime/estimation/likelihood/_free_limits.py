@@ -49,7 +49,7 @@ class FreeLimits:
     cov : ndarray, shape (k, k)
         Covariance of their logarithms.
     slopes : dict of str to ndarray, shape (k,)
-        Derivatives of gain, delay, lags and their sum by these logarithms.
+        Derivatives of gain, delay, lags, zero and the sum of times by these logarithms.
     """
 
     values: dict[str, float]
@@ -121,13 +121,14 @@ class LimitsProfile(LikelihoodProfile):
 
 
 def numbers_of(fit: NoiseFit) -> dict[str, float]:
-    """Gain, delay, lags and the sum of the times, by the names of an estimate."""
+    """Gain, delay, lags, zero and the sum of the times, by the names of an estimate."""
     one = fit.numbers
     lags = dict(zip(fit.model.lag_names, one.lags, strict=True))
     total = one.delay + sum(one.lags)
     return {
         "gain": fit.gain,
         "delay": one.delay,
+        "zero": one.zero,
         **lags,
         "delay+lag": total,
         "delay+time_constant": total,

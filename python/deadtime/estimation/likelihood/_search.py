@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.loops import FirstOrder, Integrator, Plant, RateLimited
+from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant, RateLimited
 
 Array = NDArray[np.float64]
 
@@ -27,8 +27,9 @@ LONGEST = 0.6
 #: Steps of the grid over the delay: in rows, and as a share of the delay; most rows for a grid.
 GRID_STEP, GRID_GROWTH, GRID_ROWS = 1.0, 0.1, 5000
 
-#: Lags of the grid, in rows.
-LAGS = (0.5, 3.0, 8.0)
+#: Lags of the grid, in rows, and how much shorter each further one is: equal lags have the same
+#: effect, so that a search does not move from them.
+LAGS, SHORTER = (0.5, 3.0, 8.0), 0.4
 
 #: Deviations of the air in the grid, and where it is added to a fit without: white deviations a
 #: row. Its time constant there, as a share of the window, and by how much slow air is slower.
@@ -75,6 +76,8 @@ class PlantModel:
         What is fitted.
     extra : int
         Further lags, not of the plant, that are tried.
+    zero : float
+        Time constant of the zero behind the lags, s.
     """
 
     num: tuple[float, ...]
@@ -83,6 +86,7 @@ class PlantModel:
     lags: tuple[float, ...]
     names: tuple[str, ...]
     extra: int = 0
+    zero: float = 0.0
 
     @classmethod
     def of(cls, plant: Plant, names: tuple[str, ...]) -> PlantModel:
@@ -94,6 +98,11 @@ class PlantModel:
             return cls((1.0,), (1.0, 0.0), used, (plant.lag,)[: len(used)], names)
         if isinstance(plant, FirstOrder):
             return cls((1.0,), (1.0,), ("time_constant",), (plant.time_constant,), names)
+        if isinstance(plant, FactoredPlant):
+            lags = {name: lag for name, lag in plant.parameters.items() if name.startswith("lag")}
+            lags = {name: lag for name, lag in lags.items() if lag or name in names}
+            rest = (1.0, 0.0) if plant.integrator else (1.0,)
+            return cls((1.0,), rest, tuple(lags), tuple(lags.values()), names, zero=plant.zero)
         num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
         return cls(tuple(map(float, num)), tuple(map(float, den)), (), (), names)
 
@@ -101,6 +110,13 @@ class PlantModel:
     def free_lags(self) -> list[bool]:
         """Which of the lags are fitted."""
         return [name in self.names for name in self.lag_names] + [True] * self.extra
+
+    @property
+    def order(self) -> list[tuple[str, str]]:
+        """Names of what is fitted, ours and those of the kernel, in the order of the kernel."""
+        lags = ((name, f"lag {i}") for i, name in enumerate(self.lag_names))
+        known = (("gain", "gain"), ("delay", "delay"), *lags, ("zero", "zero"))
+        return [pair for pair in known if pair[0] in self.names]
 
     @property
     def integrates(self) -> bool:
@@ -117,7 +133,7 @@ class PlantModel:
             delay="delay" in self.names,
             gain="gain" in self.names,
             lags=self.free_lags,
-            zero=False,
+            zero="zero" in self.names,
             longest=longest,
         )
 
@@ -176,7 +192,7 @@ class NoiseFit:
 
 def with_noise(numbers: PlantNumbers, noise: Sequence[RowNoise]) -> PlantNumbers:
     """The same plant under other noise."""
-    return PlantNumbers(numbers.delay, numbers.lags, noise, numbers.gain)
+    return PlantNumbers(numbers.delay, numbers.lags, noise, numbers.gain, numbers.zero)
 
 
 def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers) -> NoiseFit:
@@ -296,12 +312,14 @@ def _grid(
     for noise in noises:
         minima: list[PlantNumbers] = []
         for lags in _grid_lags(model, between):
-            points = [PlantNumbers(delay, lags, noise, first.gain) for delay in delays]
+            points = [PlantNumbers(delay, lags, noise, first.gain, first.zero) for delay in delays]
             values = np.array([likelihood.objective(point) for point in points])
             padded = np.r_[np.inf, values, np.inf]
             places = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))
             minima += [
-                PlantNumbers(delays[i], lags, noise, first.gain, objective=float(values[i]))
+                PlantNumbers(
+                    delays[i], lags, noise, first.gain, first.zero, objective=float(values[i])
+                )
                 for i in places
             ]
         starts.append(sorted(minima, key=_objective)[:REFINED])
@@ -314,10 +332,11 @@ def _grid_lags(model: PlantModel, between: float) -> list[list[float]]:
         return [list(model.lags)]
     signs = [*np.sign(model.lags), *[1.0] * model.extra]
     known = [*model.lags, *[0.0] * model.extra]
+    place = np.cumsum(free) - 1
     return [
         [
-            float((sign or 1.0) * lag * between) if is_free else value
-            for is_free, sign, value in zip(free, signs, known, strict=True)
+            float((sign or 1.0) * lag * between * SHORTER**i) if is_free else value
+            for is_free, sign, value, i in zip(free, signs, known, place, strict=True)
         ]
         for lag in LAGS
     ]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import check_moves, checked_names
+from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, check_moves, checked_names
 from deadtime.estimation.data._simulated import (
     commands_over_samples,
     known_commands,
@@ -148,8 +148,11 @@ def _estimated(
     initial_output: float | None,
     computed: bool,
 ) -> DelayEstimate:
-    names = checked_names(free, runs[0].loop)
-    models = [_model(run, names, initial_output, computed) for run in runs]
+    known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *runs[0].loop.plant.parameters]))
+    names = checked_names(free, runs[0].loop, known)
+    # Least squares begins with these; the likelihood searches the numbers of other plants itself.
+    searched = tuple(name for name in names if name in VEHICLE_PARAMETERS)
+    models = [_model(run, searched, initial_output, computed) for run in runs]
     model, found = solve_jointly(models)
     found = without_vanishing(model, found)
     sources = {one.source for one in models}
@@ -165,7 +168,7 @@ def _estimated(
     fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
 
     def plain() -> DelayEstimate:
-        start = found.point[len(names) :] if initial_output is None else [initial_output]
+        start = found.point[len(searched) :] if initial_output is None else [initial_output]
         return concluded(
             method,
             model,
@@ -175,10 +178,11 @@ def _estimated(
             details={**details, "initial_output": float(start[0])},
         )
 
-    if is_exact(model, found, fitted):
+    if searched == names and is_exact(model, found, fitted):
         return plain()
-    first = {**models[0].known, **dict(zip(names, found.point.tolist(), strict=False))}
-    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
+    first = {**models[0].known, **dict(zip(searched, found.point.tolist(), strict=False))}
+    misfit = found.misfit if searched == names else np.zeros_like(found.misfit)
+    pieces = np.split(misfit, np.cumsum(model.sizes)[:-1])
     rows = [
         one.rows(initial_output, -piece / weight, run.check)
         for one, piece, weight, run in zip(models, pieces, model.weights, runs, strict=True)
@@ -212,7 +216,8 @@ def _estimated(
         check_fit(model, found, fitted)
     adequacy = adequacy_of(profile, len(names))
     adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
-    if adequacy.lacks_lag or (adequacy.reasons and explains_less(profile.fit, found, model)):
+    astray = adequacy.reasons and explains_less(profile.fit, found, model)
+    if searched == names and (adequacy.lacks_lag or astray):
         return without_the_plant(plain(), adequacy)
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output

@@ -70,7 +70,7 @@ pub struct Fit {
 
 /// A number that a search moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Slot {
+pub(super) enum Slot {
     Time,
     Lag(usize),
     Zero,
@@ -175,7 +175,7 @@ impl Model {
         self.part(run, point, None, Wanted::All, task)
     }
 
-    fn part(
+    pub(super) fn part(
         &self,
         run: usize,
         point: &Point,
@@ -251,7 +251,14 @@ impl Model {
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
         let mut kept: Vec<Option<(Point, f64)>> = vec![None; self.runs.len()];
-        let found = minimise(&variables, tolerance, |z| {
+        let metric = |z: &[f64], inverse: &mut [f64]| {
+            let mut at = start.clone();
+            for (slot, value) in slots.iter().zip(z) {
+                put(&mut at, *slot, *value);
+            }
+            self.scoring(&at, held, &slots, inverse, task)
+        };
+        let found = minimise(&variables, tolerance, metric, |z| {
             for (slot, value) in slots.iter().zip(z) {
                 put(&mut trial, *slot, *value);
             }
@@ -295,7 +302,7 @@ impl Model {
                 slots.push(Slot::Lag(i));
             }
         }
-        if self.free.zero {
+        if self.free.zero && held != Some(Quantity::Zero) {
             slots.push(Slot::Zero);
         }
         if self.free.gain && self.runs.len() > 1 && held != Some(Quantity::Gain) {
@@ -336,7 +343,12 @@ impl Model {
                 start: match start.timing {
                     Timing::Delay(time) | Timing::Total(time) => time,
                 },
-                low: 0.0,
+                // A zero may be longer than delay and lags.
+                low: if start.zero > 0.0 || self.free.zero {
+                    -self.longest
+                } else {
+                    0.0
+                },
                 high: self.longest,
                 step: TIME_STEP * row_time,
             },

@@ -21,6 +21,7 @@ mod point;
 mod profile;
 mod propagation;
 mod rows;
+mod scoring;
 mod search;
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Minimum of a function of a few variables within bounds, by a quasi-Newton method.
 //!
 //! The inverse Hessian is that of Broyden, Fletcher, Goldfarb and Shanno from a diagonal of
-//! difference quotients; variables at a bound that would leave it are held there (Bertsekas 1982).
+//! difference quotients, of which the caller may know more; variables at a bound that would leave it are held there (Bertsekas 1982).
 //! Gradients are central difference quotients, for which the function may have kinks in its second
 //! derivative.
 
@@ -19,10 +19,14 @@ const SUFFICIENT: f64 = 1e-4;
 /// Longest step of a variable, in its units of difference quotients.
 const LONGEST: f64 = 60.0;
 
+/// Largest change of the gradient over a step of difference quotients, times that step: where the
+/// function is steep, a long step sees its third derivative.
+const STEEPEST: f64 = 0.04;
+
 /// Smallest second derivative by the units of difference quotients.
 const FLATTEST: f64 = 1e-4;
 
-/// A variable: where it starts and may go, and the step of its difference quotients.
+/// A variable: where it starts and may go, and the longest step of its difference quotients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Variable {
     pub(super) start: f64,
@@ -39,9 +43,12 @@ pub(super) struct Minimum {
 }
 
 /// Search from the starting point until a step promises less than `tolerance`.
+///
+/// `metric` is given a point and the diagonal there, and puts in what it knows of the inverse Hessian.
 pub(super) fn minimise(
     variables: &[Variable],
     tolerance: f64,
+    metric: impl Fn(&[f64], &mut [f64]) -> Result<(), Error>,
     mut function: impl FnMut(&[f64]) -> Result<f64, Error>,
 ) -> Result<Minimum, Error> {
     let n = variables.len();
@@ -53,8 +60,13 @@ pub(super) fn minimise(
     if n == 0 {
         return Ok(Minimum { place: x, value });
     }
-    let (mut gradient, mut curvature) = derivatives(variables, &x, value, &mut function)?;
+    let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
+    let (mut gradient, mut curvature) = derivatives(variables, &steps, &x, value, &mut function)?;
+    if shorten(variables, &curvature, &mut steps) {
+        (gradient, curvature) = derivatives(variables, &steps, &x, value, &mut function)?;
+    }
     let mut inverse = diagonal(&curvature);
+    metric(&x, &mut inverse)?;
     let mut fresh = true;
     for _ in 0..ITERATIONS {
         let moving: Vec<bool> = (0..n)
@@ -70,6 +82,7 @@ pub(super) fn minimise(
                 break;
             }
             inverse = diagonal(&curvature);
+            metric(&x, &mut inverse)?;
             fresh = true;
             continue;
         }
@@ -92,21 +105,35 @@ pub(super) fn minimise(
                 break;
             }
             inverse = diagonal(&curvature);
+            metric(&x, &mut inverse)?;
             fresh = true;
             continue;
         };
-        let (slopes, bends) = derivatives(variables, &trial, found, &mut function)?;
+        let (slopes, bends) = derivatives(variables, &steps, &trial, found, &mut function)?;
         let change: Vec<f64> = slopes.iter().zip(&gradient).map(|(a, b)| a - b).collect();
         update(&mut inverse, &moved, &change);
         fresh = false;
         (x, value, gradient, curvature) = (trial, found, slopes, bends);
+        shorten(variables, &curvature, &mut steps);
     }
     Ok(Minimum { place: x, value })
+}
+
+/// Fit the steps of difference quotients to these second derivatives; is one much shorter?
+fn shorten(variables: &[Variable], curvature: &[f64], steps: &mut [f64]) -> bool {
+    let mut is_shorter = false;
+    for ((variable, bend), step) in variables.iter().zip(curvature).zip(steps) {
+        let before = *step;
+        *step = variable.step.min((STEEPEST / bend).sqrt());
+        is_shorter |= *step < 0.5 * before;
+    }
+    is_shorter
 }
 
 /// Gradient and second derivatives by difference quotients, one-sided at a bound.
 fn derivatives(
     variables: &[Variable],
+    steps: &[f64],
     x: &[f64],
     value: f64,
     function: &mut impl FnMut(&[f64]) -> Result<f64, Error>,
@@ -114,11 +141,11 @@ fn derivatives(
     let mut gradient = Vec::with_capacity(x.len());
     let mut curvature = Vec::with_capacity(x.len());
     let mut at = x.to_vec();
-    for (i, variable) in variables.iter().enumerate() {
+    for (i, (variable, step)) in variables.iter().zip(steps).enumerate() {
         let flattest = FLATTEST / (variable.step * variable.step);
         let (up, down) = (
-            variable.step.min(variable.high - x[i]),
-            variable.step.min(x[i] - variable.low),
+            step.min(variable.high - x[i]),
+            step.min(x[i] - variable.low),
         );
         at[i] = x[i] + up;
         let higher = if up > 0.0 { function(&at)? } else { value };
@@ -137,7 +164,7 @@ fn derivatives(
             };
             let slope = (far - value) / distance;
             gradient.push(if slope.is_finite() { slope } else { 0.0 });
-            curvature.push((slope.abs() / variable.step).max(flattest));
+            curvature.push((slope.abs() / step).max(flattest));
         }
     }
     Ok((gradient, curvature))
@@ -213,7 +240,7 @@ mod tests {
     fn a_curved_valley_is_followed_to_its_minimum() {
         let rosenbrock = |x: &[f64]| Ok((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
         let around = [variable(-0.5, -9.0, 9.0), variable(0.5, -9.0, 9.0)];
-        let found = minimise(&around, 1e-12, rosenbrock);
+        let found = minimise(&around, 1e-12, |_, _| Ok(()), rosenbrock);
         assert!(found.is_ok_and(|found| (found.place[0] - 1.0).abs() < 1e-3 && found.value < 1e-6));
     }
 
@@ -223,6 +250,7 @@ mod tests {
         let found = minimise(
             &[variable(1.0, 0.0, 9.0), variable(1.5, -9.0, 9.0)],
             1e-12,
+            |_, _| Ok(()),
             bowl,
         );
         assert!(
