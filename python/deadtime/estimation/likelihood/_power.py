@@ -8,7 +8,6 @@ likelihood ratio is about normal around δ (Wald 1943).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -37,7 +36,7 @@ EVALUATIONS, ENOUGH = 12, 0.01
 def unseen_lag(fit: NoiseFit) -> float:
     """Below this further lag, s, the test for one finds it in less than 90 % of such recordings.
 
-    The longest lag of the search where none would be found, or where that cannot be computed.
+    The longest lag of the search where none would be found.
     """
     from scipy import special
 
@@ -52,12 +51,9 @@ def unseen_lag(fit: NoiseFit) -> float:
     def seen(lag: float) -> float:
         delay = max(0.0, one.delay - lag) if may_move else one.delay
         with_lag = PlantNumbers(delay, [*one.lags, lag], one.noise, fit.gain, one.zero)
-        found = [richer.at(i, with_lag).residuals for i in range(len(fit.runs))]
-        if not all(np.all(np.isfinite(residuals)) for residuals in found):
-            return math.nan
         means = [
-            run._replace(output=run.output - residuals)
-            for run, residuals in zip(fit.runs, found, strict=True)
+            run._replace(output=run.output - richer.at(i, with_lag).residuals)
+            for i, run in enumerate(fit.runs)
         ]
         return _left(fit, fit.model.likelihood(means, fit.trim), STEP * between)
 
@@ -65,8 +61,6 @@ def unseen_lag(fit: NoiseFit) -> float:
     lag, order = FIRST * between, 2.0
     for _ in range(EVALUATIONS):
         found = seen(lag)
-        if math.isnan(found):
-            return longest
         if abs(found - wanted) <= ENOUGH * wanted:
             break
         low, high = (lag, high) if found < wanted else (low, lag)
