@@ -7,6 +7,8 @@ from command_line import found, one_clear_line, run
 from deadtime._cli.plants import plant_from, with_names
 from vehicles import record_attitude
 
+TOLD = ("--kp", 1, "--sample-time", 0.02, "--command", "reference")
+
 
 @pytest.fixture(scope="module")
 def roll(tmp_path_factory):
@@ -21,12 +23,7 @@ def test_the_table_shows_the_evidence_and_the_estimate_follows(roll):
     result = run(
         "estimate",
         roll,
-        "--kp",
-        1,
-        "--sample-time",
-        0.02,
-        "--command",
-        "reference",
+        *TOLD,
         "--plant",
         "auto",
     )
@@ -47,12 +44,7 @@ def test_a_formula_with_two_lags_has_a_name_for_each(roll):
     out = found(
         "estimate",
         roll,
-        "--kp",
-        1,
-        "--sample-time",
-        0.02,
-        "--command",
-        "reference",
+        *TOLD,
         "--plant",
         "0.9/((0.1*s+1)*(0.2*s+1))",
         "--method",

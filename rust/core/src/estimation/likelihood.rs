@@ -12,6 +12,8 @@
 //! biased by the linear unknowns. The last term makes it independent of the scale of the columns,
 //! which changes with the lags. The variance of the white noise counts delay and lags as unknowns
 //! too.
+//!
+//! Half of the file is its tests, which compare with the same formula written with dense matrices.
 
 use super::disturbance::{Disturbance, Entry, Joint};
 use super::mean::{Derivatives, Gain, Mean, Values, sizes};
