@@ -19,6 +19,11 @@ Run ``python benches/estimation.py --reality [--runs N] [--rows NAME,NAME] [--fr
 [--json FILE] [--quick]`` for another table: estimates with the default method on recordings with
 air, lost rows, wrong clocks and other properties of real flights, from a generator that does not
 use the package (`reality`).
+
+Run ``python benches/estimation.py --firmware [--keep DIR | --read DIR] [--quick]`` to fly
+ArduPilot's Copter in its software-in-the-loop build, and to estimate on these flights
+(`reality.firmware`). The flights take 15 minutes at the speed of the clock; `--keep` keeps their
+recordings and `--read` estimates on them again.
 """
 
 from __future__ import annotations
@@ -40,6 +45,7 @@ import deadtime as dtm
 import numpy as np
 from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Waveform
 from deadtime.estimation._estimate import METHODS
+from reality import firmware
 from reality.table import chosen, free_of, print_table
 
 SAMPLE = 0.065
@@ -462,9 +468,16 @@ def main() -> None:
     reality.add_argument("--rows", default="", help="only the rows of these names")
     reality.add_argument("--free", help="fit in every row: delay,gain or delay,gain,lag")
     reality.add_argument("--json", type=Path, help="write the numbers of the rows to this file")
+    flown = parser.add_argument_group("flights against ArduPilot's Copter")
+    flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
+    flown.add_argument("--keep", type=Path, metavar="DIR", help="keep the recordings in a folder")
+    flown.add_argument("--read", type=Path, metavar="DIR", help="read the recordings, do not fly")
     given = parser.parse_args()
     # Each worker simulates its own runs; threads of NumPy's libraries would compete with them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if given.firmware:
+        firmware.run(given.read, given.keep, given.processes, given.quick)
+        return
     if given.reality:
         runs = given.runs or (2 if given.quick else 1000)
         try:

@@ -53,6 +53,7 @@ fn recorded(count: usize) -> Result<Rows, Error> {
     let time: Vec<f64> = (0..count).map(|row| ROW * row as f64).collect();
     Rows {
         output,
+        speed: Vec::new(),
         used: vec![true; count],
         commands: Commands {
             value: (0..count).map(|row| command(row * FINE)).collect(),
@@ -93,6 +94,8 @@ fn point(lag: bool, air: bool) -> Point {
             air: if air { 2.0 } else { 0.0 },
             sensor_time: 1.0,
             sensor: 0.0,
+            stamps: 0.0,
+            arrivals: 0.0,
         }],
     }
 }

@@ -35,9 +35,11 @@ if TYPE_CHECKING:
         PV,
         ControlLoop,
         DerivativeFilter,
+        FactoredPlant,
         FirstOrder,
         Integrator,
         P,
+        RateLimited,
         RationalPlant,
         kit_plant,
         simulate_fixed_step,
@@ -76,8 +78,8 @@ _ROOMS = {
     "roots": "QuasiPolynomial crossings dde_roots delay delay_margin parameters s",
     "systems": "DelaySystem TransferFunction feedback",
     "loops": (
-        "ControlLoop DerivativeFilter FirstOrder Integrator P PD PI PID PV RationalPlant kit_plant "
-        "simulate_fixed_step sweep"
+        "ControlLoop DerivativeFilter FactoredPlant FirstOrder Integrator P PD PI PID PV "
+        "RateLimited RationalPlant kit_plant simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
     "recordings": "Recording read_recording",
@@ -110,6 +112,7 @@ __all__ = [
     "DelaySystem",
     "DerivativeFilter",
     "Experiment",
+    "FactoredPlant",
     "FirstOrder",
     "FlightAbortedError",
     "Integrator",
@@ -119,6 +122,7 @@ __all__ = [
     "P",
     "PacketError",
     "QuasiPolynomial",
+    "RateLimited",
     "RationalPlant",
     "Recording",
     "RecordingError",

@@ -362,6 +362,9 @@ class LinearLoop:
     def poles(self) -> _Complexes: ...
 
 def on_samples(since: _Reals, start: float, sample_time: float, sample_phase: float) -> _Reals: ...
+def rate_limited(
+    time: _Reals, command: _Reals, rate: float, rate_of_rate: float, parts: int
+) -> tuple[_Reals, _Reals]: ...
 
 class _SampledLoops(Protocol):
     @property

@@ -360,8 +360,8 @@ def test_link_delay_and_vehicle_lag_are_estimated_from_reported_setpoint_and_cli
         speed += 1e-4 * (0.8 * value - speed) / 0.15
     climb = np.interp(time, fine, speeds) + random.normal(0.0, 0.01, time.size)
     split = split_delay([telemetry_of((time, setpoint, climb, climb), command_time, command)])
-    # The setpoint is seen in the first message after its change: half of 5 ms later on average.
-    assert split.transport.delay == pytest.approx(0.1234 + 0.0025, abs=0.002)
+    # The setpoint is seen in the first message after its change, by up to 5 ms later.
+    assert 0.1234 <= split.transport.delay <= 0.1284
     assert split.transport.gain == pytest.approx(1.0, abs=0.01)
     assert split.vehicle_delay == pytest.approx(0.15, abs=0.01)
     assert split.vehicle.gain == pytest.approx(0.8, abs=0.01)

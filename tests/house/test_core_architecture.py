@@ -54,7 +54,7 @@ ORDER = {
         "crossings",
         "ranges",
     ],
-    "dde": ["scalar", "limits", "propagator", "control_loop", "system", "spectral"],
+    "dde": ["scalar", "limits", "rate_limits", "propagator", "control_loop", "system", "spectral"],
     "estimation": [
         "plant",
         "disturbance",

@@ -30,6 +30,10 @@ def designed():
     return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
 
 
+def estimated():
+    return dtm.estimate_delay(*record_step(rest=1.0, noise=0.01), free=("delay",))
+
+
 def planned(**more):
     return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
 
@@ -59,6 +63,7 @@ MADE = {
     "FittedRun": lambda: dtm.estimate_delay(
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ).runs[0],
+    "FactoredPlant": lambda: dtm.FactoredPlant([0.2, 0.1], zero=0.05),
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
@@ -72,9 +77,13 @@ MADE = {
     "Parameter": lambda: Kp,
     "ParametricQuasiPolynomial": lambda: FAMILY,
     "PlannedBound": lambda: planned().bound,
+    "PlantChoice": lambda: dtm.estimation.PlantChoice(
+        {"1 lag": estimated()}, {"1 lag": 0.0}, {}, "1 lag"
+    ),
     "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
     "QuasiPolynomial": lambda: h,
     "PlantWithDelays": lambda: dtm.loops.PlantWithDelays(1.0 / (dtm.s + dtm.delay(1.0))),
+    "RateLimited": lambda: dtm.RateLimited(dtm.Integrator(), rate=1.0, rate_of_rate=5.0),
     "RationalPlant": lambda: dtm.RationalPlant([1.0], [1.0, 1.0]),
     "Recording": lambda: dtm.Recording(
         np.arange(9.0), np.zeros(9), np.zeros(9), units={"output": "m"}

@@ -67,6 +67,8 @@ def test_metrics_of_a_response_have_sensible_bounds(bad):
 def test_polynomials_are_sequences(num):
     with pytest.raises(TypeError, match="num="):
         dtm.RationalPlant(num, [1.0, 1.0])
+    with pytest.raises(TypeError, match="lags="):
+        dtm.FactoredPlant(num)
 
 
 @pytest.mark.parametrize("name", ["", "a b", "s", "lambda", 3])

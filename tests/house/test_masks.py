@@ -47,6 +47,7 @@ TAKERS = {
     "ControlLoop command_history": lambda x: SAMPLED.simulate(TIME, command_history=x),
     "ControlLoop frequency_response": lambda x: LOOP.frequency_response(x),
     "ControlLoop bode": lambda x: LOOP.bode(x),
+    "FactoredPlant": lambda x: dtm.FactoredPlant(x),
     "RationalPlant": lambda x: dtm.RationalPlant(x, [1.0, *np.ones(x.size)]),
     "stability_map": lambda x: dtm.stability_map(FAMILY, FLAT | {"Kp": x}, shape=(9, 3)),
     "stability_map of a loop": lambda x: dtm.stability_map(SAMPLED, {"Kp": x, "gain": (0.5, 1)}),

@@ -1,4 +1,4 @@
-"""The table of several estimates of one delay."""
+"""The tables of several estimates of one delay."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Literal
 
 from rich.table import Table
 
-from deadtime.estimation import Comparison
+from deadtime.estimation import Comparison, PlantChoice
+from deadtime.estimation._choose import COLUMNS as PLANT_COLUMNS
 from deadtime.estimation._compare import COLUMNS, truth_row
 
 
@@ -23,4 +24,14 @@ def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = 
     if truth is not None:
         table.add_section()
         table.add_row(*truth_row(truth), style="bold")
+    return table
+
+
+def choice_table(choice: PlantChoice) -> Table:
+    """The plants that were tried, the likeliest first."""
+    table = Table(title="Plants", title_justify="left", box=None, padding=(0, 1, 0, 0))
+    for index, head in enumerate(PLANT_COLUMNS):
+        table.add_column(head, justify="right" if index else "left", no_wrap=True)
+    for row in choice.rows():
+        table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))
     return table

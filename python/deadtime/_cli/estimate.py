@@ -12,13 +12,21 @@ import typer
 from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.checks import grave_findings, print_grave_findings, show_checks
-from deadtime._cli.comparisons import estimates_table
+from deadtime._cli.comparisons import choice_table, estimates_table
 from deadtime._cli.fits import print_details, print_headline
 from deadtime._cli.free import check_fitted, checked_free
 from deadtime._cli.plants import with_names
 from deadtime._cli.show import print_json, print_points, print_table, print_text, save_figure
 from deadtime._cli.windows import files_and_windows
-from deadtime.estimation import Comparison, Method, compare_methods, estimate_delay
+from deadtime.estimation import (
+    Comparison,
+    DelayEstimate,
+    Method,
+    PlantChoice,
+    choose_plant,
+    compare_methods,
+    estimate_delay,
+)
 from deadtime.estimation._estimate import JOINT, METHODS, automatic_method
 from deadtime.estimation._plots import estimate_axes, plot_estimate, plot_fits
 from deadtime.estimation.methods._overshoot import OvershootMap
@@ -26,6 +34,9 @@ from deadtime.estimation.methods._waveform import NoisePath
 from deadtime.recordings import read_recording
 
 Each = TypeVar("Each")
+
+#: What the number of lags is chosen for, and a plant that integrates or does not likewise.
+AUTOMATIC = {"auto": "1/(s+1)", "auto/s": "1/s"}
 
 CHOICES = ("all", "auto", *METHODS)
 
@@ -62,7 +73,14 @@ def command(
     command: opt.Command = None,
     sample_time: opt.Sample_time = None,
     limit: opt.Limit = None,
-    plant: opt.Plant = None,
+    plant: Annotated[
+        str | None,
+        typer.Option(
+            help="Plant in place of the integrator, such as '0.9/(s*(0.1*s+1))'; delay(T) in it is "
+            "a delay of T s, added to that of the loop. auto/s: an integrator with as many lags as "
+            "the recording shows; auto: the same without an integrator."
+        ),
+    ] = None,
     gain: opt.Gain = 1.0,
     window: opt.Window = None,
     method: Annotated[
@@ -76,8 +94,8 @@ def command(
         str | None,
         typer.Option(
             help="What is fitted, for one method: of delay, gain, lag of an integrator, "
-            "time_constant of a first-order plant; for waveform also limit and start. Without: "
-            "delay,gain.",
+            "time_constant of a first-order plant, lag_1, lag_2, … and zero of one of more real "
+            "poles; for waveform also limit and start. Without: delay,gain.",
             show_default=False,
         ),
     ] = None,
@@ -109,6 +127,8 @@ def command(
     files, windows = files_and_windows(files, window)
     given = {"map": map, "noise": noise, "initial_output": initial_output}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if plant in AUTOMATIC and method is None:
+        method = "auto"
     name = _chosen(method, len(files), options)
     if filter is not None and kv is None and kd is None:
         raise ValueError("--filter is for the derivative: give --kv or --kd, or leave it out")
@@ -129,7 +149,7 @@ def command(
             sample_time=sample_time,
             limit=limit,
             corner=filter,
-            plant=plant,
+            plant=AUTOMATIC.get(plant or "", plant),
         )
         for Kp, Kv, Ki, Kd in gains
     ]
@@ -148,6 +168,15 @@ def command(
         show_checks(files, checks, as_json)
         raise typer.Exit(1 if any(one.refused for one in checks) else 0)
     findings = grave_findings(files, checks)
+    if plant in AUTOMATIC:
+        if free is not None or name == "all":
+            raise ValueError(
+                f"--plant {plant} fits every number of a plant by one method: leave out --free, "
+                "and name --method output_error or waveform, or auto"
+            )
+        choice = choose_plant(flights, loops, method=_with_options(name, options), window=windows)
+        _show_choice(choice, findings, plot, as_json)
+        return
     if name == "all":
         if free is not None:
             raise ValueError("--free is for one method: name it by --method")
@@ -163,9 +192,7 @@ def command(
     if free is not None:
         check_fitted(fitted, fit)
     if plot is not None:
-        figure = empty_figure(7.0 + 3.5 * len(fit.runs), 4.6)
-        plot_estimate(fit, estimate_axes(fit, figure))
-        save_figure(figure, plot)
+        _draw(fit, plot)
     if as_json:
         print_json(fit.to_dict() | {"findings": findings})
     else:
@@ -208,6 +235,27 @@ def _with_options(name: str, options: dict[str, Any]) -> Method:
         if option not in known:
             raise ValueError(f"--{option.replace('_', '-')} is not an option of --method {name}")
     return METHODS[name](**options)
+
+
+def _show_choice(
+    choice: PlantChoice, findings: list[dict[str, Any]], plot: Path | None, as_json: bool
+) -> None:
+    if plot is not None:
+        _draw(choice.best, plot)
+    if as_json:
+        print_json(choice.to_dict() | {"findings": findings})
+        return
+    print_headline(choice.best)
+    print_grave_findings(findings)
+    print_table(choice_table(choice))
+    print_points(choice.remarks())
+    print_details(choice.best)
+
+
+def _draw(fit: DelayEstimate, plot: Path) -> None:
+    figure = empty_figure(7.0 + 3.5 * len(fit.runs), 4.6)
+    plot_estimate(fit, estimate_axes(fit, figure))
+    save_figure(figure, plot)
 
 
 def _show_all(

@@ -28,7 +28,10 @@ def print_headline(fit: DelayEstimate) -> None:
         text += ", without an interval"
     print_text(f"{text} ({fit.method})", "bold")
     if fit.adequate:
-        print_text("The model is adequate: no test of it fails at the 1 % level.")
+        text = "The model is adequate: no test of it fails at the 1 % level."
+        if "unseen_lag" in fit.details:
+            text += f" A further lag below {fit.details['unseen_lag']:.2g} s would not be seen."
+        print_text(text)
         return
     message = _as_option(fit.message)
     _, _, why = message.partition(_NOT_ADEQUATE)

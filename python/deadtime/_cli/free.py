@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from deadtime.estimation import DelayEstimate
-from deadtime.estimation.data._checks import VEHICLE_PARAMETERS
 from deadtime.loops import ControlLoop
 
 #: What only `waveform` fits.
@@ -20,7 +19,7 @@ def checked_free(text: str | None, loop: ControlLoop, method: str) -> tuple[str,
     if text is None:
         return ("delay", "gain")
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = [name for name in VEHICLE_PARAMETERS if name == "delay" or name in loop.parameters]
+    known = ["delay", *loop.plant.parameters]
     if method == "waveform":
         known += [name for name in OF_WAVEFORM if name != "limit" or loop.limit is not None]
     choice = f"choose from {', '.join(known)}"

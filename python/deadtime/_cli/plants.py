@@ -12,13 +12,19 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from deadtime.loops import FirstOrder, Integrator, Plant
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant
 from deadtime.roots import QuasiPolynomial, delay, s
 from deadtime.systems import TransferFunction
 
 #: Longest text, and highest power of an expression with s in it: they bound time and memory.
 _LONGEST = 500
 _HIGHEST = 30
+
+#: Imaginary part of a pole, as a share of the pole, up to which it is real.
+_REAL = 1e-4
 
 #: Characters that a message repeats.
 _SHOWN = 20
@@ -54,7 +60,7 @@ def plant_from(text: str) -> TransferFunction:
 
 
 def with_names(plant: Plant) -> Plant:
-    """An integrator with a lag or a first-order plant as such: its time is then a free parameter.
+    """A plant with real poles and at most one zero as such: its times are then free parameters.
 
     Any other plant is returned as it is.
     """
@@ -68,7 +74,21 @@ def with_names(plant: Plant) -> Plant:
             return Integrator(b / c)
         case [b], [a, c] if a * c > 0.0:
             return FirstOrder(b / c, time_constant=a / c)
-    return plant
+    return _factored(num, den) or plant
+
+
+def _factored(num: NDArray[np.float64], den: NDArray[np.float64]) -> FactoredPlant | None:
+    """The plant by its lags and its zero, if it has no others."""
+    integrator = bool(den[-1] == 0.0)
+    den = den[: den.size - integrator]
+    poles = np.roots(den)
+    # Rounding moves equal poles apart by the root of itself, into the plane for a pair.
+    is_real = np.all(np.abs(poles.imag) <= _REAL * np.abs(poles))
+    if den[-1] == 0.0 or num[-1] == 0.0 or num.size > 2 or not is_real or np.any(poles.real > 0.0):
+        return None
+    lags = sorted((-1.0 / poles.real).tolist(), reverse=True)
+    zero = float(num[0] / num[-1]) if num.size == 2 else 0.0
+    return FactoredPlant(lags, float(num[-1] / den[-1]), zero, integrator) if lags else None
 
 
 class _Reader:

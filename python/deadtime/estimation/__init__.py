@@ -1,10 +1,12 @@
 """Estimate the delay of a control loop from a recording, with a confidence interval.
 
-`_estimate` chooses and runs a method, `_compare` runs several, `_result` is what they return.
+`_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several plants,
+`_result` is what they return.
 `methods` holds one file a method, `data` what they read from a recording, `models` what they fit,
 `fit` least squares, profiles and residuals, `planning` the bounds of planned experiments.
 """
 
+from deadtime.estimation._choose import PlantChoice, choose_plant
 from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
@@ -46,9 +48,11 @@ __all__ = [
     "OutputError",
     "Overshoot",
     "PlannedBound",
+    "PlantChoice",
     "Relay",
     "Waveform",
     "Whiteness",
+    "choose_plant",
     "compare_methods",
     "damping_ratio",
     "estimate_delay",

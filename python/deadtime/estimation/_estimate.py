@@ -91,8 +91,10 @@ def estimate_delay(
           MATLAB's `delayest` does.
     free : sequence of str
         What is fitted, any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``, as the
-        plant has them; ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than
-        that of the reference the clock of the output runs. ``"decrement"`` fits delay and gain;
+        plant has them, with `FactoredPlant` also ``"lag_1"`` and so on and ``"zero"``,
+        with `RateLimited` also ``"rate"`` and ``"rate_of_rate"``;
+        ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than that of the
+        reference the clock of the output runs. ``"decrement"`` fits delay and gain;
         ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and ``"arx_scan"``
         the delay alone, and take what else they need as given.
     window : (low, high) or list of them, optional
@@ -163,6 +165,11 @@ def estimate_delay(
         raise ValueError(
             f"the {chosen.name} method takes one recording, not {len(runs)}: fit them together by "
             f"{' or '.join(map(repr, JOINT))}"
+        )
+    if not isinstance(chosen, OutputError) and not all(run.loop.plant.is_linear for run in runs):
+        raise ValueError(
+            f"the {chosen.name} method is for linear plants, and this one limits the rate of its "
+            "command: use method='output_error' on a recording with the logged command"
         )
     if chosen.joint:
         runs = [_sampled_as_seen(run) for run in runs]

@@ -16,7 +16,7 @@ from deadtime.estimation.fit._profile import Profile, floor_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, FactoredPlant, Integrator
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Quantities that are not times; a limit has the unit of the command.
-UNITLESS = ("gain", "limit")
+UNITLESS = ("gain", "limit", "rate", "rate_of_rate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class CramerRaoBound(ReadOnlyArrays):
     free : tuple of str
         The parameters that are taken as unknown; the bound depends on them.
     noise : FlightNoise
-        The noise it is for.
+        The noise it is for; in a joint fit that of the first recording.
     stderr : dict of str to float
         The bound for each free quantity, and for ``delay+lag`` where both are free.
     """
@@ -59,11 +59,14 @@ class FittedRun(ReadOnlyArrays):
         The recorded loop with the fitted parameters.
     residuals : ndarray, shape (n,)
         Recorded minus simulated output.
+    noise : FlightNoise or None
+        The noise that was fitted to this recording, where the method does that.
     """
 
     recording: Recording
     loop: ControlLoop
     residuals: Array
+    noise: FlightNoise | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,12 +103,15 @@ class DelayEstimate(ReadOnlyArrays):
     uncalibrated : str
         Why there is no interval; empty where there is one.
     details : dict
-        Further results of the method, such as the overshoot.
+        Further results of the method, such as the overshoot. Those of a likelihood have
+        ``"unseen_lag"``: a further lag of that size, s, would have been found with a probability
+        of 90 %, and one below it may be there unseen.
     others : tuple of FittedRun
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.
     noise : FlightNoise or None
-        The noise that was fitted beside the plant, where the method does that.
+        The noise that was fitted beside the plant, where the method does that; in a joint fit that
+        of the first recording. `runs` has that of each.
     """
 
     method: str
@@ -128,7 +134,7 @@ class DelayEstimate(ReadOnlyArrays):
     @property
     def runs(self) -> tuple[FittedRun, ...]:
         """All recordings that were fitted together, the first one included."""
-        return (FittedRun(self.recording, self.loop, self.residuals), *self.others)
+        return (FittedRun(self.recording, self.loop, self.residuals, self.noise), *self.others)
 
     @property
     def delay(self) -> float:
@@ -142,8 +148,12 @@ class DelayEstimate(ReadOnlyArrays):
 
     @property
     def lag(self) -> float | None:
-        """Lag of the plant, s, fitted or as given; None if the plant has no such parameter."""
-        return self.loop.parameters.get("lag")
+        """Lag of the plant, s, fitted or as given; None if the plant has no such parameter.
+
+        Of a `FactoredPlant` the total lag: the sum of its lags less its zero.
+        """
+        plant = self.loop.plant
+        return plant.lag if isinstance(plant, (Integrator, FactoredPlant)) else None
 
     @property
     def delay_plus_lag(self) -> float:
@@ -244,6 +254,8 @@ class DelayEstimate(ReadOnlyArrays):
 
     def _value(self, name: str) -> float:
         """The fitted value of a quantity."""
+        if name == "delay+lag":
+            return self.delay_plus_lag
         known = {**self.loop.parameters, **self.details}
         return float(sum(known.get(part, 0.0) for part in name.split("+")))
 
@@ -276,11 +288,11 @@ class DelayEstimate(ReadOnlyArrays):
             "adequate": self.adequate,
             "message": self.message,
         }
-        if self.noise is not None:
-            found["noise_model"] = {
-                name: value if math.isfinite(value) else None
-                for name, value in vars(self.noise).items()
-            }
+        models = [_plain(run.noise) for run in self.runs if run.noise is not None]
+        if models:
+            found["noise_model"] = models[0]
+        if len(models) > 1:
+            found["noise_models"] = models
         if self.uncalibrated:
             found["no_interval_because"] = self.uncalibrated
         return found | dict(self.details)
@@ -302,9 +314,10 @@ class DelayEstimate(ReadOnlyArrays):
         if not self.calibrated:
             lines.append(f"  no interval: {self.uncalibrated}")
         if self.crb is not None and "delay" in self.crb.stderr:
+            noises = [str(run.noise) for run in self.runs if run.noise is not None]
             lines.append(
-                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for {self.crb.noise} "
-                f"with {', '.join(self.crb.free)} free"
+                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for "
+                f"{' | '.join(noises) or self.crb.noise} with {', '.join(self.crb.free)} free"
             )
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(
@@ -344,3 +357,8 @@ class DelayEstimate(ReadOnlyArrays):
             f"<DelayEstimate {self.method}: delay {self.delay:.4g}{spread} s, "
             f"adequate: {self.adequate}>"
         )
+
+
+def _plain(noise: FlightNoise) -> dict[str, float | None]:
+    """The noise for JSON, which has no infinite numbers."""
+    return {name: value if math.isfinite(value) else None for name, value in vars(noise).items()}

@@ -26,10 +26,10 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
     Parameters
     ----------
     plant : Plant, TransferFunction, DelaySystem or a system of python-control or scipy.signal
-        `Integrator`, `FirstOrder` or `RationalPlant`; or a continuous system with one input and
-        one output. A delay in series with it is added to `delay`, and is not part of the `plant`
-        of the loop. With delays inside it becomes a `deadtime.loops.PlantWithDelays`, which takes
-        no `sample_time` and no `limit`.
+        `Integrator`, `FirstOrder`, `FactoredPlant` or `RationalPlant`; or a continuous system
+        with one input and one output. A delay in series with it is added to `delay`, and is not
+        part of the `plant` of the loop. With delays inside it becomes a
+        `deadtime.loops.PlantWithDelays`, which takes no `sample_time` and no `limit`.
     controller : Controller
         `P`, `PV`, `PD`, `PI` or `PID`.
     delay : float, optional

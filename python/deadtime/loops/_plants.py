@@ -1,7 +1,7 @@
 r"""Plants: what the delayed command acts on.
 
 A plant is a proper rational transfer function b(s)/a(s) in floats (those with delays inside:
-`_given_plants`). Its state space is the
+`_given_plants`; those that limit the rate of their command: `_rate_limits`). Its state space is the
 observable canonical form: with a monic of degree n and D = b\ :sub:`0`,
 
     x_i' = -a_i x_1 + x_{i+1} + (b_i - a_i D) w,   y = x_1 + D w,
@@ -43,11 +43,16 @@ class StateSpace(NamedTuple):
 
 
 class Plant(ABC):
-    """A proper transfer function from the delayed command w to the output y."""
+    """What the delayed command w acts on, with the output y; linear but for `RateLimited`."""
 
     @property
     def is_rational(self) -> bool:
         """Whether it is a ratio of polynomials; else it has delays inside."""
+        return True
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it has a transfer function."""
         return True
 
     @property

@@ -49,9 +49,9 @@ def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...
             raise ValueError(
                 f"sensitivities: this loop has no number {name!r}; choose from {', '.join(known)}"
             )
-        if name == "lag" and known[name] == 0.0:
+        if name.startswith("lag") and known[name] == 0.0:
             raise ValueError(
-                "sensitivities: at lag=0 the plant changes its order and has no slope with "
+                f"sensitivities: at {name}=0 the plant changes its order and has no slope with "
                 "respect to the lag; give the plant a small lag, or take the slope with respect "
                 "to the delay, which acts like it"
             )

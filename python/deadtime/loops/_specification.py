@@ -57,6 +57,7 @@ class LoopSpecification:
         if self.plant.is_rational:
             # Building the model checks that its parts fit.
             _ = self.model
+        if self.plant.is_rational or not self.plant.is_linear:
             return
         for name, value in (("sample_time", self.sample_time), ("limit", self.limit)):
             if value is not None:

@@ -22,7 +22,9 @@ from deadtime.loops._sampled_ranges import SampledNumber, further_delay
 from deadtime.roots import Parameter, QuasiPolynomial, RootSet
 
 #: Numbers of a loop that cannot be negative.
-_NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"})
+_NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"}) | {
+    f"lag_{i}" for i in range(1, 10)
+}
 #: Numbers that keep their sign, since the loop has no meaning at zero.
 _KEEPS_SIGN = frozenset({"time_constant"})
 #: Numbers of a filter.

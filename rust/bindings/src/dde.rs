@@ -1,7 +1,9 @@
 //! Bindings of `deadtime::dde`: linear loops.
 
 use deadtime::dde::sampled;
-use deadtime::dde::{Equations, LinearLoop, Reference, Request, Start, Update, on_sample};
+use deadtime::dde::{
+    Equations, LinearLoop, RateLimits, Reference, Request, Start, Update, on_sample,
+};
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -222,4 +224,21 @@ pub(crate) fn on_samples<'py>(
     let sample = Some((sample_time, sample_phase));
     let moved = column(&in_order(&since)?, |&t| on_sample(t, start, sample))?;
     Ok(moved.into_pyarray(py))
+}
+
+/// A held command within limits of its rate and of the rate of that, as one that is held: times and
+/// commands, `parts` of them for each that is given but the last.
+#[pyfunction]
+pub(crate) fn rate_limited<'py>(
+    py: Python<'py>,
+    time: Floats<'py>,
+    command: Floats<'py>,
+    rate: f64,
+    rate_of_rate: f64,
+    parts: usize,
+) -> PyResult<(Vector<'py>, Vector<'py>)> {
+    let (time, command) = (owned(&time)?, owned(&command)?);
+    let limits = converted(RateLimits::new(rate, rate_of_rate))?;
+    let (times, held) = run_here(py, |_| limits.held(&time, &command, parts))?;
+    Ok((times.into_pyarray(py), held.into_pyarray(py)))
 }

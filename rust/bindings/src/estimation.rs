@@ -327,11 +327,12 @@ fn read(quantity: &str) -> PyResult<Quantity> {
         "delay" => Quantity::Delay,
         "total" => Quantity::Total,
         "gain" => Quantity::Gain,
+        "zero" => Quantity::Zero,
         _ => match quantity.strip_prefix("lag ").and_then(|i| i.parse().ok()) {
             Some(i) => Quantity::Lag(i),
             None => {
                 return Err(PyValueError::new_err(format!(
-                    "quantity {quantity:?}: give 'delay', 'total', 'gain', or 'lag 0' and so on"
+                    "quantity {quantity:?}: give 'delay', 'total', 'gain', 'zero', or 'lag 0' and so on"
                 )));
             }
         },

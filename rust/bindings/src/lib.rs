@@ -34,7 +34,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::certificate::{Certificate, Contour, Monotone, Segment};
     #[pymodule_export]
-    use super::dde::{LoopResponse, PyLinearLoop, on_samples};
+    use super::dde::{LoopResponse, PyLinearLoop, on_samples, rate_limited};
     #[pymodule_export]
     use super::estimation::{
         FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, whitened_columns,

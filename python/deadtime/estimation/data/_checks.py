@@ -22,7 +22,7 @@ INDISTINGUISHABLE = 1e-6
 #: Parameters of the vehicle, in the order in which fits report them, and those of the whole loop:
 #: `start` is by how much the clock of the output is later than that of the reference. A sample time
 #: is not among them: the cost jumps where a sample moves from before a step to after it.
-VEHICLE_PARAMETERS = ("delay", "gain", "lag", "time_constant")
+VEHICLE_PARAMETERS = ("delay", "gain", "lag", "time_constant", "rate", "rate_of_rate")
 LOOP_PARAMETERS = (*VEHICLE_PARAMETERS, "start", "limit")
 
 #: Significance level of the F test that the response explains the output better than a constant.

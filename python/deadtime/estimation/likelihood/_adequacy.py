@@ -91,15 +91,16 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
         )
     richer, p_value = further_lag(fit)
     further = richer.lags[-1]
+    total = richer.delay + sum(richer.lags) - richer.zero
     plain = len(reasons)
     if p_value < SIGNIFICANCE:
         reasons.append(
             f"a further lag of {further:.3g} s makes the recording likelier: the plant lacks it"
         )
-    elif p_value < MOVES and not _holds(profile, richer.delay + sum(richer.lags), level):
+    elif p_value < MOVES and not _holds(profile, total, level):
         reasons.append(
-            f"a further lag of {further:.3g} s would move delay and lag together to "
-            f"{richer.delay + sum(richer.lags):.3g} s, out of their interval"
+            f"a further lag of {further:.3g} s would move delay and lag together to {total:.3g} s, "
+            "out of their interval"
         )
     lacks_lag = len(reasons) > plain
     for index, part in enumerate(fit.parts):
@@ -157,13 +158,13 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
 
     def behind(lag: float, noise: Sequence[RowNoise]) -> PlantNumbers:
         delay = max(one.delay - lag * between, 0.0)
-        return PlantNumbers(delay, [*one.lags, lag * between], noise, fit.gain)
+        return PlantNumbers(delay, [*one.lags, lag * between], noise, fit.gain, one.zero)
 
     without = behind(NONE, one.noise)
     least = (
         likelihood.objective(without)
         if long
-        else likelihood.held(without, f"lag {len(one.lags)}", NONE * between).objective
+        else likelihood.held(without, f"lag {len(fit.model.free_lags)}", NONE * between).objective
     )
     noises = [one.noise]
     if not long and any(noise.air > 0.0 for noise in one.noise):

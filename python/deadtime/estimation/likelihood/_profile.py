@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.errors import NotIdentifiableError
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._search import (
     PARTS,
@@ -91,8 +92,13 @@ class LikelihoodProfile:
     def bounds(self) -> dict[str, float]:
         """Standard errors for the fitted noise."""
         cov = common_covariance(self.fit)
-        # Rounding may leave less than nothing of a sum that is known far better than its parts.
-        return {name: math.sqrt(max(0.0, float(w @ cov @ w))) for name, w in self._weights.items()}
+        squares = {name: float(w @ cov @ w) for name, w in self._weights.items()}
+        if not all(square > 0.0 for square in squares.values()):
+            raise NotIdentifiableError(
+                f"{', '.join(self.fit.model.names)} cannot be told apart by this recording: give "
+                "the plant fewer lags, or let deadtime.estimation.choose_plant choose"
+            )
+        return {name: math.sqrt(square) for name, square in squares.items()}
 
     @cached_property
     def stderr(self) -> dict[str, float]:
@@ -102,24 +108,20 @@ class LikelihoodProfile:
     @cached_property
     def unseen(self) -> dict[str, float]:
         """Factor on the variance of each quantity for air that is too weak to be seen."""
-        return unseen_air(self.fit, self._weights)
+        return unseen_air(self.fit, self._weights, self.bounds)
 
     @cached_property
     def _weights(self) -> dict[str, Array]:
-        """Each quantity as a sum of the common numbers: gain, delay, lags."""
-        model = self.fit.model
-        order: list[str] = [name for name in ("gain", "delay") if name in model.names]
-        order += [f"lag {i}" for i, free in enumerate(model.free_lags) if free]
-        found = {}
-        for name, kernel in self.names.items():
-            wanted = order if kernel == "total" else [kernel]
-            found[name] = np.array(
-                [
-                    float(one in wanted and not (kernel == "total" and one == "gain"))
-                    for one in order
-                ]
+        """Each quantity as a sum of the common numbers: gain, delay, lags, zero."""
+        order = [kernel for _, kernel in self.fit.model.order]
+        total = {"gain": 0.0, "zero": -1.0}
+        return {
+            name: np.array(
+                [total.get(one, 1.0) if kernel == "total" else one == kernel for one in order],
+                dtype=np.float64,
             )
-        return found
+            for name, kernel in self.names.items()
+        }
 
     @cached_property
     def freedom(self) -> dict[str, float]:
@@ -161,7 +163,8 @@ class LikelihoodProfile:
     def ends(self, name: str, level: float) -> tuple[tuple[float, float], PlantNumbers]:
         """The interval, and the lowest minimum that was seen on the way."""
         kernel = self.names[name]
-        floor = -math.inf if kernel == "gain" else 0.0
+        leads = kernel == "total" and ("zero" in self.fit.model.names or self.fit.model.zero > 0.0)
+        floor = -math.inf if kernel in ("gain", "zero") or leads else 0.0
         if kernel.startswith("lag"):
             floor = 1e-3 * float(np.median(np.diff(self.fit.runs[0].time)))
         rise = self.rise(name, level)
@@ -169,7 +172,7 @@ class LikelihoodProfile:
         found, lowest = [], self.centre
         for sign in (-1.0, 1.0):
             end, low = self.fit.likelihood.end(self.centre, kernel, sign * reach, rise, floor)
-            found.append(0.0 if end == floor and kernel != "gain" else end)
+            found.append(0.0 if end == floor else end)
             lowest = min(lowest, low, key=lambda one: one.objective)
         return (found[0], found[1]), lowest
 
@@ -193,7 +196,7 @@ def profile_of(fit: NoiseFit, names: Mapping[str, str], level: float = 0.95) -> 
 
 
 def common_covariance(fit: NoiseFit) -> Array:
-    """Covariance of the numbers that all recordings share: gain, delay, lags."""
+    """Covariance of the numbers that all recordings share: gain, delay, lags, zero."""
     blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
     if len(blocks) == 1:
         return blocks[0]
@@ -210,17 +213,19 @@ def _common(inverse: Array, linear: int, fit: NoiseFit) -> Array:
     return square[np.ix_(own, own)]
 
 
-def unseen_air(fit: NoiseFit, weights: Mapping[str, Array]) -> dict[str, float]:
-    """Mean variance of each quantity over slow air, weighted by its likelihood, over that without.
+def unseen_air(
+    fit: NoiseFit, weights: Mapping[str, Array], bounds: Mapping[str, float]
+) -> dict[str, float]:
+    """Mean variance of each quantity over slow air, weighted by its likelihood, over `bounds`².
 
-    An estimate of no air does not mean that there is none. All deviations of the air are as likely
-    beforehand.
+    An estimate of no air does not mean that there is none. The prior density of its deviation falls
+    with the square root of it: with a constant one intervals cover too much without air, with one
+    that falls with the deviation too little in the weakest air.
     """
     none = dict.fromkeys(weights, 1.0)
     if not fit.model.integrates or any(one.air > 0.0 for one in fit.numbers.noise):
         return none
     middle = fit.numbers.objective
-    base = common_covariance(fit)
     _, slow = airs_of(fit.model, fit.runs)
     total, sums = 0.0, dict.fromkeys(weights, 0.0)
     for step in UNSEEN:
@@ -230,12 +235,12 @@ def unseen_air(fit: NoiseFit, weights: Mapping[str, Array]) -> dict[str, float]:
         ]
         moved = fit.moved(with_noise(fit.numbers, noise))
         rise = sum(part.objective for part in moved.parts) - middle
-        weight = step * math.exp(-0.5 * max(rise, -1.0))
+        weight = math.sqrt(step) * math.exp(-0.5 * max(rise, -1.0))
         cov = common_covariance(moved)
         total += weight
         for name, w in weights.items():
             sums[name] += weight * float(w @ cov @ w)
-    return {name: max(1.0, sums[name] / total / float(w @ base @ w)) for name, w in weights.items()}
+    return {name: max(1.0, sums[name] / total / bounds[name] ** 2) for name in weights}
 
 
 def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -> dict[str, float]:
@@ -278,6 +283,9 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
             both = at({i: h, j: h})[0]
             mixed = both - single[i][0][0] - single[j][0][0] + middle
             hessian[i, j] = hessian[j, i] = mixed / h**2
+    if not np.all(np.isfinite(hessian)):
+        # At some noise near by one unknown cannot be told from others.
+        return dict.fromkeys(weights, LEAST_FREEDOM)
     values, vectors = np.linalg.eigh(0.5 * hessian)
     spread = (vectors / np.maximum(values, LEAST_CURVATURE)) @ vectors.T
     return {

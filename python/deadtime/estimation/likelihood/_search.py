@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.loops import FirstOrder, Integrator, Plant
+from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant, RateLimited
 
 Array = NDArray[np.float64]
 
@@ -27,8 +27,9 @@ LONGEST = 0.6
 #: Steps of the grid over the delay: in rows, and as a share of the delay.
 GRID_STEP, GRID_GROWTH = 1.0, 0.1
 
-#: Lags of the grid, in rows, and factors of it over a time constant.
-LAGS, FACTORS = (0.5, 3.0, 8.0), (0.3, 1.0, 3.0)
+#: Lags of the grid, in rows, factors of it over a time constant, and how much shorter each further
+#: lag is: equal lags have the same effect, so that a search does not move from them.
+LAGS, FACTORS, SHORTER = (0.5, 3.0, 8.0), (0.3, 1.0, 3.0), 0.4
 
 #: Deviations of the air in the grid, and where it is added to a fit without: white deviations a
 #: row. Its time constant there, as a share of the window, and by how much slow air is slower.
@@ -75,6 +76,8 @@ class PlantModel:
         What is fitted.
     extra : int
         Further lags, not of the plant, that are tried.
+    zero : float
+        Time constant of the zero behind the lags, s.
     """
 
     num: tuple[float, ...]
@@ -83,15 +86,23 @@ class PlantModel:
     lags: tuple[float, ...]
     names: tuple[str, ...]
     extra: int = 0
+    zero: float = 0.0
 
     @classmethod
     def of(cls, plant: Plant, names: tuple[str, ...]) -> PlantModel:
-        """The plant with `names` free."""
+        """The plant with `names` free; one that limits rates, after its limits."""
+        if isinstance(plant, RateLimited):
+            plant = plant.plant
         if isinstance(plant, Integrator):
             used = ("lag",) if "lag" in names or plant.lag else ()
             return cls((1.0,), (1.0, 0.0), used, (plant.lag,)[: len(used)], names)
         if isinstance(plant, FirstOrder):
             return cls((1.0,), (1.0,), ("time_constant",), (plant.time_constant,), names)
+        if isinstance(plant, FactoredPlant):
+            lags = {name: lag for name, lag in plant.parameters.items() if name.startswith("lag")}
+            lags = {name: lag for name, lag in lags.items() if lag or name in names}
+            rest = (1.0, 0.0) if plant.integrator else (1.0,)
+            return cls((1.0,), rest, tuple(lags), tuple(lags.values()), names, zero=plant.zero)
         num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
         return cls(tuple(map(float, num)), tuple(map(float, den)), (), (), names)
 
@@ -99,6 +110,13 @@ class PlantModel:
     def free_lags(self) -> list[bool]:
         """Which of the lags are fitted."""
         return [name in self.names for name in self.lag_names] + [True] * self.extra
+
+    @property
+    def order(self) -> list[tuple[str, str]]:
+        """Names of what is fitted, ours and those of the kernel, in the order of the kernel."""
+        lags = ((name, f"lag {i}") for i, name in enumerate(self.lag_names))
+        known = (("gain", "gain"), ("delay", "delay"), *lags, ("zero", "zero"))
+        return [pair for pair in known if pair[0] in self.names]
 
     @property
     def integrates(self) -> bool:
@@ -115,7 +133,7 @@ class PlantModel:
             delay="delay" in self.names,
             gain="gain" in self.names,
             lags=self.free_lags,
-            zero=False,
+            zero="zero" in self.names,
             longest=longest,
         )
 
@@ -171,7 +189,9 @@ class NoiseFit:
     def with_gain(self) -> PlantNumbers:
         """The numbers with the gain, which is not searched in a single recording."""
         one = self.numbers
-        return PlantNumbers(one.delay, one.lags, one.noise, self.gain, objective=one.objective)
+        return PlantNumbers(
+            one.delay, one.lags, one.noise, self.gain, one.zero, objective=one.objective
+        )
 
     def moved(self, numbers: PlantNumbers) -> NoiseFit:
         """The same at other numbers."""
@@ -180,7 +200,7 @@ class NoiseFit:
 
 def with_noise(numbers: PlantNumbers, noise: Sequence[RowNoise]) -> PlantNumbers:
     """The same plant under other noise."""
-    return PlantNumbers(numbers.delay, numbers.lags, noise, numbers.gain)
+    return PlantNumbers(numbers.delay, numbers.lags, noise, numbers.gain, numbers.zero)
 
 
 def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers) -> NoiseFit:
@@ -190,11 +210,12 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
     strong, slow = airs_of(model, runs)
     weak = [RowNoise(one.air_time / SLOW, one.air) for one in slow]
     found = []
-    starts = _grid(model, runs, first, strong)
+    first = with_noise(first, quiet)
+    calms, airs = [first, *_grid(model, runs, first, quiet)[:1]], _grid(model, runs, first, strong)
     for trim in (False, True) if model.integrates else (False,):
         likelihood = model.likelihood(runs, trim)
-        calm = likelihood.fit(with_noise(first, quiet), ROUGH)
-        airy = (with_noise(calm, weak), with_noise(calm, slow), *starts)
+        calm = min((likelihood.fit(one, ROUGH) for one in calms), key=_objective)
+        airy = (with_noise(calm, weak), with_noise(calm, slow), *airs)
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
@@ -290,27 +311,29 @@ def _grid(
     delays = [0.0]
     while delays[-1] < LONGEST * float(rows.time[-1] - rows.time[0]):
         delays.append(delays[-1] + max(GRID_STEP * between, GRID_GROWTH * delays[-1]))
-    points = grid_minima(likelihood, delays, grid_lags(model, between), noise, first.gain)
-    return points[:REFINED]
+    return grid_minima(likelihood, delays, grid_lags(model, between), noise, first)[:REFINED]
 
 
 def grid_minima(
     likelihood: FlightLikelihood,
-    delays: list[float],
+    delays: Sequence[float],
     lags: list[list[float]],
     noise: list[RowNoise],
-    gain: float,
+    first: PlantNumbers,
 ) -> list[PlantNumbers]:
-    """Local minima over the delay at each set of lags, the lowest first."""
+    """Local minima over the delay at each set of lags, else as `first`, the lowest first."""
     minima: list[PlantNumbers] = []
     for some in lags:
-        points = [PlantNumbers(delay, some, noise, gain) for delay in delays]
-        values = np.array([likelihood.objective(point) for point in points])
+
+        def at(delay: float, objective: float = math.inf, some: list[float] = some) -> PlantNumbers:
+            return PlantNumbers(delay, some, noise, first.gain, first.zero, objective=objective)
+
+        values = np.array([likelihood.objective(at(delay)) for delay in delays])
         padded = np.r_[np.inf, values, np.inf]
-        places = np.flatnonzero((values <= padded[:-2]) & (values <= padded[2:]))
-        minima += [
-            PlantNumbers(delays[i], some, noise, gain, objective=float(values[i])) for i in places
-        ]
+        is_least = (values <= padded[:-2]) & (values <= padded[2:])
+        # Where the command has no effect yet, the likelihood is infinite.
+        places = np.flatnonzero(is_least & np.isfinite(values))
+        minima += [at(delays[i], float(values[i])) for i in places.tolist()]
     return sorted(minima, key=_objective)
 
 
@@ -323,10 +346,11 @@ def grid_lags(model: PlantModel, between: float) -> list[list[float]]:
         return [[factor * model.lags[0]] for factor in FACTORS]
     signs = [*np.sign(model.lags), *[1.0] * model.extra]
     known = [*model.lags, *[0.0] * model.extra]
+    place = np.cumsum(free) - 1
     return [
         [
-            float((sign or 1.0) * lag * between) if is_free else value
-            for is_free, sign, value in zip(free, signs, known, strict=True)
+            float((sign or 1.0) * lag * between * SHORTER**i) if is_free else value
+            for is_free, sign, value, i in zip(free, signs, known, place, strict=True)
         ]
         for lag in LAGS
     ]

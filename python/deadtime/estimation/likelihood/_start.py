@@ -11,9 +11,11 @@ is near, and takes some tens of evaluations.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from deadtime._base.errors import NotIdentifiableError
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import (
@@ -23,6 +25,7 @@ from deadtime.estimation.likelihood._search import (
     PlantModel,
     grid_lags,
     grid_minima,
+    with_noise,
 )
 
 #: Most rows of a search.
@@ -34,9 +37,9 @@ CLOSE = 5e-3
 #: Parts overlap so that each row is in so many of them.
 OVERLAP = 4
 
-#: Most points of the grid over the delay, and its step in rows where a lag makes the response
-#: smooth; it is a row elsewhere.
-MOST_POINTS, SMOOTH_STEP = 600, 2.0
+#: Most points of the grid over the delay, and its step in rows: the cost has minima less than a row
+#: apart, but not where a lag makes the response smooth.
+MOST_POINTS, SHARP_STEP, SMOOTH_STEP = 600, 0.25, 2.0
 
 #: Minima of the grid of a recording that are refined.
 REFINED = 3
@@ -72,6 +75,7 @@ def excited_part(rows: FlightRows) -> FlightRows:
         time=rows.time[kept],
         output=rows.output[kept],
         used=rows.used[kept],
+        speed=rows.speed[kept],
         command_time=rows.command_time[sent],
         command=rows.command[sent],
         unknown=tuple(one for one in rows.unknown if since < one[1] and one[0] < stop),
@@ -84,39 +88,52 @@ def least_squares(
     model: PlantModel, runs: Sequence[FlightRows], delay: float, gain: float
 ) -> NoiseFit:
     """The fit under white noise alone; `delay` and `gain` where they are known."""
+    first = PlantNumbers(delay, model.lags, [RowNoise()], gain, model.zero)
     quiet = [RowNoise()] * len(runs)
     likelihood = model.likelihood(runs, False)
     found = []
     for rows in runs:
         alone = model.likelihood([rows], False)
-        for point in _minima(model, rows, delay, gain):
+        for point in _minima(model, rows, first):
             its_gain = alone.at(0, point).gain
-            start = PlantNumbers(point.delay, point.lags, quiet, its_gain)
+            start = PlantNumbers(point.delay, point.lags, quiet, its_gain, point.zero)
             found.append(likelihood.fit(start, ROUGH))
+    if not found:
+        raise NotIdentifiableError(
+            "the output does not depend on the command within the window: widen it, or check that "
+            "the columns belong together"
+        )
     best = min(found, key=lambda one: one.objective)
     return NoiseFit(model, tuple(runs), False, likelihood.fit(best))
 
 
-def _minima(model: PlantModel, rows: FlightRows, delay: float, gain: float) -> list[PlantNumbers]:
+def _minima(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> list[PlantNumbers]:
     """The lowest local minima of a grid over delay and lag."""
     between = float(np.median(np.diff(rows.time)))
-    delays = [delay]
+    delays = [first.delay]
     if "delay" in model.names:
         longest = LONGEST * float(rows.time[-1] - rows.time[0])
-        step = (SMOOTH_STEP if any(model.free_lags) else 1.0) * between
+        step = (SMOOTH_STEP if any(model.free_lags) else SHARP_STEP) * between
         count = int(min(MOST_POINTS, max(2.0, longest / step)))
         delays = np.linspace(0.0, longest, count + 1).tolist()
     likelihood = model.likelihood([rows], False)
-    found = grid_minima(likelihood, delays, grid_lags(model, between), [RowNoise()], gain)
-    return found[:REFINED]
+    lags = grid_lags(model, between)
+    return grid_minima(likelihood, delays, lags, first.noise, first)[:REFINED]
 
 
 def on_all_rows(fit: NoiseFit, runs: Sequence[FlightRows]) -> NoiseFit:
     """The maximum on all rows of recordings, near the `fit` to parts of them, without outliers."""
-    whole = NoiseFit(fit.model, tuple(runs), fit.trim, fit.numbers)
+    if any(noise.stamps for noise in fit.numbers.noise):
+        quiet = with_noise(fit.numbers, [RowNoise()] * len(runs))
+        white = replace(fit, runs=tuple(runs), numbers=quiet)
+        runs = [
+            rows._replace(speed=part.rate / part.gain)
+            for rows, part in zip(runs, white.parts, strict=True)
+        ]
+    whole = replace(fit, runs=tuple(runs))
     kept = [
         rows._replace(used=rows.used & ~is_outlier(part.whitened, rows.used))
         for rows, part in zip(runs, whole.parts, strict=True)
     ]
-    whole = NoiseFit(fit.model, tuple(kept), fit.trim, fit.numbers)
+    whole = replace(fit, runs=tuple(kept))
     return whole.moved(whole.likelihood.fit(fit.with_gain, CLOSE))

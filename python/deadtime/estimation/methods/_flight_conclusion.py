@@ -14,13 +14,21 @@ from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
+from deadtime.estimation.likelihood._free_limits import LimitsProfile
+from deadtime.estimation.likelihood._power import unseen_lag
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
     profile_of,
 )
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
-from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, fit_noise, scatter_of
+from deadtime.estimation.likelihood._search import (
+    SHORTER,
+    NoiseFit,
+    PlantModel,
+    fit_noise,
+    scatter_of,
+)
 from deadtime.estimation.likelihood._start import excited_part, is_long, on_all_rows
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
@@ -30,6 +38,9 @@ Array = NDArray[np.float64]
 
 #: A lag below so many times its lower bound is none.
 NO_LAG = 2.0
+
+#: Ratio of the residuals to those of least squares from which the noise stands for the plant.
+LESS = 1.5
 
 #: Rounds of leaving out outliers.
 ROUNDS = 3
@@ -57,8 +68,7 @@ def fitted_flight(model: PlantModel, rows: Sequence[FlightRows], first: PlantNum
 
 def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
     """The profile over the names, and over the sum of delay and lag."""
-    kernel = {"delay": "delay", "gain": "gain"}
-    kernel |= {name: f"lag {i}" for i, name in enumerate(fit.model.lag_names)}
+    kernel = dict(fit.model.order)
     wanted = {name: kernel[name] for name in names}
     if "delay" in names:
         slow = "time_constant" if "time_constant" in names else "lag"
@@ -67,14 +77,19 @@ def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
 
 
 def _start(model: PlantModel, first: PlantNumbers, rows: Sequence[FlightRows]) -> PlantNumbers:
-    """The numbers under white noise; a lag of about zero becomes a short one."""
+    """The numbers under white noise; a lag of about zero becomes a short one.
+
+    Free lags that are equal would stay equal, since they have the same effect: they are spread.
+    """
     least = 0.5 * float(np.median(np.diff(rows[0].time)))
     delay, lags = first.delay, []
     for lag, free in zip(first.lags, model.free_lags, strict=True):
         if free and abs(lag) < least:
             delay, lag = max(0.0, delay - least + lag), least
+        while free and lag in lags:
+            lag *= SHORTER
         lags.append(lag)
-    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first.gain)
+    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first.gain, first.zero)
 
 
 def concluded_flight(
@@ -91,15 +106,21 @@ def concluded_flight(
     fit = profile.fit
     values = values_of(fit, names, known)
     cov = common_covariance(fit)
-    order = [name for name in ("gain", "delay", *fit.model.lag_names) if name in names]
+    order = [name for name, _ in fit.model.order]
     place = [order.index(name) for name in names]
+    cov = cov[np.ix_(place, place)]
+    if isinstance(profile, LimitsProfile):
+        cov = profile.limits.joined(names, cov)
+        values |= profile.limits.values
+        names = tuple(values)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
+    unseen = unseen_lag(fit)
     left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
     fitted = tuple(
-        FittedRun(run.recording, run.loop.replace(**values), part.residuals)
-        for run, part in zip(runs, fit.parts, strict=True)
+        FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)
+        for run, part, one in zip(runs, fit.parts, noise, strict=True)
     )
-    held = [name for name in names if name in ("lag", "delay") and values[name] == 0.0]
+    held = [name for name in names if name.startswith(("lag", "delay")) and values[name] == 0.0]
     stderr, least = (
         {name: 0.0 if name in held else error for name, error in errors.items()}
         for errors in (profile.stderr, profile.bounds)
@@ -116,14 +137,16 @@ def concluded_flight(
         loop=fitted[0].loop,
         free=names,
         stderr=stderr,
-        cov=cov[np.ix_(place, place)],
+        cov=cov,
         crb=CramerRaoBound(labels, noise[0], least),
         recording=fitted[0].recording,
         residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
         adequate=not adequacy.reasons,
-        message=_message(message, names, held, noise[0], left_out, scatter, adequacy, runs[0]),
-        details={**details, "rows_left_out": left_out, **scatter},
+        message=_message(
+            message, names, held, noise[0], left_out, scatter, adequacy, runs[0], unseen
+        ),
+        details={**details, "rows_left_out": left_out, "unseen_lag": unseen, **scatter},
         others=fitted[1:],
         noise=noise[0],
         _profile=profile,
@@ -136,9 +159,9 @@ def values_of(
     """The fitted parameters of the loop; a lag at its lower bound is none."""
     numbers = fit.numbers
     least = NO_LAG * 1e-3 * float(np.median(np.diff(fit.runs[0].time)))
-    found = {"delay": numbers.delay, "gain": fit.gain}
+    found = {"delay": numbers.delay, "gain": fit.gain, "zero": numbers.zero}
     for name, lag in zip(fit.model.lag_names, numbers.lags, strict=True):
-        if name == "lag" and lag <= least:
+        if name.startswith("lag") and lag <= least:
             found["delay"], lag = found["delay"] + lag, 0.0
         found[name] = lag
     found["delay"] = max(0.0, found["delay"])
@@ -171,6 +194,14 @@ def gain_is_certain(profile: LikelihoodProfile) -> bool:
     return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * profile.stderr["gain"]
 
 
+def explains_less(fit: NoiseFit, white: NoiseFit) -> bool:
+    """Whether the plant beside the noise explains far less of a recording than by least squares."""
+    return any(
+        float(np.std(part.residuals)) > LESS * float(np.std(least.residuals))
+        for part, least in zip(fit.parts, white.parts, strict=True)
+    )
+
+
 def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate:
     """The estimate of least squares for a plant that lacks something.
 
@@ -191,6 +222,7 @@ def _message(
     scatter: Mapping[str, float],
     adequacy: Adequacy,
     run: Run,
+    unseen: float,
 ) -> str:
     text = f"{done}; {noise}"
     if left_out:
@@ -200,5 +232,5 @@ def _message(
     if held:
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:
-        text += f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
-    return text
+        return text + f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
+    return f"{text}; a further lag below {unseen:.2g} s would not have been seen"

@@ -5,9 +5,8 @@
 F the exact response of 1/(s (lag s + 1)), or of another plant, to the command as it was held
 (`plant_path`), a the gain, b the output at the start. Because the command is known, a limit and
 noise that the controller acts on have no effect, and least squares is maximum likelihood for white
-noise: the standard error is the Cramér-Rao bound. The likelihood with the noise of a flight starts
-from least squares, which is what is reported where a recording holds no noise, and where the plant
-lacks something.
+noise: the standard error is the Cramér-Rao bound. For a given delay and lag the best a and b are
+linear least squares (variable projection, Golub & Pereyra 1973).
 """
 
 from __future__ import annotations
@@ -15,7 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
+from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import check_moves, checked_names
+from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, check_moves, checked_names
 from deadtime.estimation.data._simulated import (
     commands_over_samples,
     known_commands,
@@ -38,6 +38,7 @@ from deadtime.estimation.fit._least_squares import (
     solve_jointly,
 )
 from deadtime.estimation.likelihood._adequacy import adequacy_of
+from deadtime.estimation.likelihood._free_limits import LimitsProfile, fit_limits
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
     predicted_commands,
@@ -45,7 +46,7 @@ from deadtime.estimation.likelihood._missing import (
 )
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of, spikes
-from deadtime.estimation.likelihood._search import LONGEST, NoiseFit, PlantModel
+from deadtime.estimation.likelihood._search import FACTORS, LONGEST, NoiseFit, PlantModel
 from deadtime.estimation.likelihood._start import excited_part, least_squares
 from deadtime.estimation.methods._conclusion import (
     check_fit,
@@ -55,6 +56,7 @@ from deadtime.estimation.methods._conclusion import (
 )
 from deadtime.estimation.methods._flight_conclusion import (
     concluded_flight,
+    explains_less,
     fitted_flight,
     gain_is_certain,
     profile_for,
@@ -62,8 +64,8 @@ from deadtime.estimation.methods._flight_conclusion import (
     without_the_plant,
 )
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
-from deadtime.estimation.models._held import Path, path_of
-from deadtime.loops import ControlLoop
+from deadtime.estimation.models._held import RATE_LIMITS, Path, path_of
+from deadtime.loops import ControlLoop, Plant, RateLimited
 from deadtime.recordings import Recording, RecordingCheck
 
 Array = NDArray[np.float64]
@@ -142,14 +144,16 @@ def _estimated(
     initial_output: float | None,
     computed: bool,
 ) -> DelayEstimate:
-    names = checked_names(free, runs[0].loop)
-    models = [_model(run, names, initial_output, computed) for run in runs]
+    known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *runs[0].loop.plant.parameters]))
+    names = checked_names(free, runs[0].loop, known)
+    # What least squares with all derivatives knows; the likelihood knows other plants too.
+    common = tuple(name for name in names if name in VEHICLE_PARAMETERS)
+    linear = tuple(name for name in names if name not in RATE_LIMITS)
+    models = [_model(run, common, initial_output, computed) for run in runs]
     fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
-    plant = PlantModel.of(fitted[0].loop.plant, names)
+    plant = PlantModel.of(fitted[0].loop.plant, linear)
     rows = [one.rows(initial_output, run.check) for one, run in zip(models, runs, strict=True)]
-    parts = [excited_part(one) for one in rows]
-    known = models[0].known
-    white = least_squares(plant, parts, known["delay"], known["gain"])
+    white, limits = _first(plant, models, rows, [name for name in names if name in RATE_LIMITS])
     sources = {one.source for one in models}
     message = f"over {', '.join(names)} on the response to the command"
     if computed:
@@ -164,13 +168,13 @@ def _estimated(
     @cache
     def plain() -> tuple[Model, Minimum]:
         """Least squares with all its derivatives, from that of the likelihood."""
-        started = [one.started(white) for one in models]
+        started = [one.started(white, limits) for one in models]
         model, found = solve_jointly(started)
         return model, without_vanishing(model, found)
 
     def concluded_plain() -> DelayEstimate:
         model, found = plain()
-        start = found.point[len(names) :] if initial_output is None else [initial_output]
+        start = found.point[len(common) :] if initial_output is None else [initial_output]
         return concluded(
             method,
             model,
@@ -180,18 +184,30 @@ def _estimated(
             details={**details, "initial_output": float(start[0])},
         )
 
-    if _is_nearly_exact(white) and is_exact(*plain(), fitted):
+    if common == names and _is_nearly_exact(white) and is_exact(*plain(), fitted):
         return concluded_plain()
-    whole = replace(white, runs=tuple(rows))
+    whole = replace(white, runs=tuple(_within(models, rows, limits)))
     kept = [
         one._replace(used=one.used & ~spikes(part.residuals))
-        for one, part in zip(rows, whole.parts, strict=True)
+        for one, part in zip(whole.runs, whole.parts, strict=True)
     ]
+    free_limits = None
+    if limits:
+        found = plain()[1]
+        limits = {name: float(found.point[common.index(name)]) for name in limits}
+        kept = _within(models, kept, limits)
     fit = fitted_flight(plant, kept, white.with_gain)
+    if limits:
+        fit, free_limits = fit_limits(fit, partial(_within, models, fit.runs), limits)
+        fitted = [run._replace(loop=run.loop.replace(**free_limits.values)) for run in fitted]
     doubts: tuple[str, ...] = ()
     if any(one.commands.computed for one in models):
-        fit, doubts = _with_predicted_commands(names, fit, models, runs)
-    profile = profile_for(fit, names)
+        fit, doubts = _with_predicted_commands(linear, fit, models, runs)
+    profile = profile_for(fit, linear)
+    if free_limits is not None:
+        profile = LimitsProfile(
+            profile.fit, profile.names, profile.preferred, profile._ends, free_limits
+        )
     longest = min(LONGEST * one.span for one in models)
     if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
@@ -202,14 +218,15 @@ def _estimated(
         check_fit(*plain(), fitted)
     adequacy = adequacy_of(profile, len(names))
     adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
-    if adequacy.lacks_lag:
+    astray = adequacy.reasons and explains_less(profile.fit, whole)
+    if common == names and (adequacy.lacks_lag or astray):
         return without_the_plant(concluded_plain(), adequacy)
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
     return concluded_flight(
         method,
-        names,
+        linear,
         fitted,
         profile,
         models[0].known,
@@ -217,6 +234,26 @@ def _estimated(
         details,
         adequacy,
     )
+
+
+def _first(
+    plant: PlantModel, models: Sequence[_Model], rows: Sequence[FlightRows], limits: Sequence[str]
+) -> tuple[NoiseFit, dict[str, float]]:
+    """Least squares on parts of the rows, and the free limits of a grid under which it is best."""
+    known = models[0].known
+    found = []
+    for factors in product(FACTORS, repeat=len(limits)):
+        values = {name: factor * known[name] for name, factor in zip(limits, factors, strict=True)}
+        parts = [excited_part(one) for one in _within(models, rows, values)]
+        found.append((least_squares(plant, parts, known["delay"], known["gain"]), values))
+    return min(found, key=lambda one: one[0].numbers.objective)
+
+
+def _within(
+    models: Sequence[_Model], rows: Sequence[FlightRows], limits: Mapping[str, float]
+) -> list[FlightRows]:
+    """The rows with the commands that a plant with these limits of its rate gets."""
+    return [one.limited(part, limits) for one, part in zip(models, rows, strict=True)]
 
 
 def _with_predicted_commands(
@@ -254,6 +291,7 @@ class _Model(ModelOfOne):
     """Residuals of one recording."""
 
     path: Path
+    plant: Plant
     known: Mapping[str, float]
     source: str
     logged: Array
@@ -300,16 +338,26 @@ class _Model(ModelOfOne):
             rounding=rounding,
         )
 
-    def started(self, fit: NoiseFit) -> _Model:
-        """The same with its search started from a fit of the likelihood."""
+    def limited(self, rows: FlightRows, values: Mapping[str, float]) -> FlightRows:
+        """The rows with the command that the plant gets within these limits of its rate."""
+        if not isinstance(self.plant, RateLimited):
+            return rows
+        limits = {name: values[name] for name in RATE_LIMITS if name in values}
+        held = self.plant._replace(limits).limited(self.commands.time, self.commands.command)
+        return rows._replace(command_time=held[0], command=held[1])
+
+    def started(self, fit: NoiseFit, limits: Mapping[str, float]) -> _Model:
+        """The same with its search started from a fit of the likelihood within these limits."""
         numbers = fit.with_gain
-        values = {"delay": numbers.delay, "gain": numbers.gain}
+        values = {"delay": numbers.delay, "gain": numbers.gain, "zero": numbers.zero, **limits}
         values |= dict(zip(fit.model.lag_names, numbers.lags, strict=True))
+        known = {**self.known, **{name: values[name] for name in self.known if name in values}}
         point = np.array([*(values[name] for name in self.names), 0.0])
+        moved = replace(self, known=known)
         if self.offset is not None:
-            return replace(self, start=point[:-1])
-        point[-1] = -float(np.mean(self.misfit(point)))
-        return replace(self, start=point)
+            return replace(moved, start=point[:-1])
+        point[-1] = -float(np.mean(moved.misfit(point)))
+        return replace(moved, start=point)
 
     def starts(self) -> list[Array]:
         """The point that the search starts from."""
@@ -329,6 +377,8 @@ class _Model(ModelOfOne):
             "delay": Ends(0.0, LONGEST * self.span, self._sample),
             "lag": Ends(0.0, self.span, self._sample),
             "time_constant": Ends(1e-3 * size, 1e3 * size, size),
+            "rate": Ends(1e-3 * size, 1e3 * size, size),
+            "rate_of_rate": Ends(1e-3 * size, 1e3 * size, size),
             "initial output": Ends(-np.inf, np.inf, self.size),
         }.get(label, Ends(-np.inf, np.inf, size))
 
@@ -373,9 +423,16 @@ def _model(
         )
     check_moves(data.output, command)
     commands = with_missing(recording, loop, command)
+    if isinstance(loop.plant, RateLimited) and commands.time.size > command.size:
+        raise NotIdentifiableError(
+            "rows are further apart than the samples of the controller, and what a plant that "
+            "limits the rate of its command got depends on every command: choose a window without "
+            "missing rows"
+        )
     return _Model(
         recording=data,
         path=path_of(loop.plant, commands.time, commands.command),
+        plant=loop.plant,
         logged=command,
         commands=commands,
         start=np.empty(0),

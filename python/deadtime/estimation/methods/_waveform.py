@@ -101,7 +101,8 @@ class Waveform(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the windows of the runs."""
-        if self.noise == "loop":
+        factors = set(runs[0].loop.plant.parameters) - set(VEHICLE_PARAMETERS)
+        if self.noise == "loop" or (self.noise == "auto" and factors & set(free)):
             return self._by_innovations(runs, free)
         simulated = self._by_simulation(runs, free)
         if self.noise == "recording" or not set(free) <= set(VEHICLE_PARAMETERS):

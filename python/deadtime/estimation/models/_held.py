@@ -30,7 +30,7 @@ from typing import NamedTuple, TypeAlias, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops import Integrator, Plant
+from deadtime.loops import Integrator, Plant, RateLimited
 from deadtime.loops._open_run import open_response
 
 Array = NDArray[np.float64]
@@ -42,6 +42,9 @@ Complex = NDArray[np.complex128]
 
 #: Relative step of difference quotients: of a parameter, or of the time between two commands.
 STEP = 1e-5
+
+#: Names of the limits of the rate of a command, and the relative step of quotients by them.
+RATE_LIMITS, LIMIT_STEP = ("rate", "rate_of_rate"), 1e-4
 
 
 class Response(NamedTuple):
@@ -188,12 +191,47 @@ class SteppedPath:
         return PathSlopes(rate, by)
 
 
+class LimitedPath:
+    """The output of a plant that limits the rate of its command."""
+
+    def __init__(self, plant: RateLimited, time: Array, command: Array) -> None:
+        self._plant, self._time, self._command = plant, time, command
+        self._kept: tuple[dict[str, float], Path] | None = None
+
+    def value(self, times: Array, values: Mapping[str, float]) -> Array:
+        """F at `times`, of any shape, for these parameters of the plant."""
+        return self._at(values).value(times, values)
+
+    def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
+        """Derivatives of F at `times`, by those of `names` that the plant has."""
+        found = self._at(values).slopes(times, values, names)
+        for name in RATE_LIMITS:
+            if name in names:
+                step = LIMIT_STEP * values[name]
+                higher, lower = (
+                    self.value(times, {**values, name: values[name] + sign * step})
+                    for sign in (1.0, -1.0)
+                )
+                found.by[name] = (higher - lower) / (2.0 * step)
+        return found
+
+    def _at(self, values: Mapping[str, float]) -> Path:
+        """The path under the command within these limits; kept for the last ones."""
+        limits = {name: values[name] for name in RATE_LIMITS if name in values}
+        if self._kept is None or self._kept[0] != limits:
+            held = self._plant._replace(limits).limited(self._time, self._command)
+            self._kept = (limits, path_of(self._plant.plant, *held))
+        return self._kept[1]
+
+
 #: Output of a plant of unit gain under one record of commands.
-Path: TypeAlias = HeldResponse | SteppedPath
+Path: TypeAlias = HeldResponse | SteppedPath | LimitedPath
 
 
 def path_of(plant: Plant, time: Array, command: Array) -> Path:
     """The path of `plant` under `command`, each value held from its time on."""
+    if isinstance(plant, RateLimited):
+        return LimitedPath(plant, time, command)
     if isinstance(plant, Integrator):
         return HeldResponse(time, command)
     return SteppedPath(plant, time, command)

@@ -7,10 +7,12 @@
 //!   breaking points.
 //! * `propagator` is the response of x′ = A x + g to constant g (matrix exponential), `scalar` the
 //!   numbers to compute with, plain or with a derivative, `limits` when a run is given up.
+//! * [`RateLimits`]: a command that follows another one within limits of its rate.
 
 pub mod control_loop;
 mod limits;
 pub(crate) mod propagator;
+mod rate_limits;
 mod scalar;
 pub mod spectral;
 pub mod system;
@@ -19,6 +21,7 @@ pub use control_loop::{
     Criteria, Equations, LinearLoop, Metrics, Reference, Request, Response, Start, Trajectory,
     Update, ensemble, fixed_step, on_sample, sampled, sensitivity,
 };
+pub use rate_limits::RateLimits;
 pub use scalar::{Dual, Scalar};
 pub use spectral::{breaks, history};
 pub use system::{LinearSystem, Past, Signal, SystemEquations, SystemResponse};

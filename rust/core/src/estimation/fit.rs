@@ -23,9 +23,6 @@ const LONGEST_TIME: f64 = 20.0;
 const LEAST_DEVIATION: f64 = 1e-3;
 const MOST_DEVIATION: f64 = 1e5;
 
-/// Ends of the scatter of times, as a share of where the search begins, and its inverse.
-const SCATTER: f64 = 1e-3;
-
 /// Steps of difference quotients: of times, in rows; of logarithms; of the gain, as a share of it.
 const TIME_STEP: f64 = 2e-3;
 const LOG_STEP: f64 = 0.02;
@@ -332,7 +329,13 @@ impl Model {
                     }
                     moves
                 }
-                _ => vec![(zero, 1.0)],
+                _ => {
+                    let mut moves = vec![(zero, 1.0)];
+                    if matches!(point.timing, Timing::Total(_)) && self.free.delay {
+                        moves.push((usize::from(searched), 1.0));
+                    }
+                    moves
+                }
             })
             .collect();
         let Searched { slope, curvature } = &part.searched;
@@ -360,7 +363,7 @@ impl Model {
                 slots.push(Slot::Lag(i));
             }
         }
-        if self.free.zero {
+        if self.free.zero && held != Some(Quantity::Zero) {
             slots.push(Slot::Zero);
         }
         if self.free.gain && self.runs.len() > 1 && held != Some(Quantity::Gain) {
@@ -402,7 +405,12 @@ impl Model {
                 start: match start.timing {
                     Timing::Delay(time) | Timing::Total(time) => time,
                 },
-                low: 0.0,
+                // A zero may be longer than delay and lags.
+                low: if start.zero > 0.0 || self.free.zero {
+                    -self.longest
+                } else {
+                    0.0
+                },
                 high: self.longest,
                 step: TIME_STEP * row_time,
                 longest: LONGEST_TIME_STEP * row_time,
@@ -438,16 +446,23 @@ impl Model {
             }
             Slot::Sensor(run) => logarithm(noise(run).sensor, LEAST_DEVIATION, MOST_DEVIATION),
             // Both move the output by a deviation where speed times scatter is one.
-            Slot::Stamps(run) => logarithm(
-                noise(run).stamps,
-                SCATTER * noise(run).stamps,
-                noise(run).stamps / SCATTER,
-            ),
-            Slot::Arrivals(run) => logarithm(
-                noise(run).arrivals,
-                SCATTER * noise(run).arrivals,
-                noise(run).arrivals / SCATTER,
-            ),
+            // What the scatter moves a row by is a deviation like the others.
+            Slot::Stamps(run) => {
+                let most = self.runs.get(run).map_or(1.0, Rows::top_speed);
+                logarithm(
+                    noise(run).stamps,
+                    LEAST_DEVIATION / most,
+                    MOST_DEVIATION / most,
+                )
+            }
+            Slot::Arrivals(run) => {
+                let most = self.runs.get(run).map_or(1.0, Rows::largest_jump);
+                logarithm(
+                    noise(run).arrivals,
+                    LEAST_DEVIATION / most,
+                    MOST_DEVIATION / most,
+                )
+            }
         }
     }
 }
@@ -518,6 +533,37 @@ mod tests {
             zero: 0.0,
             gain: 1.0,
             noise,
+        }
+    }
+
+    #[test]
+    fn commands_that_are_late_in_an_exact_record_leave_a_finite_scatter() {
+        // Half of the commands arrive 10 ms late, and there is no other error.
+        let mut rows = recorded(INTEGRATOR, (0.31, 1.0, 0.02), 0.0, 1);
+        let late = |i: usize| if i.is_multiple_of(2) { 0.01 } else { 0.0 };
+        let sent = &rows.commands;
+        for (time, output) in rows.time.iter().zip(&mut rows.output) {
+            let mut before = 0.0;
+            *output = 0.0;
+            for (i, (from, value)) in sent.time.iter().zip(&sent.value).enumerate() {
+                *output += (value - before) * (time - from - 0.31 - late(i)).max(0.0);
+                before = *value;
+            }
+        }
+        let model = model(INTEGRATOR, vec![rows]);
+        let noise = Noise {
+            arrivals: 1e9,
+            ..QUIET
+        };
+        let found = fitted(&model, point(0.31, 0.02, vec![noise]));
+        assert!(found.objective.is_finite());
+        let largest = model.runs[0].largest_jump();
+        assert!(found.point.noise[0].arrivals <= 1.001 * MOST_DEVIATION / largest);
+        for lag in [0.005, 0.05, 0.5] {
+            let mut moved = found.point.clone();
+            moved.lags = vec![lag];
+            let at = model.at(0, &moved, &Task::new()).unwrap();
+            assert!(at.residuals.iter().all(|e| e.is_finite()));
         }
     }
 

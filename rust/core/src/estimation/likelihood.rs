@@ -12,6 +12,8 @@
 //! biased by the linear unknowns. The last term makes it independent of the scale of the columns,
 //! which changes with the lags. The variance of the white noise counts delay and lags as unknowns
 //! too.
+//!
+//! Half of the file is its tests, which compare with the same formula written with dense matrices.
 
 use super::disturbance::{Disturbance, Entry, Joint};
 use super::mean::{Derivatives, Gain, Mean, Values, sizes};
@@ -102,6 +104,9 @@ pub struct Evaluation {
     pub linear: Vec<f64>,
     /// (JᵀV⁻¹J)⁻¹, row-major: the linear unknowns, a searched gain, delay, lags and zero.
     pub inverse: Vec<f64>,
+    /// Fisher information of the searched unknowns: the inverse of their block of `inverse` over the
+    /// variance, row-major.
+    pub information: Vec<f64>,
     /// The whitened derivative by the delay, orthogonal to the linear unknowns, of norm one; empty
     /// where the delay is known.
     pub score: Vec<f64>,
@@ -229,6 +234,7 @@ pub(super) fn evaluate(
         linear: Vec::new(),
         searched: searched(&triangle, linear, &factors, 2.0 * m / squares),
         inverse: Vec::new(),
+        information: Vec::new(),
         score: Vec::new(),
         whitened: Vec::new(),
         residuals: Vec::new(),
@@ -246,6 +252,15 @@ pub(super) fn evaluate(
             }
         }
     }
+    let size = |place: usize| if place < first { 1.0 } else { found.gain };
+    found.information = (linear..count)
+        .flat_map(|i| (linear..count).map(move |j| (i, j)))
+        .map(|(i, j)| {
+            let (left, right) = (triangle.column(i), triangle.column(j));
+            let rows = left.iter().zip(right).take(i.min(j) + 1).skip(linear);
+            rows.map(|(x, y)| x * y).sum::<f64>() * size(i) * size(j) / variance
+        })
+        .collect();
     if by.delay {
         let mut unit = vec![0.0; first + 1];
         unit[first] = 1.0;

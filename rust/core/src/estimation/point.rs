@@ -7,14 +7,14 @@ use super::likelihood::Noise;
 pub enum Timing {
     /// The delay, s.
     Delay(f64),
-    /// Delay and lags together, s.
+    /// Delay and lags less the zero, s.
     Total(f64),
 }
 
 /// One set of numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// Delay, or delay and lags together.
+    /// Delay, or delay and lags less the zero.
     pub timing: Timing,
     /// s.
     pub lags: Vec<f64>,
@@ -27,19 +27,24 @@ pub struct Point {
 }
 
 impl Point {
-    /// Delay and lags together, s.
+    /// Delay and lags less the zero, s: by so much the answer to a ramp is late in the end.
     pub fn total(&self) -> f64 {
         match self.timing {
-            Timing::Delay(delay) => delay + self.lags.iter().sum::<f64>(),
+            Timing::Delay(delay) => delay + self.lag(),
             Timing::Total(total) => total,
         }
+    }
+
+    /// Lags less the zero, s.
+    pub(super) fn lag(&self) -> f64 {
+        self.lags.iter().sum::<f64>() - self.zero
     }
 
     /// s.
     pub fn delay(&self) -> f64 {
         match self.timing {
             Timing::Delay(delay) => delay,
-            Timing::Total(total) => total - self.lags.iter().sum::<f64>(),
+            Timing::Total(total) => total - self.lag(),
         }
     }
 }
@@ -49,12 +54,14 @@ impl Point {
 pub enum Quantity {
     /// The delay.
     Delay,
-    /// Delay and lags together.
+    /// Delay and lags less the zero.
     Total,
     /// The gain.
     Gain,
     /// A lag.
     Lag(usize),
+    /// The zero.
+    Zero,
 }
 
 impl Quantity {
@@ -64,7 +71,28 @@ impl Quantity {
             Self::Delay => point.delay(),
             Self::Total => point.total(),
             Self::Gain => point.gain,
+            Self::Zero => point.zero,
             Self::Lag(i) => point.lags.get(i).copied().unwrap_or(0.0),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn delay_and_total_are_the_lags_less_the_zero_apart() {
+        let mut point = Point {
+            timing: Timing::Delay(0.3),
+            lags: vec![0.2, 0.1],
+            zero: 0.05,
+            gain: 1.0,
+            noise: Vec::new(),
+        };
+        assert!((point.total() - 0.55).abs() < 1e-15);
+        point.timing = Timing::Total(0.55);
+        assert!((point.delay() - 0.3).abs() < 1e-15);
+        assert_eq!(Quantity::Zero.value(&point), 0.05);
     }
 }

@@ -36,21 +36,26 @@ impl Quantity {
                 held.timing = Timing::Delay(value);
             }
             Self::Total => {
-                let lags: f64 = held.lags.iter().sum();
-                if value < lags && lags > 0.0 {
-                    let share = value / lags;
-                    held.lags.iter_mut().for_each(|lag| *lag *= share);
+                let late = point.total() - point.delay();
+                if value < late && late > 0.0 {
+                    let share = value / late;
+                    let lags = held.lags.iter_mut().zip(&model.free.lags);
+                    lags.filter(|(_, free)| **free)
+                        .for_each(|(lag, _)| *lag *= share);
+                    if model.free.zero {
+                        held.zero *= share;
+                    }
                 }
                 held.timing = Timing::Total(value);
             }
             Self::Gain => held.gain = value,
+            Self::Zero => held.zero = value,
             Self::Lag(i) => {
-                held.timing = match held.timing {
-                    Timing::Delay(delay) => Timing::Delay(delay),
-                    Timing::Total(_) => Timing::Total(point.total().max(value)),
-                };
                 if let Some(lag) = held.lags.get_mut(i) {
                     *lag = value;
+                }
+                if let Timing::Total(total) = held.timing {
+                    held.timing = Timing::Total(total.max(held.lag()));
                 }
             }
         }

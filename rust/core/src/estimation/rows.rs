@@ -113,6 +113,16 @@ impl Rows {
         *between.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
+    /// Largest speed of a row.
+    pub(super) fn top_speed(&self) -> f64 {
+        largest(self.speed.iter().copied())
+    }
+
+    /// Largest change of the command.
+    pub(super) fn largest_jump(&self) -> f64 {
+        largest(self.commands.value.windows(2).map(|pair| pair[1] - pair[0]))
+    }
+
     /// Time from the first row to the last, s.
     pub(super) fn span(&self) -> f64 {
         match (self.time.first(), self.time.last()) {
@@ -120,6 +130,12 @@ impl Rows {
             _ => 1.0,
         }
     }
+}
+
+/// The largest size of these, one where all are zero.
+fn largest(sizes: impl Iterator<Item = f64>) -> f64 {
+    let found = sizes.map(f64::abs).fold(0.0, f64::max);
+    if found > 0.0 { found } else { 1.0 }
 }
 
 /// An error unless times are finite and increase.

@@ -23,16 +23,20 @@ const SHORTER: f64 = 0.4;
 /// Share of the predicted decrease that a step has to reach (Armijo).
 const SUFFICIENT: f64 = 1e-4;
 
+/// Largest change of the gradient over a step of difference quotients, times that step: where the
+/// function is steep, a long step sees its third derivative.
+const STEEPEST: f64 = 0.04;
+
 /// Smallest second derivative by the units of difference quotients.
 const FLATTEST: f64 = 1e-4;
 
-/// Least pivot of a matrix that is positive definite, as a share of its diagonal.
-const DEFINITE: f64 = 1e-12;
+/// Added to a known curvature of unit diagonal: bounds its condition.
+const RIDGE: f64 = 1e-7;
 
 /// Decrease that a step over the first variables alone has to promise and bring.
 const WORTHWHILE: f64 = 0.02;
 
-/// A variable: where it starts and may go, the step of its difference quotients, and the longest of
+/// A variable: where it starts and may go, the longest step of its difference quotients, and that of
 /// the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Variable {
@@ -116,7 +120,9 @@ pub(super) fn minimise(
         let value = found.value;
         return Ok(Minimum { place: x, value });
     }
-    let (mut gradient, mut inverse) = by_quotients(variables, &x, &found, &mut function)?;
+    let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
+    let (mut gradient, mut inverse) =
+        by_quotients(variables, &mut steps, &x, &found, &mut function)?;
     let mut lacking = difference(&gradient, &found.slope);
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
@@ -127,7 +133,7 @@ pub(super) fn minimise(
                 break;
             }
             // The slopes by the others are quotients already.
-            let quotients = Quotients::new(variables, &x, &found, 0..known, &mut function)?;
+            let quotients = Quotients::new(variables, &steps, &x, &found, 0..known, &mut function)?;
             lacking = difference(&quotients.slope, &found.slope);
             gradient[..known].copy_from_slice(&quotients.slope);
             exact = true;
@@ -145,14 +151,18 @@ pub(super) fn minimise(
             found = next;
             let parts = found.slope.iter().zip(&lacking);
             let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
-            slopes.extend(Quotients::new(variables, &x, &found, known..n, &mut function)?.slope);
+            let others =
+                Quotients::new(variables, &steps, &x, &found, known..n, &mut function)?;
+            shorten(&variables[known..], &others.curvature, &mut steps[known..]);
+            slopes.extend(others.slope);
             update(&mut inverse, &moved, &difference(&slopes, &gradient));
             gradient = slopes;
             (exact, fresh) = (known == 0, false);
         } else if fresh {
             break;
         } else {
-            (gradient, inverse) = by_quotients(variables, &x, &found, &mut function)?;
+            (gradient, inverse) =
+                by_quotients(variables, &mut steps, &x, &found, &mut function)?;
             lacking = difference(&gradient, &found.slope);
             (exact, fresh) = (true, true);
         }
@@ -199,6 +209,7 @@ struct Quotients {
 impl Quotients {
     fn new(
         variables: &[Variable],
+        steps: &[f64],
         x: &[f64],
         found: &Value,
         which: Range<usize>,
@@ -207,16 +218,12 @@ impl Quotients {
         let value = found.value;
         let (mut slope, mut curvature) = (Vec::new(), Vec::new());
         let mut at = x.to_vec();
-        for (i, variable) in variables
-            .iter()
-            .enumerate()
-            .take(which.end)
-            .skip(which.start)
-        {
+        for i in which {
+            let (variable, step) = (variables[i], steps[i]);
             let flattest = FLATTEST / (variable.step * variable.step);
             let (up, down) = (
-                variable.step.min(variable.high - x[i]),
-                variable.step.min(x[i] - variable.low),
+                step.min(variable.high - x[i]),
+                step.min(x[i] - variable.low),
             );
             let mut away = |step: f64| -> Result<f64, Error> {
                 at[i] = x[i] + step;
@@ -242,11 +249,22 @@ impl Quotients {
                 } else {
                     0.0
                 });
-                curvature.push((one_sided.abs() / variable.step).max(flattest));
+                curvature.push((one_sided.abs() / step).max(flattest));
             }
         }
         Ok(Self { slope, curvature })
     }
+}
+
+/// Fit the steps of difference quotients to these second derivatives; is one much shorter?
+fn shorten(variables: &[Variable], curvature: &[f64], steps: &mut [f64]) -> bool {
+    let mut is_shorter = false;
+    for ((variable, bend), step) in variables.iter().zip(curvature).zip(steps) {
+        let before = *step;
+        *step = variable.step.min((STEEPEST / bend).sqrt());
+        is_shorter |= *step < 0.5 * before;
+    }
+    is_shorter
 }
 
 /// The gradient, and the inverse of the Hessian: the known curvature of the first variables, and that
@@ -256,12 +274,16 @@ impl Quotients {
 /// effect, steps of Newton's run along the valley, past minima.
 fn by_quotients(
     variables: &[Variable],
+    steps: &mut [f64],
     x: &[f64],
     found: &Value,
     function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     let (n, known) = (x.len(), found.slope.len());
-    let quotients = Quotients::new(variables, x, found, 0..n, function)?;
+    let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
+    if shorten(variables, &quotients.curvature, steps) {
+        quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
+    }
     let mut inverse = vec![0.0; n * n];
     for (i, bend) in quotients.curvature.iter().enumerate() {
         inverse[i * n + i] = 1.0 / bend;
@@ -277,23 +299,28 @@ fn by_quotients(
     Ok((quotients.slope, inverse))
 }
 
-/// The inverse of a matrix of this size that is positive definite, else nothing.
+/// The inverse of a matrix of this size, by Cholesky's method on its unit diagonal; none for one that
+/// is not positive definite.
 fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
-    // Its Cholesky factor, column by column, then the solutions for the unit vectors.
+    let scales: Vec<f64> = (0..n).map(|i| matrix[i * n + i].sqrt().recip()).collect();
+    if !scales.iter().all(|scale| scale.is_finite() && *scale > 0.0) {
+        return None;
+    }
     let mut l = vec![0.0; n * n];
-    for j in 0..n {
-        for i in j..n {
-            let done: f64 = (0..j).map(|k| l[i * n + k] * l[j * n + k]).sum();
-            let left = matrix[i * n + j] - done;
-            if i > j {
-                l[i * n + j] = left / l[j * n + j];
-            } else if left > DEFINITE * matrix[i * n + i] && left.is_finite() {
-                l[i * n + i] = left.sqrt();
+    for i in 0..n {
+        for j in 0..=i {
+            let scaled = matrix[i * n + j] * scales[i] * scales[j];
+            let left = scaled - product(&l[i * n..][..j], &l[j * n..][..j]);
+            l[i * n + j] = if i > j {
+                left / l[j * n + j]
+            } else if left + RIDGE > 0.0 {
+                (left + RIDGE).sqrt()
             } else {
                 return None;
-            }
+            };
         }
     }
+    // The solutions for the unit vectors.
     let mut inverse = vec![0.0; n * n];
     for unit in 0..n {
         let mut column = vec![0.0; n];
@@ -304,8 +331,8 @@ fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
         for i in (0..n).rev() {
             let done: f64 = (i + 1..n).map(|k| l[k * n + i] * column[k]).sum();
             column[i] = (column[i] - done) / l[i * n + i];
+            inverse[unit * n + i] = column[i] * scales[unit] * scales[i];
         }
-        inverse[unit * n..][..n].copy_from_slice(&column);
     }
     Some(inverse)
 }
@@ -442,11 +469,18 @@ mod tests {
 
     #[test]
     fn the_inverse_is_one_and_only_of_definite_matrices() {
-        let found = inverted(&[4.0, 2.0, 2.0, 3.0], 2).unwrap();
-        for (found, expected) in found.iter().zip([0.375, -0.25, -0.25, 0.5]) {
-            assert!((found - expected).abs() < 1e-15);
+        let matrix = [4.0, 1e-3, 2.0, 1e-3, 1e-6, 1e-4, 2.0, 1e-4, 3.0];
+        let inverse = inverted(&matrix, 3).unwrap();
+        for i in 0..3 {
+            for j in 0..3 {
+                let sum: f64 = (0..3).map(|k| matrix[i * 3 + k] * inverse[k * 3 + j]).sum();
+                let size = (inverse[j * 3 + j] * matrix[i * 3 + i]).sqrt();
+                let unit = if i == j { 1.0 } else { 0.0 };
+                assert!((sum - unit).abs() < 1e-5 * size, "{i} {j} {sum}");
+            }
         }
         assert_eq!(inverted(&[1.0, 2.0, 2.0, 1.0], 2), None);
         assert_eq!(inverted(&[f64::NAN], 1), None);
+        assert_eq!(inverted(&[0.0], 1), None);
     }
 }

@@ -1,0 +1,389 @@
+"""Fly steps against ArduPilot's Copter in its software-in-the-loop build, and keep the recordings.
+
+A P controller outside the vehicle sends velocity commands every 65 ms and reads the position that
+the vehicle reports. Commands wait in a queue for a known time before they are sent, so the delay of
+the loop is that of the vehicle and this time. The firmware runs at the speed of the clock.
+
+Times are those of the vehicle. Each position comes with the time of the vehicle at which it was
+reported; the difference between the time at which it was received and this time is, at its least,
+the offset between the two clocks. A line through the least differences of every two seconds, which
+allows for clocks of different rates, converts the times of commands; positions are interpolated
+between the reports, by their velocities, at these times.
+
+Run ``python benches/reality/flights.py ARDUCOPTER FOLDER FLIGHT ...`` where nothing else is on the
+network: the firmware opens ports on all interfaces, so `firmware.fly` starts it in a network
+namespace of its own. A flight is named as ``height-calm-0.10-1``: axis, calm or wind, time in s
+added to the commands, and repeat. Requires pymavlink.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PORT = 14650
+
+#: Time between commands, s; largest command, m/s; height of the flights, m.
+SAMPLE, LIMIT, HEIGHT = 0.065, 1.0, 10.0
+
+#: Proportional gains, 1/s, by axis.
+GAINS = {"height": 1.0, "north": 0.6}
+
+#: Size of a step, m; rest before the first, and time for each, s; their number.
+STEP, REST, HOLD, STEPS = 1.0, 4.0, 8.0, 4
+
+#: Time for the vehicle to come to rest before the recording begins, s.
+APPROACH = 6.0
+
+#: Wind in m/s and turbulence of the simulated atmosphere.
+WINDS = {"calm": (0.0, 0.0), "wind": (5.0, 1.0)}
+
+#: A row that is later than this, in s, keeps the time at which its command was computed; the others
+#: have the time at which it was due.
+LATE = 0.002
+
+#: Positions each second, and the time over which the least difference of clocks is sought, s.
+RATE, STRETCH = 50.0, 2.0
+
+#: Wall time in s after which a session is ended: to be ready, to take off, to answer a request.
+READY, CLIMB, ANSWER = 180.0, 60.0, 10.0
+
+#: Wall time in s after which the firmware ends, whatever has become of this process.
+LONGEST = 3600.0
+
+#: What shapes a velocity command by axis: acceleration in cm/s², jerk in m/s³.
+SHAPING = {"height": ("WPNAV_ACCEL_Z", "PSC_JERK_Z"), "north": ("WPNAV_ACCEL", "PSC_JERK_XY")}
+
+
+class Flight(NamedTuple):
+    """What is flown."""
+
+    axis: str
+    wind: str
+    added: float
+    repeat: int
+
+    @property
+    def name(self) -> str:
+        """As in file names."""
+        return f"{self.axis}-{self.wind}-{self.added:.2f}-{self.repeat}"
+
+    @classmethod
+    def of(cls, name: str) -> Flight:
+        """The flight of this name."""
+        axis, wind, added, repeat = name.split("-")
+        if axis not in GAINS or wind not in WINDS:
+            raise ValueError(f"no flight {name!r}: name one as height-calm-0.10-1")
+        return cls(axis, wind, float(added), int(repeat))
+
+
+class Position(NamedTuple):
+    """What the vehicle reported: when received, its own time, north and height with velocities."""
+
+    received: float
+    stamp: float
+    north: float
+    height: float
+    north_speed: float
+    climb: float
+
+
+class Vehicle:
+    """The connection to the firmware."""
+
+    def __init__(self) -> None:
+        os.environ["MAVLINK20"] = "1"
+        from pymavlink import mavutil
+
+        self.link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{PORT}", source_system=255)
+        self.messages = mavutil.mavlink
+        self.position: Position | None = None
+
+    def read(self, until: float) -> Any:
+        """The next message before a time of the clock, or None."""
+        while True:
+            message = self.link.recv_msg()
+            if message is not None:
+                if message.get_type() == "LOCAL_POSITION_NED":
+                    self.position = Position(
+                        time.monotonic(),
+                        message.time_boot_ms / 1e3,
+                        message.x,
+                        -message.z,
+                        message.vx,
+                        -message.vz,
+                    )
+                return message
+            left = until - time.monotonic()
+            if left <= 0.0:
+                return None
+            select.select([self.link.port], [], [], left)
+
+    def wait(self, holds: Callable[[Any], bool], seconds: float, what: str) -> Any:
+        """The first message of which something holds."""
+        end = time.monotonic() + seconds
+        while (message := self.read(end)) is not None:
+            if holds(message):
+                return message
+        raise TimeoutError(f"the firmware did not {what} within {seconds:g} s")
+
+    def command(self, number: int, *values: float) -> None:
+        """Send a command until it is accepted."""
+        end = time.monotonic() + ANSWER
+        while time.monotonic() < end:
+            self.link.mav.command_long_send(1, 1, number, 0, *values, *[0.0] * (7 - len(values)))
+            try:
+                reply = self.wait(
+                    lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, 2.0, "answer"
+                )
+            except TimeoutError:
+                continue
+            if reply.result == self.messages.MAV_RESULT_ACCEPTED:
+                return
+        raise TimeoutError(f"the firmware did not accept command {number} within {ANSWER:g} s")
+
+    def parameter(self, name: str) -> float:
+        """The value of a parameter."""
+        for _ in range(5):
+            self.link.mav.param_request_read_send(1, 1, name.encode(), -1)
+            try:
+                return float(
+                    self.wait(
+                        lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == name,
+                        1.0,
+                        "answer",
+                    ).param_value
+                )
+            except TimeoutError:
+                continue
+        raise TimeoutError(f"the firmware did not say its {name}")
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter, until the vehicle says so."""
+        for _ in range(5):
+            self.link.mav.param_set_send(1, 1, name.encode(), value, 9)
+            try:
+                self.wait(
+                    lambda m: (
+                        m.get_type() == "PARAM_VALUE"
+                        and m.param_id == name
+                        and abs(m.param_value - value) < 1e-4
+                    ),
+                    1.0,
+                    "answer",
+                )
+                return
+            except TimeoutError:
+                continue
+        raise TimeoutError(f"the firmware did not take {name}={value:g}")
+
+    def send_velocity(self, axis: str, value: float) -> None:
+        """Command a velocity in m/s, up or to the north."""
+        north, up = (value, 0.0) if axis == "north" else (0.0, value)
+        self.link.mav.set_position_target_local_ned_send(
+            0, 1, 1, 1, 0b0000110111000111, 0, 0, 0, north, 0, -up, 0, 0, 0, 0, 0
+        )
+
+    def take_off(self) -> None:
+        """Wait until it can fly, arm, and climb."""
+        self.wait(lambda m: m.get_type() == "HEARTBEAT", READY, "say anything")
+        m = self.messages
+        for message, rate in (
+            (m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, RATE),
+            (m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2.0),
+        ):
+            self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message, 1e6 / rate)
+        self.wait(
+            lambda m: m.get_type() == "EKF_STATUS_REPORT" and m.flags & 16, READY, "find itself"
+        )
+        end = time.monotonic() + READY
+        while True:
+            try:
+                self.command(m.MAV_CMD_DO_SET_MODE, 1.0, 4.0)
+                self.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+                self.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, HEIGHT)
+                break
+            except TimeoutError:
+                if time.monotonic() > end:
+                    raise
+        self.wait(
+            lambda _: self.position is not None and self.position.height > HEIGHT - 0.3,
+            CLIMB,
+            "reach its height",
+        )
+
+    def set_wind(self, wind: str) -> None:
+        """Set the simulated atmosphere."""
+        for name, value in zip(("SIM_WIND_SPD", "SIM_WIND_TURB"), WINDS[wind], strict=True):
+            self.set_parameter(name, value)
+
+
+@dataclass
+class Log:
+    """One flight: rows of (time computed, planned, reference, measured, command), when commands
+    were due and sent, and positions.
+    """
+
+    rows: list[tuple[float, float, float, float, float]]
+    sent: list[tuple[float, float]]
+    positions: list[Position]
+
+
+def fly(vehicle: Vehicle, flight: Flight) -> Log:
+    """Fly the steps of one flight."""
+    position = vehicle.position
+    assert position is not None
+    base = round(position.north) if flight.axis == "north" else HEIGHT
+    log = Log([], [], [])
+    queue: deque[tuple[float, float]] = deque()
+    start = time.monotonic() + 0.05
+    samples = math.ceil((APPROACH + REST + STEPS * HOLD) / SAMPLE)
+    for sample in range(samples):
+        due = start + sample * SAMPLE
+        while True:
+            until = min(due, queue[0][0]) if queue else due
+            if (now := time.monotonic()) >= until:
+                if until == due:
+                    break
+                vehicle.send_velocity(flight.axis, queue.popleft()[1])
+                log.sent.append((until, time.monotonic()))
+            elif vehicle.read(until) is not None and vehicle.position is not position:
+                position = vehicle.position
+                log.positions.append(position)
+        since = sample * SAMPLE - APPROACH - REST
+        reference = base + STEP * (since >= 0.0 and int(since // HOLD) % 2 == 0)
+        measured = position.north if flight.axis == "north" else position.height
+        wanted = GAINS[flight.axis] * (reference - measured)
+        command = min(max(wanted, -LIMIT), LIMIT)
+        now = time.monotonic()
+        if now - position.received > 1.0:
+            raise TimeoutError("the firmware has reported no position for 1 s")
+        if flight.added:
+            queue.append((now + flight.added, command))
+        else:
+            vehicle.send_velocity(flight.axis, command)
+            log.sent.append((now, time.monotonic()))
+        log.rows.append((now, due, reference, measured, command))
+    end = time.monotonic() + 0.2
+    while vehicle.read(end) is not None:
+        if vehicle.position is not position:
+            position = vehicle.position
+            log.positions.append(position)
+    vehicle.send_velocity(flight.axis, 0.0)
+    return log
+
+
+def clock_of(positions: Sequence[Position]) -> tuple[float, float, float]:
+    """Rate and offset of the vehicle's time over the received times, and the largest misfit in s.
+
+    The misfit is that of the least differences to the line.
+    """
+    received = np.array([one.received for one in positions])
+    differences = received - np.array([one.stamp for one in positions])
+    places = ((received - received[0]) / STRETCH).astype(int)
+    least = np.array(
+        [
+            min(np.flatnonzero(places == place), key=lambda i: differences[i])
+            for place in np.unique(places)[:-1]
+        ]
+    )
+    x, y = received[least] - received[0], differences[least]
+    slope, offset = np.polyfit(x, y, 1)
+    misfit = float(np.max(np.abs(y - slope * x - offset)))
+    return 1.0 - float(slope), float(offset - slope * received[0]), misfit
+
+
+def rms_and_max(late: Array) -> list[float]:
+    """Root mean square, and the largest, in s."""
+    return [float(np.sqrt(np.mean(late**2))), float(np.max(late))]
+
+
+def write(folder: Path, flight: Flight, log: Log, parameters: dict[str, float]) -> None:
+    """Write the recording, in the vehicle's time, and what is to be known of it."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    rate, offset, misfit = clock_of(log.positions)
+    table = np.array(log.positions)
+    table = table[np.r_[True, np.diff(table[:, 1]) > 0.0]]
+    axis = (2, 4) if flight.axis == "north" else (3, 5)
+    path = CubicHermiteSpline(table[:, 1], table[:, axis[0]], table[:, axis[1]])
+    rows = np.array(log.rows)
+    late = rows[:, 0] - rows[:, 1]
+    times = rate * np.where(late < LATE, rows[:, 1], rows[:, 0]) - offset
+    kept = times >= times[0] + APPROACH
+    columns = np.c_[times, rows[:, 2], path(times), rows[:, 4]][kept]
+    columns[:, 0] -= columns[0, 0]
+    np.savetxt(
+        folder / f"{flight.name}.csv",
+        columns,
+        fmt="%.9f",
+        delimiter=",",
+        header="time,reference,output,command",
+        comments="",
+    )
+    facts = {
+        "clock_rate": rate,
+        "clock_misfit": misfit,
+        "late": rms_and_max(late),
+        "sent_late": rms_and_max(np.diff(np.array(log.sent), axis=1)[:, 0]),
+        "positions_each_second": float(1.0 / np.median(np.diff(table[:, 1]))),
+        "parameters": parameters,
+    }
+    (folder / f"{flight.name}.json").write_text(json.dumps(facts, indent=1) + "\n")
+
+
+def session(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
+    """Fly in one session of the firmware, and end it in any case."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as own, (folder / "firmware.log").open("a") as said:
+        options = (
+            f"--model quad --speedup 1 --home 38.7,-9.1,100,0 -w -I0 --serial1 none --serial2 none "
+            f"--serial0 udpclient:127.0.0.1:{PORT} --defaults"
+        ).split()
+        defaults = str(arducopter.parent / "copter.parm")
+        firmware = subprocess.Popen(
+            ["timeout", f"{LONGEST:g}", str(arducopter), *options, defaults],
+            cwd=own,
+            stdout=said,
+            stderr=said,
+        )
+        try:
+            vehicle = Vehicle()
+            vehicle.take_off()
+            names = [name for pair in SHAPING.values() for name in pair]
+            parameters = {name: vehicle.parameter(name) for name in names}
+            wind = None
+            for flight in flights:
+                if flight.wind != wind:
+                    vehicle.set_wind(wind := flight.wind)
+                log = fly(vehicle, flight)
+                write(folder, flight, log, parameters)
+                print(flight.name, flush=True)
+        finally:
+            firmware.send_signal(signal.SIGTERM)
+            try:
+                firmware.wait(5.0)
+            except subprocess.TimeoutExpired:
+                firmware.kill()
+                firmware.wait()
+
+
+if __name__ == "__main__":
+    session(Path(sys.argv[1]), Path(sys.argv[2]), [Flight.of(name) for name in sys.argv[3:]])

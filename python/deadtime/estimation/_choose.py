@@ -1,0 +1,295 @@
+"""`choose_plant`: how many lags a plant has, and whether it has a zero, by the evidence.
+
+Each plant of the family is fitted with all its numbers free, beside the noise. Schwarz's (1978)
+criterion weighs the likelihood against the number of unknowns,
+
+    BIC = -2 ln L + k ln n,
+
+k the numbers of the plant, of its trim and of coloured sensor noise, n the rows (air is fitted
+beside every plant). The plant of the least BIC is taken among those whose
+model is adequate, or among all where none is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
+from deadtime.estimation.methods._method import Loops, Method, Recordings, Windows, paired_runs
+from deadtime.loops import ControlLoop, FactoredPlant
+
+#: Most lags that are tried.
+MOST_LAGS = 3
+
+#: Where the first lag and each further one begin, in rows, and the zero, as shares of the lags.
+LONG, SHORT, ZEROS = 3.0, 0.5, (0.3, 3.0)
+
+#: Headings of the table.
+COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
+
+#: Points of the distribution of delay and lag together, and the least weight of a plant in it.
+PLACES, LEAST = 4001, 1e-3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlantChoice(ReadOnlyArrays):
+    """Plants of a family fitted to the same recordings, and the one that the evidence is for.
+
+    Attributes
+    ----------
+    estimates : dict of str to DelayEstimate
+        By the name of the plant, such as ``"2 lags, zero"``.
+    criteria : dict of str to float
+        Their BIC; the likeliest plant has the least.
+    refusals : dict of str to str
+        The reasons of plants that gave no estimate.
+    chosen : str
+        Name of the plant that was taken.
+    """
+
+    estimates: Mapping[str, DelayEstimate]
+    criteria: Mapping[str, float]
+    refusals: Mapping[str, str]
+    chosen: str
+
+    @property
+    def best(self) -> DelayEstimate:
+        """The estimate with the plant that was taken."""
+        return self.estimates[self.chosen]
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Probability of each plant that may be taken, if all were as probable before."""
+        likely = {name: self.criteria[name] for name in _adequate(self.estimates)}
+        least = min(likely.values())
+        shares = {name: math.exp(0.5 * (least - one)) for name, one in likely.items()}
+        return {name: share / sum(shares.values()) for name, share in shares.items()}
+
+    def ci(self, level: float = 0.95) -> tuple[float, float]:
+        """Interval of delay and lag together, s, over all plants that may be taken.
+
+        A plant with fewer lags than the vehicle may be the likeliest, and its own interval does not
+        know of the others. This is that of their mixture by `weights` (Hoeting et al. 1999).
+
+        Parameters
+        ----------
+        level : float
+            Between 0 and 1.
+        """
+        from scipy import special
+
+        one = float(special.erf(math.sqrt(0.5)))
+        weights = {name: weight for name, weight in self.weights.items() if weight > LEAST}
+        fits = {name: self.estimates[name] for name in weights}
+        ends = [fit.ci(level, "delay+lag") for fit in fits.values()]
+        places = np.linspace(min(low for low, _ in ends), max(high for _, high in ends), PLACES)
+        below = np.zeros(PLACES)
+        for name, fit in fits.items():
+            middle = fit.delay_plus_lag
+            low, high = fit.ci(one, "delay+lag")
+            sizes = np.maximum(np.where(places < middle, middle - low, high - middle), 1e-12)
+            below += weights[name] / sum(weights.values()) * special.ndtr((places - middle) / sizes)
+        low, high = np.interp([0.5 - level / 2, 0.5 + level / 2], below, places)
+        return float(low), float(high)
+
+    def rows(self) -> list[list[str]]:
+        """The plants as cells of a table with the headings `COLUMNS`, the likeliest first."""
+        least = min(self.criteria.values())
+        found = []
+        for name in sorted(self.criteria, key=lambda name: self.criteria[name]):
+            fit = self.estimates[name]
+            low, high = fit.ci(0.95, "delay+lag")
+            span = fit.recording.time[-1] - fit.recording.time[0]
+            found.append(
+                [
+                    f"{name} *" if name == self.chosen else name,
+                    f"{self.criteria[name] - least:+.1f}",
+                    "yes" if fit.whiteness.white else "no",
+                    "yes" if fit.adequate else "no",
+                    f"{fit.delay:.3f}",
+                    f"{fit.lag or 0.0:.3f}",
+                    f"{fit.delay_plus_lag:.3f}",
+                    f"{low:.3f} – {high:.3f}" if high - low < span else "unknown",
+                ]
+            )
+        return found + [[name, f"refused: {why}"] for name, why in self.refusals.items()]
+
+    def remarks(self) -> list[str]:
+        """What the table means, in sentences."""
+        found = ["BIC is less that of the likeliest plant; * was taken; times in s."]
+        if not self.best.adequate:
+            found.append("No plant of the family is adequate.")
+        found.append(
+            "Delay and lag together, over all plants by their weight: {:.4f} to {:.4f} s "
+            "(95 %).".format(*self.ci())
+        )
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """All results but the arrays, as plain values for JSON."""
+        return {
+            "chosen": self.chosen,
+            "delay_plus_lag_interval_95": list(self.ci()),
+            "bic": dict(self.criteria),
+            "estimates": {name: fit.to_dict() for name, fit in self.estimates.items()},
+            "refusals": dict(self.refusals),
+        }
+
+    def __repr__(self) -> str:
+        return f"<PlantChoice {self.chosen} of {len(self.estimates)} plants: {self.best!r}>"
+
+    def __str__(self) -> str:
+        rows = [list(COLUMNS), *self.rows()]
+        full = [row for row in rows if len(row) == len(COLUMNS)]
+        widths = [max(len(cell) for cell in column) for column in zip(*full, strict=True)]
+        lines = [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
+            for row in rows
+        ]
+        return "\n".join([*lines, *self.remarks(), "", self.best.summary()])
+
+
+def choose_plant(
+    recording: Recordings,
+    loop: Loops,
+    *,
+    method: str | Method = "auto",
+    window: Windows = None,
+    most_lags: int = MOST_LAGS,
+) -> PlantChoice:
+    """Estimate the delay with as many lags as the recording shows.
+
+    Plants with none to `most_lags` lags, each with and without a zero, are fitted with all their
+    numbers free. Whether the plant integrates is known from that of `loop`. Which of two plants it
+    is may be open, and how the lags divide among themselves: delay and lag together are well
+    determined in any case.
+
+    Parameters
+    ----------
+    recording : Recording or list of Recording
+        As for `deadtime.estimate_delay`.
+    loop : ControlLoop or list of ControlLoop
+        What is known. The plant says whether it integrates, and its gain is a start.
+    method : str or Method
+        ``"output_error"`` or ``"waveform"``; ``"auto"`` takes the first where all recordings have
+        a command.
+    window : (low, high) or list of them, optional
+        The part to use, s.
+    most_lags : int
+        Up to how many lags are tried.
+
+    Returns
+    -------
+    PlantChoice
+
+    Raises
+    ------
+    NotIdentifiableError
+        When no plant of the family gives an estimate; the message has the reason of the first.
+    ValueError
+        If a plant has delays inside, or `most_lags` is below one.
+
+    References
+    ----------
+    G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6 (1978).
+
+    Examples
+    --------
+    A vehicle with two lags follows a square wave:
+
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> time = np.arange(200) * 0.02
+    >>> told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    >>> vehicle = dtm.FactoredPlant([0.15, 0.05]).transfer_function() * dtm.delay(0.047)
+    >>> attitude = np.ravel(vehicle.simulate(time, told).outputs)
+    >>> attitude = attitude + 0.003 * np.random.default_rng(1).standard_normal(200)
+    >>> flight = dtm.Recording(time, told, attitude, command=told)
+    >>> known = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0), sample_time=0.02)
+    >>> choice = dtm.estimation.choose_plant(flight, known, most_lags=2)
+    >>> choice.chosen
+    '2 lags'
+    >>> low, high = choice.best.ci(0.95, "delay+lag")
+    >>> low < 0.247 < high
+    True
+    """
+    if most_lags < 1:
+        raise ValueError(f"most_lags={most_lags}: give at least one")
+    runs = paired_runs(recording, loop, window)
+    loops = [run.loop for run in runs]
+    if not all(one.plant.is_rational for one in loops):
+        raise ValueError(
+            "the plant has delays inside: choose_plant fits a gain, lags and a zero behind one "
+            "delay; give an Integrator() or a FirstOrder(), which says whether the plant integrates"
+        )
+    estimates: dict[str, DelayEstimate] = {}
+    refusals = {}
+    plant = _first(loops[0], runs[0].recording.sample_time)
+    for count in range(len(plant.lags), most_lags + 1):
+        if count > len(plant.lags):
+            further = SHORT * runs[0].recording.sample_time
+            plant = replace(plant, lags=(*plant.lags, further), zero=0.0)
+        # Without a zero its effect would be that of the delay, so that a search stays there.
+        for shares in ((0.0,), ZEROS) if count else ((0.0,),):
+            with_zero = shares is ZEROS
+            name = f"{count or 'no'} {'lag' if count == 1 else 'lags'}{', zero' * with_zero}"
+            free = ["delay", *(one for one in plant.parameters if with_zero or one != "zero")]
+            fits = []
+            for share in shares:
+                started = replace(plant, zero=share * sum(plant.lags))
+                tried = [one.replace(plant=started) for one in loops]
+                try:
+                    fits.append(
+                        estimate_delay(recording, tried, method=method, free=free, window=window)
+                    )
+                except NotIdentifiableError as error:
+                    refusals[name] = str(error)
+            if not fits:
+                continue
+            refusals.pop(name, None)
+            estimates[name] = fit = min(fits, key=_bic)
+            if not with_zero:  # where the search of the next plants begins
+                plant = cast(FactoredPlant, fit.loop.plant)
+    if not estimates:
+        raise NotIdentifiableError(next(iter(refusals.values())))
+    criteria = {name: _bic(fit) for name, fit in estimates.items()}
+    chosen = min(_adequate(estimates), key=lambda name: criteria[name])
+    return PlantChoice(estimates, criteria, refusals, chosen)
+
+
+def _adequate(estimates: Mapping[str, DelayEstimate]) -> list[str]:
+    """Names of the adequate ones, or of all where none is."""
+    return [name for name, fit in estimates.items() if fit.adequate] or list(estimates)
+
+
+def _first(loop: ControlLoop, sample: float) -> FactoredPlant:
+    """The plant of the family with the fewest lags."""
+    _, den = loop.plant.polynomials()
+    integrator = bool(den[-1] == 0.0)
+    lags = () if integrator else (LONG * sample,)
+    return FactoredPlant(lags, loop.parameters.get("gain", 1.0), integrator=integrator)
+
+
+def _bic(fit: DelayEstimate) -> float:
+    """Schwarz's criterion of the fit, from the plain likelihood."""
+    rows = sum(run.residuals.size for run in fit.runs)
+    unknown = len(fit.free)
+    if not isinstance(fit._profile, LikelihoodProfile):  # least squares: white noise
+        square = np.concatenate([run.residuals for run in fit.runs]) ** 2
+        least = max(float(np.mean(square)), np.finfo(float).tiny)
+        return rows * math.log(least) + unknown * math.log(rows)
+    fitted, total = fit._profile.fit, 0.0
+    for part, one, noise in zip(fitted.parts, fitted.runs, fitted.numbers.noise, strict=True):
+        count = int(np.sum(one.used))
+        total += count * math.log(part.variance * part.freedom / count) + part.log_det
+        unknown += fitted.trim + 2 * (noise.sensor > 0.0)
+    return total + unknown * math.log(rows)

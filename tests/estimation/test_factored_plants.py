@@ -1,0 +1,109 @@
+"""Estimates of plants with several lags and a zero."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation import Waveform
+from vehicles import answer, record_attitude
+
+VEHICLE = {"delay": 0.047, "lags": (0.15, 0.05), "gain": 0.95}
+KNOWN = dtm.ControlLoop(dtm.FactoredPlant([0.1, 0.1]), dtm.P(1.0), sample_time=0.02)
+FREE = ("delay", "gain", "lag_1", "lag_2")
+
+
+def test_the_independent_response_is_that_of_the_plant():
+    time = 0.02 * np.arange(80)
+    for integrator in (False, True):
+        plant = dtm.FactoredPlant([0.15, 0.05], 0.95, 0.03, integrator)
+        own = answer(time, time, np.ones(80), **VEHICLE | {"zero": 0.03, "integrator": integrator})
+        of_plant = plant.transfer_function().step_response(np.r_[0.0, time[3:] - 0.047]).outputs
+        np.testing.assert_allclose(own[3:], np.ravel(of_plant)[1:], atol=1e-9)
+
+
+@pytest.mark.parametrize("integrator", [False, True])
+def test_each_lag_is_recovered_without_noise(integrator):
+    recording = record_attitude(0, noise=1e-6, **VEHICLE, integrator=integrator)
+    known = KNOWN.replace(plant=dtm.FactoredPlant([0.1, 0.1], integrator=integrator))
+    fit = dtm.estimate_delay(recording, known, free=FREE)
+    found = fit.loop.parameters
+    assert sorted([found["lag_1"], found["lag_2"]]) == pytest.approx([0.05, 0.15], rel=2e-3)
+    assert fit.delay == pytest.approx(0.047, rel=2e-3)
+    assert fit.lag == pytest.approx(0.2, rel=1e-3)
+
+
+def test_the_zero_takes_from_the_total_lag():
+    recording = record_attitude(1, noise=1e-4, **VEHICLE, zero=0.08)
+    known = KNOWN.replace(plant=dtm.FactoredPlant([0.1, 0.1], zero=0.01))
+    fit = dtm.estimate_delay(recording, known, free=(*FREE, "zero"))
+    assert fit.loop.parameters["zero"] == pytest.approx(0.08, abs=3.0 * fit.stderr["zero"])
+    low, high = fit.ci(0.95, "zero")
+    assert low < 0.08 < high
+    assert high - low < 0.01
+    assert fit.delay_plus_lag == pytest.approx(0.167, abs=3e-4)
+    low, high = fit.ci(0.95, "delay+lag")
+    assert low < fit.delay_plus_lag < high
+    # Var(delay + lags - zero) of the joint covariance.
+    weights = np.array([{"gain": 0.0, "zero": -1.0}.get(name, 1.0) for name in fit.free])
+    assert fit.stderr["delay+lag"] == pytest.approx(np.sqrt(weights @ fit.cov @ weights), rel=1e-6)
+
+
+def test_intervals_of_each_number_are_as_wide_as_their_errors():
+    recording = record_attitude(2, **VEHICLE, zero=0.3)
+    known = KNOWN.replace(plant=dtm.FactoredPlant([0.1, 0.04], zero=0.1))
+    fit = dtm.estimate_delay(recording, known, free=(*FREE, "zero"))
+    for name, error in fit.stderr.items():
+        low, high = fit.ci(0.95, name)
+        assert 2.5 * error < high - low < 6.0 * error, name
+    # The zero is longer than delay and lags, so that the output leads a ramp.
+    low, high = fit.ci(0.95, "delay+lag")
+    assert low < -0.053 < high < 0.0
+
+
+def test_the_sum_is_covered_where_the_split_is_open():
+    held = 0
+    for seed in range(20):
+        fit = dtm.estimate_delay(record_attitude(seed, **VEHICLE), KNOWN, free=FREE)
+        low, high = fit.ci(0.95, "delay+lag")
+        held += low <= 0.247 <= high
+        assert high - low < 0.01
+    assert held >= 17
+
+
+def test_two_recordings_are_fitted_together():
+    flights = [record_attitude(seed, **VEHICLE) for seed in (1, 2)]
+    one = dtm.estimate_delay(flights[0], KNOWN, free=FREE)
+    both = dtm.estimate_delay(flights, KNOWN, free=FREE)
+    assert [run.noise.white for run in both.runs] == pytest.approx([0.003, 0.003], rel=0.2)
+    assert both.runs[0].noise is both.noise
+    assert both.runs[1].noise != both.noise
+    models = both.to_dict()["noise_models"]
+    assert [one["white"] for one in models] == [run.noise.white for run in both.runs]
+    assert str(both.runs[1].noise) in both.summary()
+    assert both.stderr["delay+lag"] < 0.85 * one.stderr["delay+lag"]
+    assert both.delay_plus_lag == pytest.approx(0.247, abs=4.0 * both.stderr["delay+lag"])
+
+
+def test_the_command_of_the_loop_serves_where_none_was_logged():
+    truth = KNOWN.replace(plant=dtm.FactoredPlant([0.2, 0.08], integrator=True), delay=0.1, Kp=1.2)
+    random, output = np.random.default_rng(3), []
+    time, jumps = 0.05 * np.arange(160), np.zeros(160)
+    reference = np.where(time < 1.0, 0.0, 1.0)
+    vehicle = {"delay": 0.1, "lags": (0.2, 0.08), "integrator": True}
+    for k, now in enumerate(time):
+        sent = np.cumsum(jumps[:k])
+        path = answer(np.array([now]), time[:k], sent, **vehicle)[0] if k else 0.0
+        output.append(path + 0.003 * random.standard_normal())
+        jumps[k] = 1.2 * (reference[k] - output[k]) - (sent[-1] if k else 0.0)
+    known = truth.replace(delay=None, lag_1=0.1, lag_2=0.1, sample_time=0.05)
+    fit = dtm.estimate_delay(dtm.Recording(time, reference, output), known, free=FREE)
+    assert fit.method == "waveform"
+    assert fit.adequate
+    low, high = fit.ci(0.95, "delay+lag")
+    assert low <= 0.38 <= high
+    with pytest.raises(ValueError, match="lag_1"):
+        dtm.estimate_delay(fit.recording, known, free=FREE, method=Waveform(noise="recording"))
+
+
+def test_a_name_that_the_plant_does_not_have_is_refused():
+    with pytest.raises(ValueError, match=r"lag_3.*choose from .*lag_2"):
+        dtm.estimate_delay(record_attitude(0, **VEHICLE), KNOWN, free=("delay", "lag_3"))
