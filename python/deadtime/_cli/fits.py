@@ -6,6 +6,7 @@ import re
 
 from deadtime._cli.show import print_text
 from deadtime.estimation import DelayEstimate
+from deadtime.estimation.likelihood._power import unseen_in_words
 
 #: What begins the reasons in the message of an estimate.
 _NOT_ADEQUATE = "; not adequate: "
@@ -30,7 +31,8 @@ def print_headline(fit: DelayEstimate) -> None:
     if fit.adequate:
         text = "The model is adequate: no test of it fails at the 1 % level."
         if "unseen_lag" in fit.details:
-            text += f" A further lag below {fit.details['unseen_lag']:.2g} s would not be seen."
+            words = unseen_in_words(fit.details["unseen_lag"])
+            text += f" {words[0].upper()}{words[1:]} be seen."
         print_text(text)
         return
     message = _as_option(fit.message)

@@ -105,7 +105,7 @@ class DelayEstimate(ReadOnlyArrays):
     details : dict
         Further results of the method, such as the overshoot. Those of a likelihood have
         ``"unseen_lag"``: a further lag of that size, s, would have been found with a probability
-        of 90 %, and one below it may be there unseen.
+        of 90 %, and one below it may be there unseen; infinite where no lag would be found.
     others : tuple of FittedRun
         The further recordings of a joint fit; `loop`, `recording` and `residuals` are those of
         the first.

@@ -39,10 +39,10 @@ OVERLAP = 4
 
 #: Most points of the grid over the delay, and its step in rows: the cost has minima less than a row
 #: apart, but not where a lag makes the response smooth.
-MOST_POINTS, SHARP_STEP, SMOOTH_STEP = 600, 0.25, 2.0
+MOST_POINTS, SHARP_STEP, SMOOTH_STEP = 600, 0.25, 1.0
 
-#: Minima of the grid of a recording that are refined.
-REFINED = 3
+#: Minima over the delay that are refined, for each recording and set of lags.
+REFINED = 2
 
 
 def is_long(runs: Sequence[FlightRows]) -> bool:
@@ -108,7 +108,7 @@ def least_squares(
 
 
 def _minima(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> list[PlantNumbers]:
-    """The lowest local minima of a grid over delay and lag."""
+    """The lowest local minima over the delay at each set of lags."""
     between = float(np.median(np.diff(rows.time)))
     delays = [first.delay]
     if "delay" in model.names:
@@ -117,8 +117,11 @@ def _minima(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> list[Pl
         count = int(min(MOST_POINTS, max(2.0, longest / step)))
         delays = np.linspace(0.0, longest, count + 1).tolist()
     likelihood = model.likelihood([rows], False)
-    lags = grid_lags(model, between)
-    return grid_minima(likelihood, delays, lags, first.noise, first)[:REFINED]
+    return [
+        point
+        for lags in grid_lags(model, between)
+        for point in grid_minima(likelihood, delays, [lags], first.noise, first)[:REFINED]
+    ]
 
 
 def on_all_rows(fit: NoiseFit, runs: Sequence[FlightRows]) -> NoiseFit:

@@ -15,7 +15,7 @@ from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._free_limits import LimitsProfile
-from deadtime.estimation.likelihood._power import unseen_lag
+from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -233,4 +233,4 @@ def _message(
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:
         return text + f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
-    return f"{text}; a further lag below {unseen:.2g} s would not have been seen"
+    return f"{text}; {unseen_in_words(unseen)} have been seen"
