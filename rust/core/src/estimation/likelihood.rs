@@ -104,9 +104,6 @@ pub struct Evaluation {
     pub linear: Vec<f64>,
     /// (JᵀV⁻¹J)⁻¹, row-major: the linear unknowns, a searched gain, delay, lags and zero.
     pub inverse: Vec<f64>,
-    /// Fisher information of the searched unknowns: the inverse of their block of `inverse` over the
-    /// variance, row-major.
-    pub information: Vec<f64>,
     /// The whitened derivative by the delay, orthogonal to the linear unknowns, of norm one; empty
     /// where the delay is known.
     pub score: Vec<f64>,
@@ -234,7 +231,6 @@ pub(super) fn evaluate(
         linear: Vec::new(),
         searched: searched(&triangle, linear, &factors, 2.0 * m / squares),
         inverse: Vec::new(),
-        information: Vec::new(),
         score: Vec::new(),
         whitened: Vec::new(),
         residuals: Vec::new(),
@@ -252,15 +248,6 @@ pub(super) fn evaluate(
             }
         }
     }
-    let size = |place: usize| if place < first { 1.0 } else { found.gain };
-    found.information = (linear..count)
-        .flat_map(|i| (linear..count).map(move |j| (i, j)))
-        .map(|(i, j)| {
-            let (left, right) = (triangle.column(i), triangle.column(j));
-            let rows = left.iter().zip(right).take(i.min(j) + 1).skip(linear);
-            rows.map(|(x, y)| x * y).sum::<f64>() * size(i) * size(j) / variance
-        })
-        .collect();
     if by.delay {
         let mut unit = vec![0.0; first + 1];
         unit[first] = 1.0;

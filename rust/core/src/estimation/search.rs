@@ -151,8 +151,7 @@ pub(super) fn minimise(
             found = next;
             let parts = found.slope.iter().zip(&lacking);
             let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
-            let others =
-                Quotients::new(variables, &steps, &x, &found, known..n, &mut function)?;
+            let others = Quotients::new(variables, &steps, &x, &found, known..n, &mut function)?;
             shorten(&variables[known..], &others.curvature, &mut steps[known..]);
             slopes.extend(others.slope);
             update(&mut inverse, &moved, &difference(&slopes, &gradient));
@@ -161,8 +160,7 @@ pub(super) fn minimise(
         } else if fresh {
             break;
         } else {
-            (gradient, inverse) =
-                by_quotients(variables, &mut steps, &x, &found, &mut function)?;
+            (gradient, inverse) = by_quotients(variables, &mut steps, &x, &found, &mut function)?;
             lacking = difference(&gradient, &found.slope);
             (exact, fresh) = (true, true);
         }
