@@ -20,6 +20,9 @@ Run ``python benches/estimation.py --reality [--runs N] [--rows NAME,NAME] [--fr
 air, lost rows, wrong clocks and other properties of real flights, from a generator that does not
 use the package (`reality`).
 
+Run ``python benches/estimation.py --designs [--runs N] [--quick]`` to design gains from such
+estimates, 200 a row, and to print the gain margin of the true loop beside the demanded one.
+
 Run ``python benches/estimation.py --firmware [--keep DIR | --read DIR] [--quick]`` to fly
 ArduPilot's Copter in its software-in-the-loop build, and to estimate on these flights
 (`reality.firmware`). The flights take 15 minutes at the speed of the clock; `--keep` keeps their
@@ -46,6 +49,7 @@ import numpy as np
 from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Waveform
 from deadtime.estimation._estimate import METHODS
 from reality import firmware
+from reality.designs import print_designs
 from reality.table import chosen, free_of, print_table
 
 SAMPLE = 0.065
@@ -468,6 +472,7 @@ def main() -> None:
     reality.add_argument("--rows", default="", help="only the rows of these names")
     reality.add_argument("--free", help="fit in every row: delay,gain or delay,gain,lag")
     reality.add_argument("--json", type=Path, help="write the numbers of the rows to this file")
+    reality.add_argument("--designs", action="store_true", help="print gains designed from them")
     flown = parser.add_argument_group("flights against ArduPilot's Copter")
     flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
     flown.add_argument("--keep", type=Path, metavar="DIR", help="keep the recordings in a folder")
@@ -477,6 +482,9 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if given.firmware:
         firmware.run(given.read, given.keep, given.processes, given.quick)
+        return
+    if given.designs:
+        print_designs(given.runs or (1 if given.quick else 200), given.processes)
         return
     if given.reality:
         runs = given.runs or (2 if given.quick else 1000)
