@@ -31,12 +31,11 @@ MET = 95.0
 
 
 class Designed(NamedTuple):
-    """Gain margins of the true loop, and of the best loop for exact knowledge over the gain."""
+    """Gain margins of the true loop, and the sharpest gain over that for exact knowledge."""
 
     margin: float
     sharpest: float
-    gain: float
-    exact_gain: float
+    share: float
 
 
 def gain_margin(loop: dtm.ControlLoop) -> float:
@@ -115,7 +114,7 @@ def line(name: str, found: list[Designed]) -> str:
     ):
         met = 100.0 * sum(margin >= DEMANDED for margin in margins) / len(margins)
         text += f"{met:>{wide}.0f}{sum(margin <= 1.0 for margin in margins):>10}"
-    used = 100.0 * math.fsum(one.gain / one.exact_gain for one in found) / len(found)
+    used = 100.0 * math.fsum(one.share for one in found) / len(found)
     least = min(one.sharpest for one in found)
     met = 100.0 * sum(one.sharpest >= DEMANDED for one in found) / len(found)
     return f"{text}{least:>8.2f}{used:>16.0f}  {'met' if met >= MET else 'missed'}"
