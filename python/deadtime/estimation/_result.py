@@ -16,7 +16,7 @@ from deadtime.estimation.fit._profile import Profile, floor_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
-from deadtime.loops import ControlLoop, FactoredPlant, Integrator
+from deadtime.loops import ControlLoop, FactoredPlant, Integrator, RateLimited
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
@@ -150,9 +150,12 @@ class DelayEstimate(ReadOnlyArrays):
     def lag(self) -> float | None:
         """Lag of the plant, s, fitted or as given; None if the plant has no such parameter.
 
-        Of a `FactoredPlant` the total lag: the sum of its lags less its zero.
+        Of a `FactoredPlant` the total lag: the sum of its lags less its zero. Of a plant that
+        limits rates, that of the plant after the limits.
         """
         plant = self.loop.plant
+        if isinstance(plant, RateLimited):
+            plant = plant.plant
         return plant.lag if isinstance(plant, (Integrator, FactoredPlant)) else None
 
     @property

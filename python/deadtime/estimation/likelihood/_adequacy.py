@@ -8,6 +8,7 @@ whitened residuals stay white. Beside their whiteness, these are tested:
 * a delay that is constant over the window: the cumulated score of the delay is a Brownian bridge
   over its information (Nyblom 1989);
 * air that is slower than the rows: faster air stands for something else;
+* air that moves the output as much while the vehicle rests (`air_at_rest`);
 * noise that does not grow with the speed of the output, as it does where time stamps are not the
   times of the samples (Breusch & Pagan 1979).
 """
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
+from deadtime.estimation.likelihood._air_at_rest import air_at_rest
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
@@ -117,6 +119,11 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
             reasons.append(
                 f"the air found{where} changes within a row and moves the output {share:.2g} times "
                 "the noise of the sensor, as no air does: it stands for something else"
+            )
+        if air_at_rest(fit, index) < SIGNIFICANCE:
+            reasons.append(
+                f"what is taken for air{where} moves the output more while the vehicle moves than "
+                "while it rests: the plant lacks something"
             )
     return Adequacy(whiteness, further, tuple(reasons), lacks_lag)
 

@@ -56,6 +56,10 @@ PRICE_OF_SENSOR, PRICE_OF_TRIM, PRICE_OF_SCATTER = 4.0, 9.0, 4.0
 #: Times that scatter by more rows than this are no scatter.
 MOST_SCATTER = 1.0
 
+#: A command that changes more often a row than this is one that a plant with limited rates gets: it
+#: moves steadily, and has no times that may scatter.
+STEADY = 2.0
+
 #: The numbers of the noise of one recording.
 PARTS = ("air_time", "air", "sensor_time", "sensor", "stamps", "arrivals")
 
@@ -252,7 +256,7 @@ def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
             speed = like.rate / like.gain
             moves = speed if part == "stamps" else np.diff(rows.command)
             size = float(np.max(np.abs(moves), initial=0.0))
-            if size == 0.0:
+            if size == 0.0 or rows.command.size > STEADY * rows.time.size:
                 return found
             runs.append(rows._replace(speed=speed))
             noise.append(changed(one, **{part: getattr(one, part) or 1.0 / size}))

@@ -16,6 +16,11 @@ use crate::Error;
 const ITERATIONS: usize = 60;
 const FIRST_ITERATIONS: usize = 10;
 
+/// Share of what a step promises below which it is poor, and the poor steps in a row after which the
+/// search ends: the function is then rougher than its derivatives.
+const POOR: f64 = 0.1;
+const STALLED: usize = 3;
+
 /// Most shortenings of a step, and by how much.
 const SHORTENINGS: usize = 12;
 const SHORTER: f64 = 0.4;
@@ -33,7 +38,7 @@ const FLATTEST: f64 = 1e-4;
 /// Added to a known curvature of unit diagonal: bounds its condition.
 const RIDGE: f64 = 1e-7;
 
-/// Decrease that a step over the first variables alone has to promise and bring.
+/// Decrease that matters: a step over the first variables alone has to promise and bring it.
 const WORTHWHILE: f64 = 0.02;
 
 /// A variable: where it starts and may go, the longest step of its difference quotients, and that of
@@ -126,6 +131,7 @@ pub(super) fn minimise(
     let mut lacking = difference(&gradient, &found.slope);
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
+    let mut stalled = 0;
     for _ in 0..ITERATIONS {
         let step = direction(variables, &x, &inverse, &gradient);
         if promised(&step, &gradient) <= tolerance {
@@ -148,7 +154,13 @@ pub(super) fn minimise(
             &mut function,
         )?;
         if let Some((next, moved)) = next {
+            let decrease = found.value - next.value;
+            let is_poor = decrease < WORTHWHILE && decrease < POOR * promised(&step, &gradient);
+            stalled = if is_poor { stalled + 1 } else { 0 };
             found = next;
+            if stalled >= STALLED {
+                break;
+            }
             let parts = found.slope.iter().zip(&lacking);
             let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
             let others = Quotients::new(variables, &steps, &x, &found, known..n, &mut function)?;
