@@ -31,7 +31,10 @@ MET = 95.0
 
 
 class Designed(NamedTuple):
-    """Gain margins of the true loop, and the sharpest gain over that for exact knowledge."""
+    """Gain margins of the true loop, and the sharpest gain over that for exact knowledge.
+
+    NaN where `design` found no gains.
+    """
 
     margin: float
     sharpest: float
@@ -56,16 +59,16 @@ def designed(name: str, number: int) -> Designed | None:
             return None
         if not fit.adequate:
             return None
-        best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=DEMANDED)
+        try:
+            best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=DEMANDED)
+        except ValueError:
+            return Designed(math.nan, math.nan, math.nan)
     vehicle = run.vehicle
     plant = dtm.Integrator(vehicle.gain, lag=sum(vehicle.lags))
     true = dtm.ControlLoop(plant, best.loop.controller, delay=vehicle.delay, sample_time=SAMPLE)
     margin = gain_margin(true)
     least = min(gain_margin(best.loop.replace(limit=None, **one)) for one in best.region.points)
-    gain = best.loop.controller.Kp
-    return Designed(
-        margin, margin * DEMANDED / least, gain * least / DEMANDED, gain * margin / DEMANDED
-    )
+    return Designed(margin, margin * DEMANDED / least, least / margin if margin else math.inf)
 
 
 def tried(name: str, numbers: range) -> list[Designed | None]:
@@ -76,7 +79,7 @@ def tried(name: str, numbers: range) -> list[Designed | None]:
 def print_designs(runs: int, processes: int) -> None:
     """Design for `runs` flights a row, and print how the true loops do."""
     print(
-        f"{'gain margin of 2.5':24}{'designs':>9}{'met, %':>8}{'unstable':>10}"
+        f"{'gain margin of 2.5':24}{'adequate':>9}{'no gains':>9}{'met, %':>8}{'unstable':>10}"
         f"{'sharpest: met, %':>18}{'unstable':>10}{'least':>8}{'of the gain, %':>16}"
     )
     begin = time.perf_counter()
@@ -105,7 +108,8 @@ def print_designs(runs: int, processes: int) -> None:
 
 def line(name: str, found: list[Designed]) -> str:
     """A row of the table."""
-    text = f"{name:24}{len(found):>9}"
+    text = f"{name:24}{len(found):>9}{sum(math.isnan(one.margin) for one in found):>9}"
+    found = [one for one in found if not math.isnan(one.margin)]
     if not found:
         return text
     for margins, wide in (

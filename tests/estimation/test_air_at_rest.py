@@ -1,0 +1,65 @@
+"""Air that is there only while the vehicle moves stands for what the plant lacks."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation.likelihood import _air_at_rest as rest
+from deadtime.estimation.likelihood._air_at_rest import air_at_rest
+from deadtime.experiments import FlightNoise
+
+KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=0.065, limit=1.0)
+TIME = 0.065 * np.arange(560)
+STEPS = np.where(TIME < 2.0, 0.0, (TIME - 2.0) // 8.0 % 2 == 0).astype(float)
+AIR = FlightNoise(white=0.001, air=0.04, air_time=0.4)
+
+
+def flown(seed, moved=None):
+    """Four steps in air, of which only a part may be there while the vehicle rests."""
+    random = np.random.default_rng(seed)
+    kept = np.exp(-0.065 / AIR.air_time)
+    command, output = np.zeros(TIME.size), np.zeros(TIME.size)
+    position = air = speed = 0.0
+    for row in range(TIME.size):
+        output[row] = position + AIR.white * random.standard_normal()
+        command[row] = np.clip(STEPS[row] - output[row], -1.0, 1.0)
+        # The delay is 4.6 samples: a part of two commands acts until the next.
+        told = [command[row - late] if row >= late else 0.0 for late in (4, 5)]
+        speed = 0.85 * (0.385 * told[0] + 0.615 * told[1])
+        air = kept * air + AIR.air * np.sqrt(1.0 - kept**2) * random.standard_normal()
+        share = 1.0 if moved is None or abs(speed) > 0.03 else moved
+        position += 0.065 * (speed + share * air)
+    return dtm.Recording(TIME, STEPS, output, command)
+
+
+def fitted(seed, moved=None):
+    return dtm.estimate_delay(flown(seed, moved), KNOWN, free=("delay", "gain"))
+
+
+def test_air_that_is_always_there_is_not_taken_for_more():
+    assert sum("while it rests" in fitted(seed).message for seed in range(30)) <= 2
+
+
+def test_air_that_is_there_while_the_vehicle_moves_is_found():
+    found = sum("while it rests" in fitted(seed, 0.1).message for seed in range(10))
+    assert found >= 7
+
+
+def test_the_covariance_of_changes_is_that_of_the_integral_of_air():
+    noise = fitted(0)._profile.fit.numbers.noise[0]
+    between, count = 0.065, 4
+    found = rest._covariance(noise, between, count, 30)
+    # By sums over short steps of the exponential covariance of the speed.
+    parts = 200
+    at = (np.arange(count * parts) + 0.5) * between / parts
+    for apart in (0, 2, 4, 7, 20):
+        gaps = np.abs(at[:, None] - at[None, :] - apart * between)
+        air = noise.air**2 * np.exp(-gaps / noise.air_time)
+        expected = float(np.sum(air)) * (between / parts) ** 2
+        expected += {0: 2.0, count: -1.0}.get(apart, 0.0)
+        assert found[apart] == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+def test_a_recording_without_rest_is_not_judged():
+    fit = fitted(1)._profile.fit
+    short = fit.runs[0]._replace(used=TIME < 5.0)
+    assert air_at_rest(type(fit)(fit.model, (short,), fit.trim, fit.numbers), 0) == 1.0
