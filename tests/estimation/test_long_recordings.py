@@ -77,3 +77,18 @@ def test_a_long_recording_whose_plant_lacks_a_lag_is_inadequate():
     fit = dtm.estimate_delay(recorded(20_000), known)
     assert not fit.adequate
     assert "a further lag" in fit.message
+
+
+def test_rows_that_were_lost_before_the_part_are_no_unknowns_of_it(monkeypatch):
+    recording = recorded(3000)
+    kept = np.random.default_rng(1).random(3000) > 0.05
+    monkeypatch.setattr(start, "PART", 1000)
+    some = (recording.time, recording.reference, recording.output, recording.command)
+    fit = dtm.estimate_delay(
+        dtm.Recording(*(column[kept] for column in some)),
+        TRUTH.replace(delay=None, lag=0.1),
+        free=FREE[:2],
+    )
+    low, high = fit.ci(0.999, "delay")
+    assert low < 0.3 < high
+    assert high - low < 0.005

@@ -78,8 +78,8 @@ def excited_part(rows: FlightRows) -> FlightRows:
         speed=rows.speed[kept],
         command_time=rows.command_time[sent],
         command=rows.command[sent],
-        unknown=tuple(one for one in rows.unknown if since < one[1] and one[0] < stop),
-        uncertain=tuple(one for one in rows.uncertain if since < one[1] and one[0] < stop),
+        unknown=tuple(one for one in rows.unknown if start < one[1] and one[0] < stop),
+        uncertain=tuple(one for one in rows.uncertain if start < one[1] and one[0] < stop),
         offset=rows.offset or first > 0,
     )
 
