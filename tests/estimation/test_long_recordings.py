@@ -57,7 +57,7 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
         np.ones(20_000, dtype=bool),
         recording.time,
         recording.command,
-        ((10.0, 11.0), (700.0, 701.0)),
+        ((10.0, 11.0), (700.0, 701.0), (800.0, 801.0)),
         False,
     )
     part = start.excited_part(rows)
@@ -66,7 +66,7 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
     # Commands of as long a time before it act on it; the output at its start is unknown.
     assert part.command_time[0] == pytest.approx(2 * part.time[0] - part.time[-1], abs=0.1)
     assert part.command_time[-1] == part.time[-1]
-    assert part.unknown == ((700.0, 701.0),)
+    assert part.unknown == ((800.0, 801.0),)
     assert part.offset
     short = FlightRows(*(one[:4000] if isinstance(one, np.ndarray) else one for one in rows))
     assert start.excited_part(short) is short
@@ -91,4 +91,4 @@ def test_rows_that_were_lost_before_the_part_are_no_unknowns_of_it(monkeypatch):
     )
     low, high = fit.ci(0.999, "delay")
     assert low < 0.3 < high
-    assert high - low < 0.005
+    assert high - low < 0.03
