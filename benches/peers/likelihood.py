@@ -13,10 +13,10 @@ import argparse
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowNoise
+from deadtime.estimation.likelihood._rows import FlightRows
 
 try:
     from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
@@ -26,27 +26,14 @@ except ImportError:
 ROW, AIR, AIR_TIME, DELAY, GAIN = 0.065, 2.0, 1.5, 0.3, 0.85
 
 
-class Rows(NamedTuple):
-    """The rows as the kernel takes them."""
-
-    time: np.ndarray
-    output: np.ndarray
-    used: np.ndarray
-    command_time: np.ndarray
-    command: np.ndarray
-    unknown: tuple = ()
-    uncertain: tuple = ()
-    offset: bool = False
-    trim: bool = False
-
-
-def recording(count: int) -> Rows:
+def recording(count: int) -> FlightRows:
     """An integrator that answers a square wave, with white noise."""
     rng = np.random.default_rng(3)
     moment = ROW * np.arange(count)
     command = np.where(np.sin(0.9 * moment) > 0.0, 1.0, -0.4)
     output = GAIN * ROW * np.cumsum(command) + 0.005 * rng.standard_normal(count)
-    return Rows(moment, output, np.ones(count, dtype=bool), moment, command)
+    used = np.ones(count, dtype=bool)
+    return FlightRows(moment, output, used, moment, command, (), False)
 
 
 def peer_filter(residuals: np.ndarray) -> object:
