@@ -52,11 +52,9 @@ def spikes(residuals: Array) -> NDArray[np.bool_]:
 
 def _from_neighbours(residuals: Array) -> tuple[Array, float]:
     """Difference from the median of the rows around, and its robust deviation."""
-    wide = min(2 * HALF_WINDOW + 1, residuals.size)
-    windows = np.lib.stride_tricks.sliding_window_view(residuals, wide)
-    # At the ends the window is not around the row, but as wide: two of its rows may be outliers.
-    first = np.clip(np.arange(residuals.size) - HALF_WINDOW, 0, windows.shape[0] - 1)
-    away = np.asarray(residuals - np.median(windows, axis=1)[first])
+    padded = np.pad(residuals, HALF_WINDOW, mode="reflect")
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_WINDOW + 1)
+    away = np.asarray(residuals - np.median(around, axis=1))
     robust = float(np.median(np.abs(away[away != 0.0]))) / MAD if np.any(away) else 0.0
     return away, max(robust, LEAST_ROBUST * float(np.std(away)))
 
