@@ -51,12 +51,18 @@ def spikes(residuals: Array) -> NDArray[np.bool_]:
 
 
 def _from_neighbours(residuals: Array) -> tuple[Array, float]:
-    """Difference from the median of the rows around, and its robust deviation."""
-    padded = np.pad(residuals, HALF_WINDOW, mode="reflect")
-    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_WINDOW + 1)
-    away = np.asarray(residuals - np.median(around, axis=1))
-    robust = float(np.median(np.abs(away[away != 0.0]))) / MAD if np.any(away) else 0.0
-    return away, max(robust, LEAST_ROBUST * float(np.std(away)))
+    """Difference from the median of the rows around, and its robust deviation.
+
+    At the ends the window is as wide and on one side, because two of its rows may be outliers. A
+    slope of the residuals shows there, so that the deviation is that of the other rows.
+    """
+    wide = min(2 * HALF_WINDOW + 1, residuals.size)
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(residuals, wide), axis=1)
+    places = np.arange(residuals.size) - HALF_WINDOW
+    away = residuals - medians[np.clip(places, 0, medians.size - 1)]
+    inner = away[(places >= 0) & (places < medians.size)]
+    robust = float(np.median(np.abs(inner[inner != 0.0]))) / MAD if np.any(inner) else 0.0
+    return away, max(robust, LEAST_ROBUST * float(np.std(inner)))
 
 
 def is_outlier(whitened: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
