@@ -9,18 +9,15 @@ from the designed one. Both are tried on the true loop.
 from __future__ import annotations
 
 import math
-import signal
 import time
 import warnings
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import NamedTuple
 
 import deadtime as dtm
 
 from reality.conditions import CONDITIONS, SAMPLE
 from reality.generator import record
-from reality.table import given_loop, recording_of
+from reality.table import given_loop, pool_of, recording_of
 
 #: The gain margin that is asked for, and the rows of the table.
 DEMANDED = 2.5
@@ -84,12 +81,7 @@ def print_designs(runs: int, processes: int) -> None:
     )
     begin = time.perf_counter()
     batch = max(1, min(10, runs // (2 * processes)))
-    pool = ProcessPoolExecutor(
-        processes,
-        get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    )
+    pool = pool_of(processes)
     try:
         waiting = {
             name: [

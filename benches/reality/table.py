@@ -231,12 +231,7 @@ def print_table(
 ) -> None:
     """Measure and print, in batches on all processes; write the numbers of the rows to `file`."""
     batch = max(1, min(10, runs // (2 * processes)))
-    pool = ProcessPoolExecutor(
-        processes,
-        get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    )
+    pool = pool_of(processes)
     rows = []
     print(header())
     begin = time.perf_counter()
@@ -264,6 +259,16 @@ def print_table(
         pool.shutdown(cancel_futures=True)
         if file is not None:
             file.write_text(json.dumps(without_nan(rows), indent=1) + "\n", encoding="utf-8")
+
+
+def pool_of(processes: int) -> ProcessPoolExecutor:
+    """Processes that leave an interrupt to this one."""
+    return ProcessPoolExecutor(
+        processes,
+        get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
 
 
 def collected(condition: Condition, parts: list[Future[list[Outcome]]]) -> list[Outcome]:

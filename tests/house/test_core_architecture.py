@@ -67,6 +67,7 @@ ORDER = {
         "likelihood",
         "search",
         "point",
+        "variables",
         "fit",
         "profile",
     ],

@@ -1,53 +1,18 @@
 //! The numbers of plant and noise at which the likelihood of one or more recordings is largest.
 //!
-//! A quarter of the file is its tests; the rest is one search, whose variables, bounds and starts are
-//! read together.
+//! Half of the file is its tests.
 
-use super::likelihood::{Evaluation, Noise, Searched, Wanted, evaluate};
+use super::likelihood::{Evaluation, Noise, Wanted, evaluate};
 use super::mean::{Derivatives, Gain, Values};
 use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
 use super::rows::Rows;
 use super::search::{Value, Variable, minimise};
+use super::variables::{Free, SHORTEST_LAG, Variables, mean_slots, put};
 use crate::{Error, Task};
-
-/// Shortest lag of a search, as a share of the time between rows; shorter ones act as a delay.
-pub(super) const SHORTEST_LAG: f64 = 1e-3;
-
-/// Ends of the time constant of a disturbance: of the time between rows, and of the record.
-const SHORTEST_TIME: f64 = 0.3;
-const LONGEST_TIME: f64 = 20.0;
-
-/// Ends of the deviation of the air in white deviations, per record and per row for plants that
-/// integrate; of the coloured noise, and of the air before other plants.
-const LEAST_DEVIATION: f64 = 1e-3;
-const MOST_DEVIATION: f64 = 1e5;
-
-/// Steps of difference quotients: of times, in rows; of logarithms; of the gain, as a share of it.
-const TIME_STEP: f64 = 2e-3;
-const LOG_STEP: f64 = 0.02;
-const GAIN_STEP: f64 = 1e-4;
-
-/// Longest steps of the search: of times, in rows; of logarithms; of the gain, as a share of it.
-const LONGEST_TIME_STEP: f64 = 1.0;
-const LONGEST_LOG_STEP: f64 = 1.2;
-const LONGEST_GAIN_STEP: f64 = 0.5;
 
 /// Rise of the objective by a row of negative delay.
 const PENALTY: f64 = 1e4;
-
-/// What is unknown.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Free {
-    /// The delay.
-    pub delay: bool,
-    /// The gain.
-    pub gain: bool,
-    /// Each lag.
-    pub lags: Vec<bool>,
-    /// The zero.
-    pub zero: bool,
-}
 
 /// Recordings of one plant with what is unknown about it.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,21 +42,6 @@ pub enum Search {
     Mean,
     /// Those of the noise too.
     All,
-}
-
-/// A number that a search moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Slot {
-    Time,
-    Lag(usize),
-    Zero,
-    Gain,
-    AirTime(usize),
-    Air(usize),
-    SensorTime(usize),
-    Sensor(usize),
-    Stamps(usize),
-    Arrivals(usize),
 }
 
 impl Model {
@@ -256,14 +206,18 @@ impl Model {
             !(tolerance.is_finite() && tolerance > 0.0),
             "a tolerance of {tolerance}: give a finite number above zero"
         );
-        let mut slots = self.slots(start, held);
+        let by = Variables {
+            runs: &self.runs,
+            free: &self.free,
+            integrates: self.plant.integrates(),
+            longest: self.longest,
+            row_time: self.row_time,
+        };
+        let mut slots = by.slots(start, held);
         if searched == Search::Mean {
             slots.truncate(mean_slots(&slots));
         }
-        let variables: Vec<Variable> = slots
-            .iter()
-            .map(|slot| self.variable(*slot, start))
-            .collect();
+        let variables: Vec<Variable> = slots.iter().map(|slot| by.variable(*slot, start)).collect();
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
         let mut kept: Vec<Option<(Point, Value)>> = vec![None; self.runs.len()];
@@ -279,9 +233,10 @@ impl Model {
                 }
                 if !matches!(kept.get(run), Some(Some((point, _))) if *point == own) {
                     let part = self.part(run, &trial, held, Wanted::Objective, task)?;
-                    let by = self.by_slots(&slots, &trial, held, &part);
+                    let is_gain = matches!(self.gain_at(&trial, held), Gain::Searched(_));
+                    let part = by.part(&slots, &trial, is_gain, &part);
                     if let Some(place) = kept.get_mut(run) {
-                        *place = Some((own, by));
+                        *place = Some((own, part));
                     }
                 }
                 if let Some(Some((_, part))) = kept.get(run) {
@@ -299,215 +254,12 @@ impl Model {
             objective: found.value,
         })
     }
-
-    /// The part of one recording, with its derivatives by the variables of the mean, which come first.
-    fn by_slots(
-        &self,
-        slots: &[Slot],
-        point: &Point,
-        held: Option<Quantity>,
-        part: &Evaluation,
-    ) -> Value {
-        let count = mean_slots(slots);
-        let mut found = Value::new(part.objective, count);
-        let searched = matches!(self.gain_at(point, held), Gain::Searched(_));
-        let from_lags = usize::from(searched) + usize::from(self.free.delay);
-        let is_by = |i: usize| self.free.lags.get(i) == Some(&true) && point.lags[i] != 0.0;
-        let zero = from_lags + (0..point.lags.len()).filter(|i| is_by(*i)).count();
-        // By which of the searched numbers each variable moves the mean, and how much.
-        let moves: Vec<Vec<(usize, f64)>> = slots[..count]
-            .iter()
-            .map(|slot| match *slot {
-                Slot::Gain => vec![(0, 1.0)],
-                Slot::Time => vec![(usize::from(searched), 1.0)],
-                Slot::Lag(i) => {
-                    let lag = point.lags[i];
-                    let place = from_lags + (0..i).filter(|i| is_by(*i)).count();
-                    let mut moves = vec![(place, lag)];
-                    if matches!(point.timing, Timing::Total(_)) && self.free.delay {
-                        moves.push((usize::from(searched), -lag));
-                    }
-                    moves
-                }
-                _ => {
-                    let mut moves = vec![(zero, 1.0)];
-                    if matches!(point.timing, Timing::Total(_)) && self.free.delay {
-                        moves.push((usize::from(searched), 1.0));
-                    }
-                    moves
-                }
-            })
-            .collect();
-        let Searched { slope, curvature } = &part.searched;
-        for (i, moves_i) in moves.iter().enumerate() {
-            for (a, by_a) in moves_i {
-                found.slope[i] += by_a * slope[*a];
-                for (j, moves_j) in moves.iter().enumerate() {
-                    for (b, by_b) in moves_j {
-                        found.curvature[i * count + j] +=
-                            by_a * by_b * curvature[a * slope.len() + b];
-                    }
-                }
-            }
-        }
-        found
-    }
-
-    fn slots(&self, start: &Point, held: Option<Quantity>) -> Vec<Slot> {
-        let mut slots = Vec::new();
-        if self.free.delay && !matches!(held, Some(Quantity::Delay | Quantity::Total)) {
-            slots.push(Slot::Time);
-        }
-        for (i, free) in self.free.lags.iter().enumerate() {
-            if *free && held != Some(Quantity::Lag(i)) {
-                slots.push(Slot::Lag(i));
-            }
-        }
-        if self.free.zero && held != Some(Quantity::Zero) {
-            slots.push(Slot::Zero);
-        }
-        if self.free.gain && self.runs.len() > 1 && held != Some(Quantity::Gain) {
-            slots.push(Slot::Gain);
-        }
-        for (run, noise) in start.noise.iter().enumerate() {
-            if noise.air > 0.0 {
-                slots.extend([Slot::AirTime(run), Slot::Air(run)]);
-            }
-            if noise.sensor > 0.0 {
-                slots.extend([Slot::SensorTime(run), Slot::Sensor(run)]);
-            }
-            if noise.stamps > 0.0 {
-                slots.push(Slot::Stamps(run));
-            }
-            if noise.arrivals > 0.0 {
-                slots.push(Slot::Arrivals(run));
-            }
-        }
-        slots
-    }
-
-    fn variable(&self, slot: Slot, start: &Point) -> Variable {
-        let row_time = self.row_time;
-        let span = |run: usize| self.runs.get(run).map_or(1.0, Rows::span);
-        let noise = |run: usize| start.noise.get(run).copied().unwrap_or(QUIET);
-        let logarithm = |start: f64, low: f64, high: f64| Variable {
-            start: start.abs().ln(),
-            low: low.ln(),
-            // A recording may be shorter than a row of the first.
-            high: high.max(low).ln(),
-            step: LOG_STEP,
-            longest: LONGEST_LOG_STEP,
-        };
-        let time =
-            |run, start| logarithm(start, SHORTEST_TIME * row_time, LONGEST_TIME * span(run));
-        match slot {
-            Slot::Time => Variable {
-                start: match start.timing {
-                    Timing::Delay(time) | Timing::Total(time) => time,
-                },
-                // A zero may be longer than delay and lags.
-                low: if start.zero > 0.0 || self.free.zero {
-                    -self.longest
-                } else {
-                    0.0
-                },
-                high: self.longest,
-                step: TIME_STEP * row_time,
-                longest: LONGEST_TIME_STEP * row_time,
-            },
-            Slot::Lag(i) => logarithm(
-                start.lags.get(i).copied().unwrap_or(row_time),
-                SHORTEST_LAG * row_time,
-                self.longest,
-            ),
-            Slot::Zero => Variable {
-                start: start.zero,
-                low: -self.longest,
-                high: self.longest,
-                step: TIME_STEP * row_time,
-                longest: LONGEST_TIME_STEP * row_time,
-            },
-            Slot::Gain => Variable {
-                start: start.gain,
-                low: f64::NEG_INFINITY,
-                high: f64::INFINITY,
-                step: GAIN_STEP * start.gain.abs().max(f64::MIN_POSITIVE),
-                longest: LONGEST_GAIN_STEP * start.gain.abs().max(f64::MIN_POSITIVE),
-            },
-            Slot::AirTime(run) => time(run, noise(run).air_time),
-            Slot::SensorTime(run) => time(run, noise(run).sensor_time),
-            Slot::Air(run) => {
-                let (low, high) = if self.plant.integrates() {
-                    (LEAST_DEVIATION / span(run), MOST_DEVIATION / row_time)
-                } else {
-                    (LEAST_DEVIATION, MOST_DEVIATION)
-                };
-                logarithm(noise(run).air, low, high)
-            }
-            Slot::Sensor(run) => logarithm(noise(run).sensor, LEAST_DEVIATION, MOST_DEVIATION),
-            // Both move the output by a deviation where speed times scatter is one.
-            // What the scatter moves a row by is a deviation like the others.
-            Slot::Stamps(run) => {
-                let most = self.runs.get(run).map_or(1.0, Rows::top_speed);
-                logarithm(
-                    noise(run).stamps,
-                    LEAST_DEVIATION / most,
-                    MOST_DEVIATION / most,
-                )
-            }
-            Slot::Arrivals(run) => {
-                let most = self.runs.get(run).map_or(1.0, Rows::largest_jump);
-                logarithm(
-                    noise(run).arrivals,
-                    LEAST_DEVIATION / most,
-                    MOST_DEVIATION / most,
-                )
-            }
-        }
-    }
-}
-
-/// Number of the variables that move the mean; they come first.
-fn mean_slots(slots: &[Slot]) -> usize {
-    let of_mean =
-        |slot: &&Slot| matches!(slot, Slot::Time | Slot::Lag(_) | Slot::Zero | Slot::Gain);
-    slots.iter().take_while(of_mean).count()
-}
-
-/// No noise but white noise.
-const QUIET: Noise = Noise {
-    air_time: 1.0,
-    air: 0.0,
-    sensor_time: 1.0,
-    sensor: 0.0,
-    stamps: 0.0,
-    arrivals: 0.0,
-};
-
-/// Put the value of a variable into a point.
-fn put(point: &mut Point, slot: Slot, value: f64) {
-    match slot {
-        Slot::Time => {
-            point.timing = match point.timing {
-                Timing::Delay(_) => Timing::Delay(value),
-                Timing::Total(_) => Timing::Total(value),
-            }
-        }
-        Slot::Lag(i) => point.lags[i] = value.exp().copysign(point.lags[i]),
-        Slot::Zero => point.zero = value,
-        Slot::Gain => point.gain = value,
-        Slot::AirTime(run) => point.noise[run].air_time = value.exp(),
-        Slot::Air(run) => point.noise[run].air = value.exp(),
-        Slot::SensorTime(run) => point.noise[run].sensor_time = value.exp(),
-        Slot::Sensor(run) => point.noise[run].sensor = value.exp(),
-        Slot::Stamps(run) => point.noise[run].stamps = value.exp(),
-        Slot::Arrivals(run) => point.noise[run].arrivals = value.exp(),
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::tests::recorded;
+    use super::super::variables::{MOST_DEVIATION, QUIET};
     use super::*;
 
     const INTEGRATOR: (&[f64], &[f64]) = (&[1.0], &[1.0, 0.0]);

@@ -24,12 +24,14 @@ mod rows;
 mod search;
 #[cfg(test)]
 mod tests;
+mod variables;
 mod whiten;
 
 pub use disturbance::{Disturbance, Entry};
-pub use fit::{Fit, Free, Model, Search};
+pub use fit::{Fit, Model, Search};
 pub use likelihood::{Evaluation, Noise};
 pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};
 pub use rows::{Commands, Rows};
+pub use variables::Free;
 pub use whiten::whiten;

@@ -1,7 +1,8 @@
 //! The profile of the likelihood over one quantity, and the ends of an interval.
 
-use super::fit::{Fit, Model, SHORTEST_LAG, Search};
+use super::fit::{Fit, Model, Search};
 use super::point::{Point, Quantity, Timing};
+use super::variables::SHORTEST_LAG;
 use crate::{Error, Task};
 
 /// Farthest end of an interval, in Gaussian half widths.
@@ -193,10 +194,10 @@ impl Model {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fit::Free;
     use super::super::likelihood::Noise;
     use super::super::plant::Plant;
     use super::super::tests::recorded;
+    use super::super::variables::Free;
     use super::*;
 
     const QUIET: Noise = Noise {
