@@ -77,8 +77,6 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
     gains = search.globally() if start is None else search.locally(start)
     best: Found | None = None
     for _ in range(_ROUNDS_SIMULATED if objective.simulated else _ROUNDS):
-        if required.named and search.short(gains) > _HOPELESS:
-            break
         everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
         cost, worst = worst_scenario(problem, objective, gains, everywhere)
         seen = objective.worst(problem, gains, scenarios)
@@ -93,6 +91,8 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
         stalled = best is not None and cost > best.cost - _STALLED * abs(best.cost)
         if not missing.any() and (best is None or cost < best.cost):
             best = Found(gains, tuple(scenarios), cost, worst, len(everywhere))
+        if missing.any() and search.short(gains) > _HOPELESS:
+            break
         added = [one for one in added if one not in scenarios]
         if not missing.any() and (stalled or not added):
             break
