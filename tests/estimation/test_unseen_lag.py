@@ -52,6 +52,21 @@ def test_a_free_lag_hides_longer_ones():
     assert free.details["unseen_lag"] > 1.5 * held
 
 
+def test_where_no_lag_would_be_seen_it_is_infinite():
+    recording, known = record_height(5, (0.12,), rows=300), KNOWN.replace(lag=0.12)
+    fit = dtm.estimate_delay(recording, known, free=("delay", "gain", "lag"))
+    assert fit.adequate, fit.message
+    assert np.isinf(fit.details["unseen_lag"])
+    assert "no further lag would have been seen" in fit.message
+    # Nor is it: the fitted lag becomes the longer of both, and the delay takes the shorter.
+    found = 0
+    for seed, second in enumerate((0.06, 0.2, 0.5, 1.0)):
+        both = record_height(20 + seed, (0.12, second), rows=300)
+        fit = dtm.estimate_delay(both, known, free=("delay", "gain", "lag"))
+        found += "the plant lacks it" in fit.message
+    assert found <= 1
+
+
 def test_two_recordings_show_more_than_one():
     recordings = [record_height(seed) for seed in (1, 2)]
     one = dtm.estimate_delay(recordings[0], KNOWN).details["unseen_lag"]
