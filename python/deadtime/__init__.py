@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         FirstOrder,
         Integrator,
         P,
+        ParametricPlant,
         RateLimited,
         RationalPlant,
         kit_plant,
@@ -79,7 +80,7 @@ _ROOMS = {
     "systems": "DelaySystem TransferFunction feedback",
     "loops": (
         "ControlLoop DerivativeFilter FactoredPlant FirstOrder Integrator P PD PI PID PV "
-        "RateLimited RationalPlant kit_plant simulate_fixed_step sweep"
+        "ParametricPlant RateLimited RationalPlant kit_plant simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
     "recordings": "Recording read_recording",
@@ -121,6 +122,7 @@ __all__ = [
     "NotIdentifiableError",
     "P",
     "PacketError",
+    "ParametricPlant",
     "QuasiPolynomial",
     "RateLimited",
     "RationalPlant",

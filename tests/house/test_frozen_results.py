@@ -38,6 +38,10 @@ def planned(**more):
     return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
 
 
+def lag_of(lag):
+    return [1.0], [lag, 1.0]
+
+
 #: An expression for one object of every public type that is not an error or a plain number.
 MADE = {
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
@@ -74,6 +78,7 @@ MADE = {
     "PI": lambda: dtm.PI(2.0, 0.1),
     "PID": lambda: dtm.PID(2.0, 0.1, 0.1),
     "PV": lambda: dtm.PV(2.0, 0.1),
+    "ParametricPlant": lambda: dtm.ParametricPlant(lag_of, {"lag": 0.3}),
     "Parameter": lambda: Kp,
     "ParametricQuasiPolynomial": lambda: FAMILY,
     "PlannedBound": lambda: planned().bound,

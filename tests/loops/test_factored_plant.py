@@ -19,6 +19,20 @@ def test_the_transfer_function_is_the_product_of_the_factors(lags, integrator):
     assert plant.lag == pytest.approx(sum(lags) + 0.04)
 
 
+@pytest.mark.parametrize("integrator", [False, True])
+@pytest.mark.parametrize("lags", [(), (0.3, 0.1)])
+def test_a_pair_of_complex_poles_is_a_factor(lags, integrator):
+    plant = dtm.FactoredPlant(lags, 0.8, 0.05, integrator, pole_frequency=7.0, pole_damping=0.3)
+    s = np.array([0.3 + 1.7j, -0.2 + 4.0j])
+    expected = 0.8 * (1.0 + 0.05 * s) / (s if integrator else 1.0)
+    expected = expected / ((s / 7.0) ** 2 + 2.0 * 0.3 * s / 7.0 + 1.0)
+    for lag in lags:
+        expected = expected / (lag * s + 1.0)
+    num, den = plant.polynomials()
+    assert_allclose(np.polyval(num, s) / np.polyval(den, s), expected, rtol=1e-13)
+    assert plant.lag == pytest.approx(sum(lags) - 0.05 + 0.6 / 7.0)
+
+
 def test_an_integrator_without_lags_is_an_integrator():
     plant = dtm.FactoredPlant(gain=0.9, integrator=True)
     assert plant.parameters == {"gain": 0.9}
@@ -59,6 +73,8 @@ def test_the_range_of_a_lag_ends_at_zero():
         ({"lags": [0.1], "gain": 0.0}, "gain=0"),
         ({"lags": [0.1], "zero": np.inf}, "zero"),
         ({"zero": 0.1, "integrator": True}, "needs a lag above zero"),
+        ({"pole_frequency": 3.0}, "both or neither"),
+        ({"pole_frequency": 3.0, "pole_damping": 0.0}, "pole_damping"),
     ],
 )
 def test_what_is_no_plant_is_refused(arguments, message):

@@ -60,7 +60,7 @@ def plant_from(text: str) -> TransferFunction:
 
 
 def with_names(plant: Plant) -> Plant:
-    """A plant with real poles and at most one zero as such: its times are then free parameters.
+    """A plant with at most one zero and one pair of complex poles: its numbers can then be free.
 
     Any other plant is returned as it is.
     """
@@ -78,17 +78,23 @@ def with_names(plant: Plant) -> Plant:
 
 
 def _factored(num: NDArray[np.float64], den: NDArray[np.float64]) -> FactoredPlant | None:
-    """The plant by its lags and its zero, if it has no others."""
+    """The plant by its lags, its zero and a pair of complex poles, if it has no others."""
     integrator = bool(den[-1] == 0.0)
     den = den[: den.size - integrator]
     poles = np.roots(den)
     # Rounding moves equal poles apart by the root of itself, into the plane for a pair.
-    is_real = np.all(np.abs(poles.imag) <= _REAL * np.abs(poles))
-    if den[-1] == 0.0 or num[-1] == 0.0 or num.size > 2 or not is_real or np.any(poles.real > 0.0):
+    is_real = np.abs(poles.imag) <= _REAL * np.abs(poles)
+    pair = poles[~is_real]
+    if den[-1] == 0.0 or num[-1] == 0.0 or num.size > 2 or pair.size > 2 or np.any(poles.real > 0):
         return None
-    lags = sorted((-1.0 / poles.real).tolist(), reverse=True)
+    lags = sorted((-1.0 / poles.real[is_real]).tolist(), reverse=True)
     zero = float(num[0] / num[-1]) if num.size == 2 else 0.0
-    return FactoredPlant(lags, float(num[-1] / den[-1]), zero, integrator) if lags else None
+    gain = float(num[-1] / den[-1])
+    if pair.size:
+        frequency = float(np.abs(pair[0]))
+        damping = -float(pair.real[0]) / frequency
+        return FactoredPlant(lags, gain, zero, integrator, frequency, damping) if damping else None
+    return FactoredPlant(lags, gain, zero, integrator) if lags else None
 
 
 class _Reader:

@@ -1,4 +1,4 @@
-"""`choose_plant`: how many lags a plant has, and whether it has a zero, by the evidence.
+"""`choose_plant`: how many lags a plant has, and whether they are complex, by the evidence.
 
 Each plant of the family is fitted with all its numbers free, beside the noise. Schwarz's (1978)
 criterion weighs the likelihood against the number of unknowns,
@@ -32,6 +32,10 @@ MOST_LAGS = 3
 
 #: Where the first lag and each further one begin, in rows, and the zero, as shares of the lags.
 LONG, SHORT, ZEROS = 3.0, 0.5, (0.3, 3.0)
+
+#: Two lags that come out within this factor may be a pair of complex poles, which real ones come
+#: closest to where they are equal; the damping from which that pair is searched.
+ALIKE, DAMPING = 0.7, 0.7
 
 #: Headings of the table.
 COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
@@ -169,7 +173,8 @@ def choose_plant(
     """Estimate the delay with as many lags as the recording shows.
 
     Plants with none to `most_lags` lags, each with and without a zero, are fitted with all their
-    numbers free. Whether the plant integrates is known from that of `loop`. Which of two plants it
+    numbers free; where the two longest lags come out alike, also with a pair of complex poles in
+    their place. Whether the plant integrates is known from that of `loop`. Which of two plants it
     is may be open, and how the lags divide among themselves: delay and lag together are well
     determined in any case.
 
@@ -233,37 +238,55 @@ def choose_plant(
         )
     estimates: dict[str, DelayEstimate] = {}
     refusals = {}
+
+    def tried(name: str, plant: FactoredPlant) -> FactoredPlant | None:
+        """Fit the plant without and with a zero; the fitted one without."""
+        best, size = None, plant.lag
+        # At a zero of none its effect would be that of the delay, so that a search stays there.
+        for shares in ((0.0,), ZEROS) if size else ((0.0,),):
+            with_zero = shares is ZEROS
+            label = f"{name}{', zero' * with_zero}"
+            free = ["delay", *(one for one in plant.parameters if with_zero or one != "zero")]
+            fits = []
+            for share in shares:
+                started = replace(plant, zero=share * size)
+                known = [one.replace(plant=started) for one in loops]
+                try:
+                    fits.append(
+                        estimate_delay(recording, known, method=method, free=free, window=window)
+                    )
+                except NotIdentifiableError as error:
+                    refusals[label] = str(error)
+            if fits:
+                refusals.pop(label, None)
+                estimates[label] = fit = min(fits, key=_bic)
+                best = best or cast(FactoredPlant, fit.loop.plant)
+        return best
+
     plant = _first(loops[0], runs[0].recording.sample_time)
     for count in range(len(plant.lags), most_lags + 1):
         if count > len(plant.lags):
             further = SHORT * runs[0].recording.sample_time
             plant = replace(plant, lags=(*plant.lags, further), zero=0.0)
-        # Without a zero its effect would be that of the delay, so that a search stays there.
-        for shares in ((0.0,), ZEROS) if count else ((0.0,),):
-            with_zero = shares is ZEROS
-            name = f"{count or 'no'} {'lag' if count == 1 else 'lags'}{', zero' * with_zero}"
-            free = ["delay", *(one for one in plant.parameters if with_zero or one != "zero")]
-            fits = []
-            for share in shares:
-                started = replace(plant, zero=share * sum(plant.lags))
-                tried = [one.replace(plant=started) for one in loops]
-                try:
-                    fits.append(
-                        estimate_delay(recording, tried, method=method, free=free, window=window)
-                    )
-                except NotIdentifiableError as error:
-                    refusals[name] = str(error)
-            if not fits:
-                continue
-            refusals.pop(name, None)
-            estimates[name] = fit = min(fits, key=_bic)
-            if not with_zero:  # where the search of the next plants begins
-                plant = cast(FactoredPlant, fit.loop.plant)
+        if found := tried(_lags(count), plant):
+            plant = found  # where the search of the next plants begins
+        first, second = (*sorted(plant.lags, reverse=True), 0.0, 0.0)[:2]
+        if second > ALIKE * first > 0.0:
+            rest = sorted(plant.lags, reverse=True)[2:]
+            frequency = 2.0 * DAMPING / (first + second)
+            paired = replace(
+                plant, lags=rest, pole_frequency=frequency, pole_damping=DAMPING, zero=0.0
+            )
+            tried(f"a pair, {_lags(len(rest))}" if rest else "a pair", paired)
     if not estimates:
         raise NotIdentifiableError(next(iter(refusals.values())))
     criteria = {name: _bic(fit) for name, fit in estimates.items()}
     chosen = min(_adequate(estimates), key=lambda name: criteria[name])
     return PlantChoice(estimates, criteria, refusals, chosen)
+
+
+def _lags(count: int) -> str:
+    return f"{count or 'no'} {'lag' if count == 1 else 'lags'}"
 
 
 def _adequate(estimates: Mapping[str, DelayEstimate]) -> list[str]:

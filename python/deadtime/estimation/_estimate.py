@@ -91,8 +91,9 @@ def estimate_delay(
           MATLAB's `delayest` does.
     free : sequence of str
         What is fitted, any of ``"delay"``, ``"gain"``, ``"lag"`` and ``"time_constant"``, as the
-        plant has them, with `FactoredPlant` also ``"lag_1"`` and so on and ``"zero"``,
-        with `RateLimited` also ``"rate"`` and ``"rate_of_rate"``;
+        plant has them, with `FactoredPlant` also ``"lag_1"`` and so on, ``"zero"``,
+        ``"pole_frequency"`` and ``"pole_damping"``, with `RateLimited` also ``"rate"`` and
+        ``"rate_of_rate"``, with `ParametricPlant` its numbers;
         ``"waveform"`` also fits ``"limit"`` and ``"start"``, how much later than that of the
         reference the clock of the output runs. ``"decrement"`` fits delay and gain;
         ``"overshoot"``, ``"decay"``, ``"graphical"``, ``"relay"``, ``"gcc"`` and ``"arx_scan"``

@@ -12,20 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array
-from deadtime.estimation.fit._profile import Profile, floor_of
+from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
-from deadtime.loops import ControlLoop, FactoredPlant, Integrator, RateLimited
+from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, RateLimited
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-
-#: Quantities that are not times; a limit has the unit of the command.
-UNITLESS = ("gain", "limit", "rate", "rate_of_rate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,13 +147,15 @@ class DelayEstimate(ReadOnlyArrays):
     def lag(self) -> float | None:
         """Lag of the plant, s, fitted or as given; None if the plant has no such parameter.
 
-        Of a `FactoredPlant` the total lag: the sum of its lags less its zero. Of a plant that
+        Of a `FactoredPlant` or a `ParametricPlant` the total lag (its ``lag``). Of a plant that
         limits rates, that of the plant after the limits.
         """
         plant = self.loop.plant
         if isinstance(plant, RateLimited):
             plant = plant.plant
-        return plant.lag if isinstance(plant, (Integrator, FactoredPlant)) else None
+        return (
+            plant.lag if isinstance(plant, (Integrator, FactoredPlant, ParametricPlant)) else None
+        )
 
     @property
     def delay_plus_lag(self) -> float:
@@ -265,7 +264,7 @@ class DelayEstimate(ReadOnlyArrays):
     def _reach(self, name: str) -> float:
         """About one standard error; for a quantity at its bound, the largest of the other times."""
         return self.stderr[name] or max(
-            (error for other, error in self.stderr.items() if other not in UNITLESS), default=0.0
+            (error for other, error in self.stderr.items() if unit_of(other) == "s"), default=0.0
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -308,8 +307,7 @@ class DelayEstimate(ReadOnlyArrays):
             lines.append(f"  {len(self.runs)} recordings together, {rows} samples")
         width = max((len(name) for name in self.stderr), default=0) + 1
         for name, stderr in self.stderr.items():
-            unit = "" if name in UNITLESS else "s"
-            line = f"  {name:<{width}}{self._value(name):9.4f} {unit:<2}"
+            line = f"  {name:<{width}}{self._value(name):9.4f} {unit_of(name):<2}"
             if self.calibrated:
                 low, high = self.ci(0.95, name)
                 line += f" ± {stderr:.4f}   95 % interval {low:.4f} to {high:.4f}"

@@ -9,14 +9,16 @@ hold the questions that a loop answers, `_run`, `_stability` and the `_sampled_*
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._controllers import PD, PI, PID, PV, Controller, P
 from deadtime.loops._derivative_filter import DerivativeFilter
-from deadtime.loops._factored_plant import FactoredPlant
+from deadtime.loops._factored_plant import PAIR, FactoredPlant
 from deadtime.loops._fixed_step import simulate_fixed_step
 from deadtime.loops._given_plants import PlantWithDelays
+from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import FirstOrder, Integrator, Plant, RationalPlant, kit_plant
 from deadtime.loops._rate_limits import RateLimited
 from deadtime.loops._sweep import Sweep, SweepStatus, sweep
 
 __all__ = [
+    "PAIR",
     "PD",
     "PI",
     "PID",
@@ -28,6 +30,7 @@ __all__ = [
     "FirstOrder",
     "Integrator",
     "P",
+    "ParametricPlant",
     "Plant",
     "PlantWithDelays",
     "RateLimited",

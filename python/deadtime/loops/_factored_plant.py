@@ -6,17 +6,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from deadtime._base.validation import finite, non_negative, non_zero, unmasked
+from deadtime._base.validation import finite, non_negative, non_zero, positive, unmasked
 from deadtime.loops._plants import NO_GAIN, Plant
+
+#: Names of the numbers of a pair of complex poles.
+PAIR = ("pole_frequency", "pole_damping")
 
 
 @dataclass(frozen=True)
 class FactoredPlant(Plant):
     """gain (zero s + 1) / ((lag_1 s + 1) (lag_2 s + 1) …), and one over s with an integrator.
 
-    A vehicle that follows an attitude or rate answers with two or three lags, one that is told a
-    rate and whose attitude is logged with an integrator besides. Each lag and the zero can be
-    fitted by its name.
+    With a pair of complex poles also over s²/w² + 2 d s/w + 1, w the `pole_frequency` and d the
+    `pole_damping`.
+
+    A vehicle that follows an attitude or rate answers with two or three lags, or with a pair that
+    overshoots; one that is told a rate and whose attitude is logged with an integrator besides.
+    Each lag, the zero, the frequency and the damping can be fitted by its name.
 
     Parameters
     ----------
@@ -28,12 +34,16 @@ class FactoredPlant(Plant):
         Time constant of the zero in s; below zero the output first moves the other way.
     integrator : bool
         Whether the output is the integral of all that.
+    pole_frequency, pole_damping : float, optional
+        Natural frequency in rad/s and damping ratio of a pair of complex poles, above zero; both or
+        neither.
 
     Raises
     ------
     ValueError
-        If the gain is zero, a lag negative or a number not finite, or if there is a zero and no
-        lag, or neither a lag nor an integrator.
+        If the gain is zero, a lag negative or a number not finite; if there is a zero without a lag
+        or a pair, or no lag, pair or integrator at all; if `pole_frequency` or `pole_damping`
+        is given alone or not above zero.
 
     See Also
     --------
@@ -49,12 +59,16 @@ class FactoredPlant(Plant):
     0.18
     >>> plant.transfer_function()
     (0.9 + 0.018 s) / (1 + 0.2 s + 0.0075 s^2)
+    >>> dtm.FactoredPlant(pole_frequency=20.0, pole_damping=0.4).parameters
+    {'gain': 1.0, 'zero': 0.0, 'pole_frequency': 20.0, 'pole_damping': 0.4}
     """
 
     lags: Sequence[float] = ()
     gain: float = 1.0
     zero: float = 0.0
     integrator: bool = False
+    pole_frequency: float | None = None
+    pole_damping: float | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -65,43 +79,78 @@ class FactoredPlant(Plant):
         object.__setattr__(self, "lags", lags)
         object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
         object.__setattr__(self, "zero", finite("zero", self.zero))
-        if not lags and not self.integrator:
+        if (self.pole_frequency is None) != (self.pole_damping is None):
+            raise ValueError(
+                f"pole_frequency={self.pole_frequency}, pole_damping={self.pole_damping}: a pair "
+                "of complex poles has both; give both or neither"
+            )
+        for name in PAIR if self.has_pair else ():
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
+        if not lags and not self.integrator and not self.has_pair:
             raise ValueError(
                 "a plant without lags or integrator is a gain alone: give lags=[0.1] to begin "
                 "with, or RationalPlant([gain], [1.0])"
             )
-        if self.zero != 0.0 and not any(lags):
+        if self.zero != 0.0 and not any(lags) and not self.has_pair:
             raise ValueError(
                 f"zero={self.zero}: a plant with a zero needs a lag above zero, lags=[0.1] for one"
             )
 
     @property
+    def has_pair(self) -> bool:
+        """Whether there is a pair of complex poles."""
+        return self.pole_frequency is not None
+
+    @property
     def parameters(self) -> dict[str, float]:
-        """``gain``, ``lag_1`` and so on, and with lags ``zero``."""
-        lags = {f"lag_{i}": lag for i, lag in enumerate(self.lags, 1)}
-        return {"gain": self.gain, **lags, **({"zero": self.zero} if lags else {})}
+        """``gain``, ``lag_1`` and so on; ``zero`` with any of them; those of a pair."""
+        found = {"gain": self.gain}
+        found |= {f"lag_{i}": lag for i, lag in enumerate(self.lags, 1)}
+        if self.lags or self.has_pair:
+            found["zero"] = self.zero
+        if self.pole_frequency is not None and self.pole_damping is not None:
+            found |= dict(zip(PAIR, (self.pole_frequency, self.pole_damping), strict=True))
+        return found
 
     @property
     def lag(self) -> float:
-        """Total lag, s: the sum of the lags less the zero.
+        """Total lag, s: the sum of the lags, less the zero, plus that of a pair, 2 d/w.
 
         The answer to a ramp is late by this and the delay in the end. It is well determined also
         where a recording does not tell one lag from another.
         """
-        return sum(self.lags) - self.zero
+        total = sum(self.lags) - self.zero
+        if self.pole_frequency is not None and self.pole_damping is not None:
+            total += 2.0 * self.pole_damping / self.pole_frequency
+        return total
 
     def _replace(self, numbers: Mapping[str, float]) -> FactoredPlant:
         values = {**self.parameters, **numbers}
         lags = [values.pop(f"lag_{i}") for i in range(1, len(self.lags) + 1)]
-        return replace(self, lags=lags, gain=values["gain"], zero=values.get("zero", 0.0))
+        return replace(self, lags=lags, **values)  # type: ignore[arg-type]
 
     def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        den: list[Any] = [1.0]
+        num, den = self._without_lags(values)
         for i in range(1, len(self.lags) + 1):
-            lag = values[f"lag_{i}"]
-            # den (lag s + 1)
-            den = [
-                lag * higher + lower for higher, lower in zip([*den, 0.0], [0.0, *den], strict=True)
-            ]
-        num = [values["gain"] * values["zero"], values["gain"]] if self.lags else [values["gain"]]
-        return num, [*den, 0.0] if self.integrator else den
+            den = _times(den, [values[f"lag_{i}"], 1.0])
+        if "zero" in self.parameters:
+            num = _times(num, [values["zero"], 1.0])
+        return num, den
+
+    def _without_lags(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+        """Numerator and denominator without the lags and the zero."""
+        num, den = [values["gain"]], [1.0, 0.0] if self.integrator else [1.0]
+        if not self.has_pair:
+            return num, den
+        frequency, damping = (values[name] for name in PAIR)
+        square = frequency * frequency
+        return [square * num[0]], _times(den, [1.0, 2.0 * damping * frequency, square])
+
+
+def _times(one: list[Any], other: list[Any]) -> list[Any]:
+    """Product of two polynomials with coefficients of any kind."""
+    found: list[Any] = [0.0] * (len(one) + len(other) - 1)
+    for i, a in enumerate(one):
+        for j, b in enumerate(other):
+            found[i + j] = found[i + j] + a * b
+    return found

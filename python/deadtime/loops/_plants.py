@@ -282,6 +282,22 @@ def kit_plant() -> RationalPlant:
     return RationalPlant(num=(0.15265, 5.1529), den=(1.0, 5.820, 0.0))
 
 
+def steady_lag(num: Sequence[float], den: Sequence[float]) -> float:
+    """How late the answer of num/den to a ramp is in the end, s; its integrators left out.
+
+    To first order in s, a plant without integrators is its steady gain times 1 - lag s.
+    """
+
+    def slope(coefficients: Sequence[float]) -> float:
+        rising = list(reversed(coefficients))
+        first = next((i for i, c in enumerate(rising) if c != 0.0), None)
+        if first is None or first + 1 >= len(rising):
+            return 0.0
+        return float(rising[first + 1] / rising[first])
+
+    return slope(den) - slope(num)
+
+
 def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
     """Observable canonical form of num/den (descending, proper); entries may be arrays."""
     a, b = _led(den), _led(num)

@@ -16,7 +16,9 @@ from deadtime import _deadtime
 from deadtime._deadtime import sampled_abscissa_grid
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
+from deadtime.loops._factored_plant import PAIR
 from deadtime.loops._model import LoopModel, refuse_discretised
+from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import Plant
 from deadtime.loops._sampled_ranges import SampledNumber, further_delay
 from deadtime.roots import Parameter, QuasiPolynomial, RootSet
@@ -26,7 +28,7 @@ _NON_NEGATIVE = frozenset({"delay", "lag", "sample_time", "omega", "damping"}) |
     f"lag_{i}" for i in range(1, 10)
 }
 #: Numbers that keep their sign, since the loop has no meaning at zero.
-_KEEPS_SIGN = frozenset({"time_constant"})
+_KEEPS_SIGN = frozenset({"time_constant", *PAIR})
 #: Numbers of a filter.
 _OF_FILTER = frozenset({"omega", "damping"})
 
@@ -136,7 +138,7 @@ def continuous_range(
     if name in _OF_FILTER:
         seek = _deadtime.damping_range if name == "damping" else _deadtime.corner_range
         return seek(family._family, value, _highest_crossing(plant, controller, values))
-    return _deadtime.gain_range(family._family, value, _bounds(name, value))
+    return _deadtime.gain_range(family._family, value, _bounds(plant, name, value))
 
 
 def _highest_crossing(plant: Plant, controller: Controller, values: Mapping[str, float]) -> float:
@@ -161,24 +163,25 @@ def sampled_range(
 ) -> tuple[float, float]:
     """Stable values of one number of a sampled loop, around its present one."""
     number = SampledNumber(lambda given: LoopModel.build(plant, controller, given), values, name)
-    low, high = _bounds(name, number.value)
+    low, high = _bounds(plant, name, number.value)
     if number.is_idle:
         return low, high
     if name == "delay":
         before = number.loss(0.0)
         return 0.0 if before is None else before.value, number.value + further_delay(number)[0]
-    return _sampled_end(number, low, -1.0), _sampled_end(number, high, 1.0)
+    endless = name in _NON_NEGATIVE or _keeps_sign(plant, name)
+    return _sampled_end(number, low, -1.0, endless), _sampled_end(number, high, 1.0, endless)
 
 
-def _sampled_end(number: SampledNumber, end: float, sign: float) -> float:
+def _sampled_end(number: SampledNumber, end: float, sign: float, endless: bool) -> float:
+    """The end of a range; of an `endless` one nothing may be known beyond the farthest value."""
     size = abs(number.value) if number.value != 0.0 else 1.0
     if number.value == end:
         return end
     if end == 0.0:
         found = number.loss(-sign * _NEARLY_ZERO * size)
         return 0.0 if found is None else found.value
-    may_be_forever = number.name in _NON_NEGATIVE or number.name in _KEEPS_SIGN
-    found = number.loss(sign * _FARTHEST * size if may_be_forever else end)
+    found = number.loss(sign * _FARTHEST * size if endless else end)
     if found is None:
         raise ValueError(
             f"the loop is stable from {number.name}={number.value:g} to "
@@ -187,11 +190,17 @@ def _sampled_end(number: SampledNumber, end: float, sign: float) -> float:
     return found.value
 
 
-def _bounds(name: str, value: float) -> tuple[float, float]:
+def _bounds(plant: Plant, name: str, value: float) -> tuple[float, float]:
     """Between what a number can be."""
-    if name in _KEEPS_SIGN and value < 0.0:
+    keeps_sign = _keeps_sign(plant, name) and value != 0.0
+    if keeps_sign and value < 0.0:
         return -math.inf, 0.0
-    return (0.0 if name in _NON_NEGATIVE or name in _KEEPS_SIGN else -math.inf), math.inf
+    return (0.0 if name in _NON_NEGATIVE or keeps_sign else -math.inf), math.inf
+
+
+def _keeps_sign(plant: Plant, name: str) -> bool:
+    """Whether a number of a loop with this plant keeps its sign."""
+    return name in _KEEPS_SIGN or (isinstance(plant, ParametricPlant) and name in plant.numbers)
 
 
 class SampledLoops(NamedTuple):

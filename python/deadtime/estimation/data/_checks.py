@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.loops import ControlLoop, Integrator
+from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, Plant
 from deadtime.recordings import Finding, Recording
 from deadtime.recordings._check_excitation import copied_setpoint, no_excitation, no_motion
 
@@ -24,6 +24,9 @@ INDISTINGUISHABLE = 1e-6
 #: is not among them: the cost jumps where a sample moves from before a step to after it.
 VEHICLE_PARAMETERS = ("delay", "gain", "lag", "time_constant", "rate", "rate_of_rate")
 LOOP_PARAMETERS = (*VEHICLE_PARAMETERS, "start", "limit")
+
+#: Relative step of the difference quotient of the total lag.
+QUOTIENT = 1e-5
 
 #: Significance level of the F test that the response explains the output better than a constant.
 #: Over all delays that are tried, noise alone passes about once in some hundred recordings.
@@ -153,16 +156,32 @@ def embedded(cov: Array, loose: list[int], size: int) -> Array:
     return full
 
 
-def standard_errors(names: tuple[str, ...], cov: Array) -> dict[str, float]:
-    """Standard errors of `names`, and of ``delay+lag`` where the delay is among them."""
+def standard_errors(
+    names: tuple[str, ...], cov: Array, plant: Plant | None = None
+) -> dict[str, float]:
+    """Standard errors of `names`, and of ``delay+lag`` where the delay is among them.
+
+    `plant` is needed where a name is none of the plain lags.
+    """
     errors = {name: float(np.sqrt(cov[i, i])) for i, name in enumerate(names)}
     if "delay" in names:
-        # What acts like a delay.
         slow = "time_constant" if "time_constant" in names else "lag"
-        total = np.array([1.0 if name in ("delay", slow) else 0.0 for name in names])
+        total = np.array([1.0 if name == "delay" else by_lag(name, plant) for name in names])
         count = len(names)
         errors[f"delay+{slow}"] = float(np.sqrt(total @ cov[:count, :count] @ total))
     return errors
+
+
+def by_lag(name: str, plant: Plant | None) -> float:
+    """Derivative of the total lag of a plant by one of its numbers."""
+    if not isinstance(plant, (FactoredPlant, ParametricPlant)):
+        return 1.0 if name in ("lag", "time_constant") else 0.0
+    if name not in plant.parameters:
+        return 0.0
+    value = plant.parameters[name]
+    step = QUOTIENT * abs(value) or QUOTIENT
+    higher, lower = (plant._replace({name: value + sign * step}) for sign in (1.0, -1.0))
+    return (higher.lag - lower.lag) / (2.0 * step)
 
 
 def check_moves(output: Array, command: Array | None = None) -> None:

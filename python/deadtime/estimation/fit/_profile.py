@@ -29,9 +29,23 @@ TOLERANCE = 1e-3
 FIRST_STEP = 1.05
 
 
+#: Beginnings of the names of times that are not negative, and units of other quantities. Further
+#: ones have the unit that their plant gives them.
+TIMES = ("delay", "lag", "time_constant")
+UNITS = {"zero": "s", "start": "s", "pole_frequency": "rad/s"}
+
+#: Further quantities that are not negative.
+POSITIVE = ("limit", "rate", "rate_of_rate", "pole_frequency", "pole_damping")
+
+
 def floor_of(name: str) -> float:
     """Lower bound of a quantity: zero for times, none for gains and clock offsets."""
-    return -np.inf if name in ("gain", "start") else 0.0
+    return 0.0 if name.startswith(TIMES) or name in POSITIVE else -np.inf
+
+
+def unit_of(name: str) -> str:
+    """Unit of a quantity; empty where it depends on the units of command and output."""
+    return "s" if name.startswith(TIMES) else UNITS.get(name, "")
 
 
 @dataclass(frozen=True, eq=False)

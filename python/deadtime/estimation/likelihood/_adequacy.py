@@ -93,7 +93,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
         )
     richer, p_value = further_lag(fit)
     further = richer.lags[-1]
-    total = richer.delay + sum(richer.lags) - richer.zero
+    total = richer.delay + sum(richer.lags) - richer.zero + fit.model.own_lag
     plain = len(reasons)
     if p_value < SIGNIFICANCE:
         reasons.append(

@@ -60,8 +60,6 @@ class LikelihoodProfile:
     fit : NoiseFit
     names : mapping of str to str
         The kernel's name of each quantity.
-    known : float
-        Lags that are in the kernel's sum but not in that of the estimate, s.
     """
 
     fit: NoiseFit
@@ -145,7 +143,7 @@ class LikelihoodProfile:
 
     def statistic(self, name: str, value: float) -> float:
         """The squared t for which `value` is the end of an interval."""
-        held = self.fit.likelihood.held(self.centre, self.names[name], value)
+        held = self.fit.likelihood.held(self.centre, self.names[name], value - self._outside(name))
         rise = max(0.0, held.objective - self.centre.objective)
         return self.rows * math.expm1(rise / self.rows) / self.unseen[name]
 
@@ -158,7 +156,12 @@ class LikelihoodProfile:
         key = (name, level)
         if key not in self._ends:
             self._ends[key], _ = self.ends(name, level)
-        return self._ends[key]
+        low, high = self._ends[key]
+        return low + self._outside(name), high + self._outside(name)
+
+    def _outside(self, name: str) -> float:
+        """What a sum of times holds besides the numbers of the kernel, s."""
+        return self.fit.model.own_lag if self.names[name] == "total" else 0.0
 
     def ends(self, name: str, level: float) -> tuple[tuple[float, float], PlantNumbers]:
         """The interval, and the lowest minimum that was seen on the way."""

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant, RateLimited
+from deadtime.loops import (
+    PAIR,
+    FactoredPlant,
+    FirstOrder,
+    Integrator,
+    ParametricPlant,
+    Plant,
+    RateLimited,
+)
 
 Array = NDArray[np.float64]
 
@@ -64,6 +72,20 @@ STEADY = 2.0
 PARTS = ("air_time", "air", "sensor_time", "sensor", "stamps", "arrivals")
 
 
+def names_in_kernel(plant: Plant) -> tuple[str, ...]:
+    """The numbers of a loop with this plant that the kernel fits."""
+    if isinstance(plant, RateLimited):
+        plant = plant.plant
+    own: tuple[str, ...] = ()
+    if isinstance(plant, Integrator):
+        own = ("lag",)
+    elif isinstance(plant, FirstOrder):
+        own = ("time_constant",)
+    elif isinstance(plant, FactoredPlant):
+        own = tuple(name for name in plant.parameters if name not in PAIR)
+    return ("delay", "gain", *own)
+
+
 @dataclass(frozen=True)
 class PlantModel:
     """A plant as the kernel takes it: num/den of unit gain behind lags.
@@ -82,6 +104,8 @@ class PlantModel:
         Further lags, not of the plant, that are tried.
     zero : float
         Time constant of the zero behind the lags, s.
+    own_lag : float
+        The lag of num/den, s, where it counts among those of the plant.
     """
 
     num: tuple[float, ...]
@@ -91,6 +115,7 @@ class PlantModel:
     names: tuple[str, ...]
     extra: int = 0
     zero: float = 0.0
+    own_lag: float = 0.0
 
     @classmethod
     def of(cls, plant: Plant, names: tuple[str, ...]) -> PlantModel:
@@ -105,10 +130,14 @@ class PlantModel:
         if isinstance(plant, FactoredPlant):
             lags = {name: lag for name, lag in plant.parameters.items() if name.startswith("lag")}
             lags = {name: lag for name, lag in lags.items() if lag or name in names}
-            rest = (1.0, 0.0) if plant.integrator else (1.0,)
-            return cls((1.0,), rest, tuple(lags), tuple(lags.values()), names, zero=plant.zero)
+            if lags or plant.has_pair:
+                num, den = plant._without_lags({**plant.parameters, "gain": 1.0})
+                own = plant.lag + plant.zero - sum(plant.lags)
+                known = (tuple(lags), tuple(lags.values()), names)
+                return cls(tuple(num), tuple(den), *known, zero=plant.zero, own_lag=own)
         num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
-        return cls(tuple(map(float, num)), tuple(map(float, den)), (), (), names)
+        own = plant.lag if isinstance(plant, (FactoredPlant, ParametricPlant)) else 0.0
+        return cls(tuple(map(float, num)), tuple(map(float, den)), (), (), names, own_lag=own)
 
     @property
     def free_lags(self) -> list[bool]:

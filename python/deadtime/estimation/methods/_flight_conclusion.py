@@ -14,7 +14,7 @@ from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
-from deadtime.estimation.likelihood._free_limits import LimitsProfile
+from deadtime.estimation.likelihood._free_numbers import NumbersProfile
 from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
@@ -63,7 +63,17 @@ def fitted_flight(model: PlantModel, rows: Sequence[FlightRows], first: PlantNum
             for one, outliers in zip(fit.runs, found, strict=True)
         )
         fit = fit_noise(model, kept, fit.numbers)
-    return on_all_rows(fit, rows) if is_long(rows) else fit
+    return _in_order(on_all_rows(fit, rows) if is_long(rows) else fit)
+
+
+def _in_order(fit: NoiseFit) -> NoiseFit:
+    """The same plant with the longest of its free lags first: their order has no effect."""
+    one, free = fit.numbers, fit.model.free_lags
+    longest = iter(sorted((lag for lag, own in zip(one.lags, free, strict=True) if own))[::-1])
+    lags = [next(longest) if own else lag for lag, own in zip(one.lags, free, strict=True)]
+    return fit.moved(
+        PlantNumbers(one.delay, lags, one.noise, one.gain, one.zero, objective=one.objective)
+    )
 
 
 def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
@@ -109,9 +119,9 @@ def concluded_flight(
     order = [name for name, _ in fit.model.order]
     place = [order.index(name) for name in names]
     cov = cov[np.ix_(place, place)]
-    if isinstance(profile, LimitsProfile):
-        cov = profile.limits.joined(names, cov)
-        values |= profile.limits.values
+    if isinstance(profile, NumbersProfile):
+        cov = profile.free.joined(names, cov)
+        values |= profile.free.values
         names = tuple(values)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
     unseen = unseen_lag(fit)

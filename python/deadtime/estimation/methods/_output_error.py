@@ -38,7 +38,12 @@ from deadtime.estimation.fit._least_squares import (
     solve_jointly,
 )
 from deadtime.estimation.likelihood._adequacy import adequacy_of
-from deadtime.estimation.likelihood._free_limits import LimitsProfile, fit_limits
+from deadtime.estimation.likelihood._free_numbers import (
+    MOST_NUMBERS,
+    NumbersProfile,
+    fit_numbers,
+    numbers_under_white_noise,
+)
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
     predicted_commands,
@@ -46,7 +51,13 @@ from deadtime.estimation.likelihood._missing import (
 )
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of, spikes
-from deadtime.estimation.likelihood._search import FACTORS, LONGEST, NoiseFit, PlantModel
+from deadtime.estimation.likelihood._search import (
+    FACTORS,
+    LONGEST,
+    NoiseFit,
+    PlantModel,
+    names_in_kernel,
+)
 from deadtime.estimation.likelihood._start import excited_part, least_squares
 from deadtime.estimation.methods._conclusion import (
     check_fit,
@@ -148,12 +159,14 @@ def _estimated(
     names = checked_names(free, runs[0].loop, known)
     # What least squares with all derivatives knows; the likelihood knows other plants too.
     common = tuple(name for name in names if name in VEHICLE_PARAMETERS)
-    linear = tuple(name for name in names if name not in RATE_LIMITS)
     models = [_model(run, common, initial_output, computed) for run in runs]
     fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
-    plant = PlantModel.of(fitted[0].loop.plant, linear)
+    in_kernel = names_in_kernel(fitted[0].loop.plant)
+    linear = tuple(name for name in names if name in in_kernel)
+    others = [name for name in names if name not in in_kernel]
+    _check_others(others, models[0].known)
     rows = [one.rows(initial_output, run.check) for one, run in zip(models, runs, strict=True)]
-    white, limits = _first(plant, models, rows, [name for name in names if name in RATE_LIMITS])
+    white, numbers = _first(linear, models, rows, others)
     sources = {one.source for one in models}
     message = f"over {', '.join(names)} on the response to the command"
     if computed:
@@ -168,7 +181,7 @@ def _estimated(
     @cache
     def plain() -> tuple[Model, Minimum]:
         """Least squares with all its derivatives, from that of the likelihood."""
-        started = [one.started(white, limits) for one in models]
+        started = [one.started(white, numbers) for one in models]
         model, found = solve_jointly(started)
         return model, without_vanishing(model, found)
 
@@ -186,27 +199,23 @@ def _estimated(
 
     if common == names and _is_nearly_exact(white) and is_exact(*plain(), fitted):
         return concluded_plain()
-    whole = replace(white, runs=tuple(_within(models, rows, limits)))
+    whole = replace(white, runs=tuple(_given(linear, models, rows, numbers)[1]))
     kept = [
         one._replace(used=one.used & ~spikes(part.residuals))
         for one, part in zip(whole.runs, whole.parts, strict=True)
     ]
-    free_limits = None
-    if limits:
-        found = plain()[1]
-        limits = {name: float(found.point[common.index(name)]) for name in limits}
-        kept = _within(models, kept, limits)
-    fit = fitted_flight(plant, kept, white.with_gain)
-    if limits:
-        fit, free_limits = fit_limits(fit, partial(_within, models, fit.runs), limits)
-        fitted = [run._replace(loop=run.loop.replace(**free_limits.values)) for run in fitted]
+    free_numbers = None
+    fit = fitted_flight(white.model, kept, white.with_gain)
+    if numbers:
+        fit, free_numbers = fit_numbers(fit, partial(_given, linear, models, fit.runs), numbers)
+        fitted = [run._replace(loop=run.loop.replace(**free_numbers.values)) for run in fitted]
     doubts: tuple[str, ...] = ()
     if any(one.commands.computed for one in models):
         fit, doubts = _with_predicted_commands(linear, fit, models, runs)
     profile = profile_for(fit, linear)
-    if free_limits is not None:
-        profile = LimitsProfile(
-            profile.fit, profile.names, profile.preferred, profile._ends, free_limits
+    if free_numbers is not None:
+        profile = NumbersProfile(
+            profile.fit, profile.names, profile.preferred, profile._ends, free_numbers
         )
     longest = min(LONGEST * one.span for one in models)
     if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
@@ -236,24 +245,52 @@ def _estimated(
     )
 
 
+def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
+    """Refuse numbers that cannot be searched around the rest."""
+    if len(names) > MOST_NUMBERS:
+        raise ValueError(
+            f"{', '.join(names)} are {len(names)} numbers besides gain, delay, lags and zero: fit "
+            f"at most {MOST_NUMBERS} of them"
+        )
+    for name in names:
+        if known[name] == 0.0:
+            raise ValueError(f"{name}=0: give another value to start from, of the sign it has")
+
+
 def _first(
-    plant: PlantModel, models: Sequence[_Model], rows: Sequence[FlightRows], limits: Sequence[str]
+    names: tuple[str, ...],
+    models: Sequence[_Model],
+    rows: Sequence[FlightRows],
+    others: Sequence[str],
 ) -> tuple[NoiseFit, dict[str, float]]:
-    """Least squares on parts of the rows, and the free limits of a grid under which it is best."""
+    """Least squares on parts of the rows, and the other numbers under which it is best."""
     known = models[0].known
     found = []
-    for factors in product(FACTORS, repeat=len(limits)):
-        values = {name: factor * known[name] for name, factor in zip(limits, factors, strict=True)}
-        parts = [excited_part(one) for one in _within(models, rows, values)]
-        found.append((least_squares(plant, parts, known["delay"], known["gain"]), values))
-    return min(found, key=lambda one: one[0].numbers.objective)
+
+    def within(values: Mapping[str, float]) -> tuple[PlantModel, list[FlightRows]]:
+        model, whole = _given(names, models, rows, values)
+        return model, [excited_part(one) for one in whole]
+
+    for factors in product(FACTORS, repeat=len(others)):
+        values = {name: factor * known[name] for name, factor in zip(others, factors, strict=True)}
+        fit = least_squares(*within(values), known["delay"], known["gain"])
+        found.append((fit, values))
+    best, values = min(found, key=lambda one: one[0].numbers.objective)
+    return numbers_under_white_noise(best, within, values) if others else (best, values)
 
 
-def _within(
-    models: Sequence[_Model], rows: Sequence[FlightRows], limits: Mapping[str, float]
-) -> list[FlightRows]:
-    """The rows with the commands that a plant with these limits of its rate gets."""
-    return [one.limited(part, limits) for one, part in zip(models, rows, strict=True)]
+def _given(
+    names: tuple[str, ...],
+    models: Sequence[_Model],
+    rows: Sequence[FlightRows],
+    values: Mapping[str, float],
+) -> tuple[PlantModel, list[FlightRows]]:
+    """The plant with these numbers and `names` free, and the rows with the commands it gets."""
+    plant = models[0].plant
+    if values:
+        plant = plant._replace({**plant.parameters, **values})
+    within = [one.limited(part, values) for one, part in zip(models, rows, strict=True)]
+    return PlantModel.of(plant, names), within
 
 
 def _with_predicted_commands(
@@ -313,7 +350,7 @@ class _Model(ModelOfOne):
         return rows._replace(
             command_time=commands.time,
             command=commands.command,
-            unknown=commands.unknown,
+            unknown=(*self._before, *commands.unknown),
             uncertain=tuple(
                 (a, b, abs(gain) * slope) for a, b, slope in commands.computed if slope
             ),
@@ -333,7 +370,7 @@ class _Model(ModelOfOne):
             used=used,
             command_time=self.commands.time,
             command=self.commands.command,
-            unknown=self.commands.unknown,
+            unknown=(*self._before, *self.commands.unknown),
             offset=initial_output is None,
             rounding=rounding,
         )
@@ -362,6 +399,18 @@ class _Model(ModelOfOne):
     def starts(self) -> list[Array]:
         """The point that the search starts from."""
         return [self.start]
+
+    @property
+    def _before(self) -> tuple[tuple[float, float], ...]:
+        """The time before the first command, if the plant still answers to the one before.
+
+        A plant that integrates keeps that as a part of the output at the start.
+        """
+        first = float(self.commands.time[0])
+        integrates = PlantModel.of(self.plant, ()).integrates
+        if integrates or first < self.recording.time[0]:
+            return ()
+        return ((first - self.span, first),)
 
     @cached_property
     def span(self) -> float:

@@ -15,6 +15,7 @@ from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import estimate_delay, method_of
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
+from deadtime.estimation.fit._profile import unit_of
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
@@ -164,7 +165,7 @@ class Identifiability(ReadOnlyArrays):
         informed = self._informed(method_of(method, [self.recording]))
         return run_many_times(
             informed.name,
-            self.loop.parameters,
+            self.loop,
             partial(self.experiment.run, self.loop, self.noise, noise_in_loop=noise_in_loop),
             partial(estimate_delay, loop=known, method=informed, free=self.free),
             runs,
@@ -194,8 +195,7 @@ class Identifiability(ReadOnlyArrays):
                 f"{'-' if bound is None else format(bound.stderr[name], '.3g'):>16}"
                 for bound in (self.command_logged, self.reference_only)
             ]
-            unit = "" if name == "gain" else " s"
-            lines.append(f"  {name + unit:<12}{''.join(cells)}")
+            lines.append(f"  {f'{name} {unit_of(name)}':<12}{''.join(cells)}")
         if self.correlation is not None:
             lines.append(f"  correlation of delay and lag: {self.correlation:.3f}")
         lines += [f"  {remark}" for remark in self.remarks]
@@ -319,8 +319,9 @@ def identifiability(
     if not isinstance(experiment, Experiment):
         raise TypeError(f"experiment is a {type(experiment).__name__}, not an Experiment")
     if free is None:
-        free = ["delay", *(name for name in VEHICLE_PARAMETERS if loop.parameters.get(name))]
-    names = checked_names(free, loop)
+        free = ["delay", *(name for name, value in loop.plant.parameters.items() if value)]
+    known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *loop.plant.parameters]))
+    names = checked_names(free, loop, known)
     noise = _noise_with_covariance(noise)
     if initial_output is not None and finite("initial_output", initial_output) != 0.0:
         raise ValueError(
@@ -344,18 +345,19 @@ def identifiability(
             from_the_command(run_loop, one, names, offset, trim) for one in noisy or [recording]
         ]
         whitened = partial(in_open_loop, run_loop, experiment.time, noise=noise)
-        return bound_of(slopes, whitened, names, noise)
+        return bound_of(slopes, whitened, names, noise, loop.plant)
 
     def reference_only() -> PlannedBound:
         slopes = from_the_reference(run_loop, experiment, names, offset, noise.white)
         if not noise.moves_plant:
             whitened = partial(in_open_loop, run_loop, experiment.time, noise=noise)
-            return bound_of([slopes], whitened, names, noise)
+            return bound_of([slopes], whitened, names, noise, loop.plant)
         assert recording.command is not None
         closed = ClosedLoop.along(run_loop, experiment, recording.command)
         if trim:
             slopes["trim"] = closed.response(trim_response(run_loop, experiment.time))
-        return bound_of([slopes], partial(closed.whitened, run_loop, noise=noise), names, noise)
+        whitened = partial(closed.whitened, run_loop, noise=noise)
+        return bound_of([slopes], whitened, names, noise, loop.plant)
 
     found: list[PlannedBound | None] = []
     remarks: list[str] = []

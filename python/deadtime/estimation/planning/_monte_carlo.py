@@ -21,6 +21,7 @@ from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
+from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ class _Outcome(NamedTuple):
 
 def run_many_times(
     method: str,
-    truth: Mapping[str, float],
+    loop: ControlLoop,
     simulate: Simulate,
     estimate: Estimate,
     runs: int,
@@ -119,7 +120,7 @@ def run_many_times(
     count = whole_number("runs", runs)
     if not 0.0 < level < 1.0:
         raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
-    truth = _with_sum(truth)
+    truth = _with_sum(loop)
     some = partial(_outcomes, truth, simulate, estimate, level, seed)
     return _summed_up(method, truth, level, shared_out(some, count, processes, progress))
 
@@ -138,7 +139,7 @@ def _outcomes(
         recording = simulate(np.random.SeedSequence(seed, spawn_key=(i,)))
         try:
             fit = estimate(recording)
-            fitted = _with_sum(fit.loop.parameters)
+            fitted = _with_sum(fit.loop)
             values = {name: fitted[name] for name in fit.stderr}
             bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
             held = {}
@@ -165,10 +166,14 @@ def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
     return low <= truth <= high
 
 
-def _with_sum(values: Mapping[str, float]) -> dict[str, float]:
+def _with_sum(loop: ControlLoop) -> dict[str, float]:
     """The parameters of a loop, and the sum of its delay and its lag or time constant."""
-    sums = {f"delay+{name}": values["delay"] + values[name] for name in SLOW if name in values}
-    return dict(values) | {"delay+lag": values["delay"]} | sums
+    values = loop.parameters
+    lag = float(getattr(loop.plant, "lag", 0.0))
+    sums = {"delay+lag": values["delay"] + lag}
+    if "time_constant" in values:
+        sums["delay+time_constant"] = values["delay"] + values["time_constant"]
+    return values | sums
 
 
 def _summed_up(

@@ -7,7 +7,7 @@ deviation sigma it is sigma^2 (J^T J)^-1. `_whitening` has V. Two bounds, for tw
 * command logged: f is the response of the plant to that command, which is known, with the noise
   that the controller acted on. With P its transfer function, w the command and T the delay,
   df/dT = -s P e^(-sT) w, df/dlag = -s/(lag s + 1) P e^(-sT) w, df/dgain = f/gain: plants with
-  delay themselves, simulated exactly.
+  delay themselves, simulated exactly; other numbers by difference quotients.
 * reference only: f is the output of the whole loop, whose controller does not act on the noise; J
   is the sensitivity of its simulation.
 
@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
-from deadtime.estimation.data._checks import check_distinguishable, standard_errors
+from deadtime.estimation.data._checks import QUOTIENT, check_distinguishable, standard_errors
+from deadtime.estimation.likelihood._search import names_in_kernel
 from deadtime.estimation.planning._whitening import trim_response
 from deadtime.experiments import Experiment, FlightNoise
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, Plant
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
@@ -94,6 +95,7 @@ def bound_of(
     whitened: Callable[[Array], Array],
     names: tuple[str, ...],
     noise: FlightNoise,
+    plant: Plant,
 ) -> PlannedBound:
     """The bound from the mean information of runs; the sensitivities of the first are kept.
 
@@ -106,7 +108,7 @@ def bound_of(
     # P P^T is the inverse of J^T J for the pseudoinverse P of J.
     inverse = np.linalg.pinv(jacobian / scale) / scale[:, None]
     cov = noise.white**2 * len(runs) * inverse @ inverse.T
-    return PlannedBound(labels, noise, standard_errors(names, cov), cov, runs[0])
+    return PlannedBound(labels, noise, standard_errors(names, cov, plant), cov, runs[0])
 
 
 def from_the_command(
@@ -136,8 +138,16 @@ def from_the_command(
             slopes[name] = -response(plant * s)
         elif name == "gain":
             slopes[name] = response(plant) / values["gain"]
-        else:  # a lag or time constant
-            slopes[name] = -response(plant * s / (values[name] * s + 1.0))
+        elif name in names_in_kernel(loop.plant):  # a lag, time constant or zero
+            slope = response(plant * s / (values[name] * s + 1.0))
+            slopes[name] = slope if name == "zero" else -slope
+        else:
+            step = QUOTIENT * (abs(values[name]) or 1.0)
+            higher, lower = (
+                response(loop.plant._replace({name: values[name] + move}).transfer_function())
+                for move in (step, -step)
+            )
+            slopes[name] = (higher - lower) / (2.0 * step)
     if offset:
         slopes["initial output"] = np.ones(len(recording))
     if trim:

@@ -62,7 +62,7 @@ impl Model {
              of at least a thousandth of a row"
         );
         refuse_if!(
-            free.zero && free.lags.is_empty(),
+            free.zero && free.lags.is_empty() && !plant.takes_zero(),
             "a zero is searched without a lag: give the plant a lag"
         );
         let states = plant.states(free.lags.len());

@@ -1,7 +1,7 @@
 //! Plants with lags in front: 1/(T₁ s + 1) … (z s + 1)/(T_m s + 1) · num(s)/den(s).
 //!
 //! The lags come first, the last of them with the zero; num/den follows in its controllable
-//! canonical form. A lag of zero has no state.
+//! canonical form. A lag of zero has no state. Without lags the zero is a factor of num.
 
 use crate::Error;
 
@@ -71,6 +71,11 @@ impl Plant {
         self.den.len() - 1 + lags
     }
 
+    /// Is it proper with a zero, without lags?
+    pub(super) fn takes_zero(&self) -> bool {
+        self.num.last() == Some(&0.0)
+    }
+
     /// Does a constant input let the output grow without end?
     pub(super) fn integrates(&self) -> bool {
         self.den.len() > 1 && self.den[0] == 0.0
@@ -97,7 +102,13 @@ impl Plant {
             direct *= through;
             from[i] += 1.0 - through;
         }
-        let last = self.num[order];
+        let mut num = self.num.clone();
+        if count == 0 && self.takes_zero() {
+            for i in (1..=order).rev() {
+                num[i] += zero * num[i - 1];
+            }
+        }
+        let last = num[order];
         let mut c: Vec<f64> = from.iter().map(|from| last * from).collect();
         for i in 0..order {
             let row = (count + i) * n;
@@ -112,7 +123,7 @@ impl Plant {
                     a[row + count + j] -= self.den[j];
                 }
             }
-            c[count + i] += self.num[i] - last * self.den[i];
+            c[count + i] += num[i] - last * self.den[i];
         }
         PlantSpace {
             a,
@@ -173,7 +184,12 @@ mod tests {
         for (num, den) in plants {
             let value = |c: &[f64]| c.iter().fold(Complex64::ZERO, |sum, c| sum * s + c);
             for lags in [&[] as &[f64], &[0.2], &[0.3, 0.0, 0.1]] {
-                let zero = if lags.is_empty() { 0.0 } else { 0.25 };
+                let is_proper = num.len() < den.len();
+                let zero = if lags.is_empty() && !is_proper {
+                    0.0
+                } else {
+                    0.25
+                };
                 let mut expected = value(num) / value(den) * (zero * s + 1.0);
                 for lag in lags {
                     expected /= lag * s + 1.0;
