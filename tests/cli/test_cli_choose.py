@@ -13,7 +13,7 @@ TOLD = ("--kp", 1, "--sample-time", 0.02, "--command", "reference")
 @pytest.fixture(scope="module")
 def roll(tmp_path_factory):
     path = tmp_path_factory.mktemp("roll") / "roll.csv"
-    recording = record_attitude(1, delay=0.047, lags=(0.15, 0.05), gain=0.95)
+    recording = record_attitude(2, delay=0.047, lags=(0.15, 0.05), gain=0.95)
     columns = np.stack([recording.time, recording.reference, recording.output], axis=1)
     np.savetxt(path, columns, delimiter=",", header="time,reference,output", comments="")
     return str(path)
@@ -62,12 +62,16 @@ def test_a_formula_with_two_lags_has_a_name_for_each(roll):
     [
         ("3*(0.1*s+1)/((0.2*s+1)*(s+2))", {"gain": 1.5, "lag_1": 0.5, "lag_2": 0.2, "zero": 0.1}),
         ("1/(s*(0.1*s+1)**2)", {"gain": 1.0, "lag_1": 0.1, "lag_2": 0.1, "zero": 0.0}),
-        ("1/(s**2+0.1*s+1)", {"gain": 1.0}),
+        (
+            "1/(s**2+0.1*s+1)",
+            {"gain": 1.0, "zero": 0.0, "pole_frequency": 1.0, "pole_damping": 0.05},
+        ),
+        ("1/((s**2+0.1*s+1)*(s**2+s+4))", {"gain": 1.0}),
         ("1/((s-1)*(s+2))", {"gain": 1.0}),
         ("s/((s+1)*(s+2))", {"gain": 1.0}),
     ],
 )
-def test_real_poles_and_a_zero_get_names_and_nothing_else_does(formula, parameters):
+def test_poles_and_a_zero_get_names_where_a_plant_has_few(formula, parameters):
     plant = with_names(dtm.ControlLoop(plant_from(formula), dtm.P(1.0)).plant)
     assert plant.parameters == pytest.approx(parameters, rel=1e-5)
 

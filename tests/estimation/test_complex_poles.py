@@ -149,7 +149,7 @@ def test_a_plan_knows_the_numbers_of_any_plant():
 @pytest.mark.survey
 @pytest.mark.parametrize("air", [0.0, 0.03])
 def test_intervals_hold_the_truth(air):
-    held = {name: 0 for name in (*TRUTH, "delay+lag")}
+    held = dict.fromkeys((*TRUTH, "delay+lag"), 0)
     for seed in range(80):
         fit = dtm.estimate_delay(recorded(seed, air), KNOWN, free=NAMES)
         for name, truth in (TRUTH | {"delay+lag": SUM}).items():
