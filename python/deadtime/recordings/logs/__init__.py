@@ -1,0 +1,1 @@
+"""Logs of autopilots: what they hold, and the recordings of their loops."""
