@@ -47,6 +47,11 @@ class LogContents:
         Flight modes, each with the time from which it holds, s.
     remarks : tuple of str
         What was damaged or left out, in sentences.
+    span : (float, float), optional
+        First and last time of the log, s, where its header or its index tells; otherwise those of
+        the topics.
+    gaps : tuple of (float, float)
+        Where the logger lost data: start and stop, s.
     """
 
     format: str
@@ -57,3 +62,5 @@ class LogContents:
     parameters: Mapping[str, float] = field(default_factory=dict)
     modes: tuple[tuple[float, str], ...] = ()
     remarks: tuple[str, ...] = ()
+    span: tuple[float, float] | None = None
+    gaps: tuple[tuple[float, float], ...] = ()
