@@ -828,12 +828,13 @@ def loop_packet_write(
     reference: float,
     flags: int,
 ) -> bytes: ...
+
 @final
 class BlackboxFrames:
-    main: Final[Int32Array]
-    slow: Final[Int32Array]
+    main: Final[NDArray[np.int32]]
+    slow: Final[NDArray[np.int32]]
     slow_before: Final[NDArray[np.uint32]]
-    gps: Final[Int32Array]
+    gps: Final[NDArray[np.int32]]
     gps_before: Final[NDArray[np.uint32]]
     ended: Final[bool]
     damaged: Final[int]

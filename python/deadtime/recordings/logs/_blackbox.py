@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from deadtime import _deadtime
 from deadtime._base.errors import RecordingError
-from deadtime.recordings.logs._blackbox_frames import read_frames, seconds
+from deadtime.recordings.logs._blackbox_frames import layout, read_frames, seconds
 from deadtime.recordings.logs._blackbox_head import MARK, Head, read_head
 from deadtime.recordings.logs._blackbox_modes import flight_modes
 from deadtime.recordings.logs._columns import Columns
@@ -26,7 +26,7 @@ GYRO = re.compile(r"(gyroADC|gyroUnfilt)\[\d\]")
 
 
 def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> LogContents:
-    """Read a Blackbox log of Betaflight or INAV.
+    r"""Read a Blackbox log of Betaflight or INAV.
 
     Logs of data version 2 define their fields themselves. Versions whose fields, scales and modes
     are known: Betaflight 4.2 to 4.6 and 2025.12, INAV 5 to 8. Those of other versions are read by
@@ -45,13 +45,12 @@ def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> Log
     Returns
     -------
     LogContents
-        Topic ``"main"`` has the fields of the loop by their names in the log, and
-        ``"axisSum[0]"`` to ``[2]``, the sum of what a P, I, D, F and S controller of an axis
-        gives. Setpoints and rates (``setpoint[0]`` to ``[2]``, ``gyroADC``, ``gyroUnfilt``,
-        INAV's ``axisRate``) are in deg/s; everything else is as logged: INAV's ``attitude`` in
-        0.1 deg, ``navPos`` and ``navVel`` in cm and cm/s, ``eRPM`` in 100 rpm. ``"slow"`` has modes
-        and states from the times at which they hold; ``"gps"`` is there where it is logged.
-        Parameters are the numbers of the head, several of a line as ``"rollPID[0]"``.
+        Topic ``"main"`` has the fields of the loop. Setpoints and rates (``setpoint[0]`` to
+        ``[2]``, ``gyroADC``, ``gyroUnfilt``, INAV's ``axisRate``) are in deg/s; everything else is
+        as logged: INAV's ``attitude`` in 0.1 deg, ``navPos`` and ``navVel`` in cm and cm/s,
+        ``eRPM`` in 100 rpm, ``baroAlt`` in cm. ``"slow"`` has modes and states from the times at
+        which they hold; ``"gps"`` is there where it is logged. Parameters are the numbers of the
+        head, several of a line as ``"rollPID[0]"``.
 
     Raises
     ------
@@ -60,11 +59,11 @@ def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> Log
 
     Examples
     --------
-    >>> head = b"H Product:Blackbox flight data recorder by Nicholas Sherlock\\n"
-    >>> head += b"H Data version:2\\nH Firmware revision:Betaflight 4.5.1 (abc) X\\n"
+    >>> head = b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n"
+    >>> head += b"H Data version:2\nH Firmware revision:Betaflight 4.5.1 (abc) X\n"
     >>> for line in ("name:loopIteration,time,gyroADC[0]", "encoding:1,1,0", "predictor:0,0,0"):
-    ...     head += f"H Field I {line}\\n".encode()
-    >>> contents = read_blackbox(head + b"I\\0\\x64\\x02" + b"I\\1\\x65\\x03", "small.bbl")
+    ...     head += f"H Field I {line}\n".encode()
+    >>> contents = read_blackbox(head + b"I\0\x64\x02" + b"I\1\x65\x03", "small.bbl")
     >>> contents.firmware, contents.topics["main"].columns["gyroADC[0]"]
     ('Betaflight 4.5.1 (abc) X', array([ 1., -2.]))
     """
@@ -156,7 +155,19 @@ def _contents(flight: _Flight, remarks: tuple[str, ...]) -> LogContents:
         parameters=dict(head.numbers),
         modes=modes,
         remarks=(*remarks, *_remarks(flight, autopilot)),
+        gaps=_gaps(flight),
     )
+
+
+def _gaps(flight: _Flight) -> tuple[tuple[float, float], ...]:
+    """Where iterations are missing that the firmware was told to log."""
+    shape = layout(flight.head)
+    some, all_ = shape.logged
+    has_deltas = shape.inter is not None and flight.head.numbers.get("P interval") != 0.0
+    step = max(all_ - some, 0) + 1 if has_deltas else shape.interval
+    iterations = flight.frames.main[shape.iteration]
+    after = np.flatnonzero(np.diff(iterations) > step)
+    return tuple((float(flight.time[k]), float(flight.time[k + 1])) for k in after)
 
 
 def _remarks(flight: _Flight, autopilot: str) -> Iterator[str]:
@@ -201,11 +212,6 @@ def _columns(flight: _Flight, letter: str, table: Integers) -> Columns:
             continue
         is_signed = k >= len(signs) or signs[k] != "0"
         makers[name] = partial(_column, table[k], is_signed, scales.get(name, 1.0))
-    if letter == "I":
-        for axis in range(3):
-            terms = [k for k, name in enumerate(names) if re.fullmatch(rf"axis[PIDFS]\[{axis}\]", name)]
-            if terms:
-                makers[f"axisSum[{axis}]"] = partial(_sum, table, terms)
     return Columns(makers)
 
 
@@ -222,7 +228,3 @@ def _scales(head: Head) -> dict[str, float]:
 def _column(values: Integers, is_signed: bool, scale: float) -> Array:
     column = (values if is_signed else values.view(np.uint32)).astype(np.float64)
     return column if scale == 1.0 else column * scale
-
-
-def _sum(table: Integers, terms: list[int]) -> Array:
-    return table[terms].sum(axis=0, dtype=np.float64)

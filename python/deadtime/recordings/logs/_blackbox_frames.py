@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from deadtime import _deadtime
 from deadtime._base.errors import RecordingError
 from deadtime.recordings.logs._blackbox_head import Head
+from deadtime.recordings.logs._contents import Array
 
 Codes = tuple[bytes, bytes]
 
 #: What decoded values may take, bytes: so much, and so many times the size of the log. A frame of
-#: 20 bytes holds 45 values of 4 bytes each.
+#: 30 bytes holds 45 values of 4 bytes each.
 MEMORY = 16 << 20
-MEMORY_FACTOR = 9
+MEMORY_FACTOR = 6
 
 
 @dataclass(frozen=True)
@@ -91,12 +93,10 @@ def read_frames(log: bytes, head: Head) -> _deadtime.BlackboxFrames:
     return _deadtime.blackbox_frames(log[head.size :], layout(head), limit)
 
 
-def seconds(microseconds: np.ndarray[tuple[int], np.dtype[np.int32]]) -> np.ndarray[
-    tuple[int], np.dtype[np.float64]
-]:
+def seconds(microseconds: NDArray[np.int32]) -> Array:
     """A clock of 32 bits, µs, as seconds that go on where it starts again from zero."""
     raw = microseconds.view(np.uint32)
     # A step is the nearest one, forwards or backwards.
     steps = np.diff(raw).view(np.int32).astype(np.int64)
-    start = np.int64(raw[0]) if raw.size else np.int64(0)
-    return (start + np.concatenate([[0], np.cumsum(steps)])[: raw.size]) * 1e-6
+    elapsed = np.concatenate([[0], np.cumsum(steps)]) + np.int64(raw[0])
+    return elapsed.astype(np.float64) * 1e-6
