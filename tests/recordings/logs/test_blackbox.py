@@ -240,7 +240,7 @@ def test_a_flight_that_cannot_be_read_is_named():
     assert contents.remarks[-1] == (
         'Not read: flight 1: data version "1" is not read, only version 2.'
     )
-    with pytest.raises(RecordingError, match='^made.bbl: flight 1: data version "1"'):
+    with pytest.raises(RecordingError, match=r'^made\.bbl: flight 1: data version "1"'):
         read_blackbox(broken + flight(rows, log), "made.bbl", flight=1)
     with pytest.raises(RecordingError, match="flight 3 of 2: give a number from 1 to 2"):
         read_blackbox(broken + flight(rows, log), "made.bbl", flight=3)
