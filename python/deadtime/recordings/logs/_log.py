@@ -69,17 +69,28 @@ class LogLoop(ReadOnlyArrays):
         """Length of all segments, s."""
         return float(sum(stop - start for start, stop in self.segments))
 
+    def headline(self) -> str:
+        """The loop in one line."""
+        rates = f"{self.setpoint.rate:.4g} and {self.response.rate:.4g} Hz"
+        windows = f"{len(self.segments)} window{'s' if len(self.segments) > 1 else ''}"
+        followed = f"{self.followed:.2f} s in {windows}" if self.segments else "never"
+        return (
+            f"{self.name}: {self.setpoint.source} → {self.response.source} "
+            f"[{self.response.unit}], {rates}; followed: {followed}"
+        )
+
     def summary(self) -> str:
         """The loop in lines of text."""
-        lines = [f"{self.name} ({self.kind}, {self.axis})"]
+        lines = [self.headline()]
         for name, series in self.signals.items():
             gaps = f", {len(series.gaps)} gaps" if series.gaps else ""
             unit = f" [{series.unit}]" if series.unit else ""
             lines.append(f"  {name}: {series.source}{unit}, {series.rate:.4g} Hz{gaps}")
             if series.conversion:
                 lines.append(f"    converted: {series.conversion}")
-        shown = [f"{start:.2f} to {stop:.2f}" for start, stop in self.segments]
-        lines.append(f"  followed: {', '.join(shown)} s" if shown else "  never followed")
+        shown = ", ".join(f"{start:.2f} to {stop:.2f}" for start, stop in self.segments)
+        if shown:
+            lines.append(f"  followed from {shown} s")
         lines.extend(f"  {reason}" for reason in self.why_left_out)
         return "\n".join(lines)
 
@@ -186,7 +197,7 @@ class Log(ReadOnlyArrays):
         if self.modes:
             spans = ", ".join(f"{name} from {at:.2f} s" for at, name in self.modes)
             lines.append(f"modes: {spans}")
-        lines.extend(loop.summary() for loop in self.loops.values())
+        lines.extend(loop.headline() for loop in self.loops.values())
         if not self.loops:
             lines.append("no loop: setpoint and response of none are in the log")
         if self.key_parameters:

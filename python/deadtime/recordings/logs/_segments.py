@@ -47,11 +47,8 @@ def segments_of(
     copies = outside(_copies(setpoint, response))
     kept = _cut(kept, copies, "the setpoint is a copy of the estimate", reasons)
     long = [one for one in kept if all(_rows(s, one) >= FEWEST for s in (setpoint, response))]
-    if len(long) < len(kept):
-        reasons.append(
-            f"{len(kept) - len(long)} windows with fewer than {FEWEST} rows are left out"
-        )
-    return tuple(long), tuple(reasons)
+    kept = _cut(kept, long, f"a window holds fewer than {FEWEST} rows", reasons)
+    return tuple(kept), tuple(reasons)
 
 
 def _cut(kept: Windows, allowed: Windows, reason: str, reasons: list[str]) -> Windows:
