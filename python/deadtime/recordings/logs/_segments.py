@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from deadtime.recordings.logs._contents import LogContents
 from deadtime.recordings.logs._names import Condition, Windows
 from deadtime.recordings.logs._series import Series
-from deadtime.recordings.logs._windows import held_rows, length, outside, shared, windows_of
+from deadtime.recordings.logs._windows import held_rows, length, outside, shared
 
 #: Fewest rows of setpoint and response in a segment.
 FEWEST = 8
@@ -39,7 +39,7 @@ def segments_of(
             moved = [(low - start, high - start) for low, high in found]
             kept = _cut(kept, moved, condition.otherwise, reasons)
     for name, series in (("setpoint", setpoint), ("response", response)):
-        finite = windows_of(series.time, np.isfinite(series.values))
+        finite = held_rows(series.time, np.isfinite(series.values))
         kept = _cut(kept, finite, f"the {name} holds no number (NaN)", reasons)
         kept = _cut(kept, outside(list(series.gaps)), f"the {name} has a gap", reasons)
     lost = [(low - start, high - start) for low, high in contents.gaps]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -101,16 +102,37 @@ def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
 
 
 def increasing(time: Array) -> NDArray[np.bool_]:
-    """The rows whose time is after that of all rows that are kept before them.
+    """The most rows whose times increase strictly.
 
-    One wrong time far ahead would take all later rows with it, one far behind all earlier rows:
-    of the two ways to count, the one that keeps more rows is taken.
+    One wrong time far ahead then takes no later rows with it, and one far behind no earlier ones.
     """
-    finite = np.isfinite(time)
-    given = np.where(finite, time, -np.inf)
-    before = np.concatenate(([-np.inf], np.maximum.accumulate(given)[:-1]))
-    forward = finite & (given > before)
-    given = np.where(finite, time, np.inf)
-    after = np.concatenate((np.minimum.accumulate(given[::-1])[::-1][1:], [np.inf]))
-    backward = finite & (given < after)
-    return forward if forward.sum() >= backward.sum() else backward
+    kept = np.isfinite(time)
+    rows = np.flatnonzero(kept)
+    repeated = np.flatnonzero(np.diff(time[rows]) == 0.0) + 1
+    rows = np.delete(rows, repeated)
+    if np.any(np.diff(time[rows]) <= 0.0):
+        rows = rows[_longest(time[rows].tolist())]
+    kept[:] = False
+    kept[rows] = True
+    return kept
+
+
+def _longest(values: list[float]) -> list[int]:
+    """Places of the longest increasing part (patience sorting)."""
+    lowest: list[float] = []  # the least last value of a part of each length
+    last: list[int] = []
+    before = []
+    for place, value in enumerate(values):
+        at = bisect_left(lowest, value)
+        before.append(last[at - 1] if at else -1)
+        if at == len(lowest):
+            lowest.append(value)
+            last.append(place)
+        else:
+            lowest[at] = value
+            last[at] = place
+    found, place = [], last[-1] if last else -1
+    while place >= 0:
+        found.append(place)
+        place = before[place]
+    return found[::-1]
