@@ -19,8 +19,12 @@ TABLES = {
 
 def names_of(contents: LogContents) -> AutopilotNames:
     """The loops that logs of this autopilot can hold; none of an unknown one."""
-    if contents.autopilot not in TABLES:
-        return AutopilotNames(())
-    table = importlib.import_module(f"deadtime.recordings.logs.{TABLES[contents.autopilot]}")
-    found: AutopilotNames = table.names(contents)
+    found = AutopilotNames(())
+    if contents.autopilot in TABLES:
+        table = importlib.import_module(f"deadtime.recordings.logs.{TABLES[contents.autopilot]}")
+        found = table.names(contents)
+    if contents.format == "tlog":  # the messages are the same for all autopilots
+        from deadtime.recordings.logs._mavlink import LOOPS
+
+        return AutopilotNames(LOOPS, found.key_parameters)
     return found

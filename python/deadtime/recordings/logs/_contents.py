@@ -21,10 +21,13 @@ class Topic:
         Seconds on the vehicle's clock, as logged: it may repeat or go back.
     columns : mapping of str to ndarray, shape (n,)
         Values by their names in the log; NaN where a message has none.
+    units : mapping of str to str
+        Units of columns, where the log tells them.
     """
 
     time: Array
     columns: Mapping[str, Array]
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

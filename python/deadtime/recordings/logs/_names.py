@@ -32,6 +32,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "cm/s": ("m/s", 1e-2),
     "mm/s": ("m/s", 1e-3),
     "ft/s": ("m/s", 0.3048),
+    "m/s/s": ("m/s²", 1.0),
+    "cm/s/s": ("m/s²", 1e-2),
 }
 
 
