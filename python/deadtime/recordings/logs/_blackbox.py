@@ -10,9 +10,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
 from deadtime._base.errors import RecordingError
-from deadtime.recordings.logs._blackbox_frames import layout, read_frames, seconds
+from deadtime.recordings.logs._blackbox_frames import Frames, layout, read_frames, seconds
 from deadtime.recordings.logs._blackbox_head import MARK, Head, read_head
 from deadtime.recordings.logs._blackbox_modes import flight_modes
 from deadtime.recordings.logs._columns import Columns
@@ -110,7 +109,7 @@ class _Flight:
 
     number: int
     head: Head
-    frames: _deadtime.BlackboxFrames
+    frames: Frames
     time: Array
 
     @property

@@ -13,6 +13,7 @@ from deadtime.recordings.logs._blackbox_head import Head
 from deadtime.recordings.logs._contents import Array
 
 Codes = tuple[bytes, bytes]
+Frames = _deadtime.BlackboxFrames
 
 #: What decoded values may take, bytes: so much, and so many times the size of the log. A frame of
 #: 30 bytes holds 45 values of 4 bytes each.
@@ -87,7 +88,7 @@ def layout(head: Head) -> Layout:
     )
 
 
-def read_frames(log: bytes, head: Head) -> _deadtime.BlackboxFrames:
+def read_frames(log: bytes, head: Head) -> Frames:
     """The frames of a flight; `log` starts at its head."""
     limit = (MEMORY + MEMORY_FACTOR * len(log)) // 4
     return _deadtime.blackbox_frames(log[head.size :], layout(head), limit)

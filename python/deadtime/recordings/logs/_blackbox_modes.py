@@ -75,6 +75,7 @@ def flight_modes(
         name = "+".join(names) or "ACRO"
         if not raised & 1:
             name = "DISARMED"
-        if not modes or modes[-1][1] != name:
+        # Damage can set the clock back; a mode before the last one would have no time to hold.
+        if not modes or (modes[-1][1] != name and modes[-1][0] <= time[k]):
             modes.append((float(time[k]), name))
     return tuple(modes)

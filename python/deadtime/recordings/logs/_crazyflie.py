@@ -102,9 +102,9 @@ def read_crazyflie(data: bytes, source: str) -> LogContents:
     if not whole:
         faults.insert(0, "The checksum does not match: the log was cut off, or is damaged.")
     return LogContents(
-        format="Crazyflie micro-SD log",
+        format="Crazyflie uSD",
         autopilot="Crazyflie",
-        vehicle="Crazyflie",
+        vehicle="",
         firmware="",
         topics=topics,
         remarks=tuple(faults),
