@@ -46,7 +46,7 @@ if TYPE_CHECKING:
         simulate_fixed_step,
         sweep,
     )
-    from deadtime.recordings import Recording, read_recording
+    from deadtime.recordings import Recording, open_log, read_recording
     from deadtime.roots import (
         QuasiPolynomial,
         crossings,
@@ -83,7 +83,7 @@ _ROOMS = {
         "ParametricPlant RateLimited RationalPlant kit_plant simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
-    "recordings": "Recording read_recording",
+    "recordings": "Recording open_log read_recording",
     "experiments": "Experiment",
     "gallery": "",
     "links": "",
@@ -145,6 +145,7 @@ __all__ = [
     "lambertw0",
     "lambertwm1",
     "largest_stable_box",
+    "open_log",
     "parameters",
     "proved_boxes",
     "read_recording",

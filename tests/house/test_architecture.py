@@ -51,6 +51,7 @@ WIRE = {
     "links.ardrone2.configuration",
     "links.ardrone2.navdata",
     "links.udp.packets",
+    "recordings.logs._blackbox_frames",
 }
 
 #: Imports for types from a later room, with the reason.

@@ -26,6 +26,7 @@ INTERRUPTED = 130
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
     "estimate": "Estimate the delay of a loop from a recording of it, or from several together.",
+    "inspect": "Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
     "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
     "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
     "design": "Find the gains that are best in the worst case, within margins.",

@@ -5,5 +5,17 @@ from deadtime.recordings._check_rows import Hole
 from deadtime.recordings._csv import read_recording
 from deadtime.recordings._findings import Finding
 from deadtime.recordings._recording import Recording, Step
+from deadtime.recordings.logs import Log, LogLoop, Series, open_log
 
-__all__ = ["Finding", "Hole", "Recording", "RecordingCheck", "Step", "read_recording"]
+__all__ = [
+    "Finding",
+    "Hole",
+    "Log",
+    "LogLoop",
+    "Recording",
+    "RecordingCheck",
+    "Series",
+    "Step",
+    "open_log",
+    "read_recording",
+]

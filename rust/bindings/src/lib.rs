@@ -73,9 +73,10 @@ mod _deadtime {
     use super::ufunc::limit_threads;
     #[pymodule_export]
     use super::wire::{
-        AtCommand, Navdata, NavdataLayout, NavdataOption, PyLoopPacket, at_read, at_write,
-        configuration_read, configuration_write, doubles_read, doubles_write, loop_packet_read,
-        loop_packet_write, navdata_full, navdata_layouts, navdata_read, navdata_write,
+        AtCommand, BlackboxFrames, Navdata, NavdataLayout, NavdataOption, PyLoopPacket, at_read,
+        at_write, blackbox_frames, configuration_read, configuration_write, doubles_read,
+        doubles_write, loop_packet_read, loop_packet_write, navdata_full, navdata_layouts,
+        navdata_read, navdata_write,
     };
     use pyo3::prelude::*;
 

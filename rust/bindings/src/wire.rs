@@ -2,10 +2,14 @@
 //! cannot be written a `ValueError`.
 
 use crate::errors::own;
+use crate::runtime;
 use deadtime_wire::at::{self, Command};
+use deadtime_wire::blackbox::{self, Fields, Layout, Table};
 use deadtime_wire::loop_packet::{self, LoopPacket};
 use deadtime_wire::navdata::{self, Head, LAYOUTS, OptionView, Value};
-use deadtime_wire::{Error, Unit, configuration};
+use deadtime_wire::{Error, Fault, Unit, configuration};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
@@ -399,4 +403,96 @@ pub(crate) fn doubles_write(py: Python<'_>, values: Vec<f64>) -> PyResult<Bound<
     let bytes = loop_packet::write_doubles(&values);
     let bytes = bytes.map_err(|error| unwritable("doubles", &error))?;
     Ok(PyBytes::new(py, &bytes))
+}
+
+/// The codes of encodings and predictors of the fields of a frame.
+type Codes = (Vec<u8>, Vec<u8>);
+
+/// What the head of a Blackbox log says of its frames.
+#[derive(FromPyObject)]
+pub(crate) struct BlackboxLayout {
+    intra: Codes,
+    inter: Option<Codes>,
+    slow: Option<Codes>,
+    gps: Option<Codes>,
+    home: Option<Codes>,
+    iteration: usize,
+    time: usize,
+    first_motor: Option<usize>,
+    least_throttle: i32,
+    least_motor: i32,
+    voltage: i32,
+    interval: u32,
+    logged: (u32, u32),
+}
+
+impl TryFrom<BlackboxLayout> for Layout {
+    type Error = Fault;
+
+    fn try_from(given: BlackboxLayout) -> Result<Self, Fault> {
+        let fields = |(encodings, predictors): Codes| Fields::new(&encodings, &predictors);
+        Ok(Self {
+            intra: fields(given.intra)?,
+            inter: given.inter.map(fields).transpose()?,
+            slow: given.slow.map(fields).transpose()?,
+            gps: given.gps.map(fields).transpose()?,
+            home: given.home.map(fields).transpose()?,
+            iteration: given.iteration,
+            time: given.time,
+            first_motor: given.first_motor,
+            least_throttle: given.least_throttle,
+            least_motor: given.least_motor,
+            voltage: given.voltage,
+            interval: given.interval,
+            logged: given.logged,
+        })
+    }
+}
+
+/// Frames of a Blackbox log: a row for each field, a column for each frame; and how many main
+/// frames stand before each of the others.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct BlackboxFrames {
+    main: Py<PyArray2<i32>>,
+    slow: Py<PyArray2<i32>>,
+    slow_before: Py<PyArray1<u32>>,
+    gps: Py<PyArray2<i32>>,
+    gps_before: Py<PyArray1<u32>>,
+    ended: bool,
+    damaged: u32,
+    unusable: u32,
+}
+
+/// The frames of a Blackbox log without its head, with `limit` values at most.
+#[pyfunction]
+pub(crate) fn blackbox_frames(
+    py: Python<'_>,
+    log: &[u8],
+    layout: BlackboxLayout,
+    limit: usize,
+) -> PyResult<BlackboxFrames> {
+    let unreadable = |fault: Fault| own(py, "RecordingError", (fault.to_string(),));
+    let layout = Layout::try_from(layout).map_err(unreadable)?;
+    let frames = runtime::run(py, None, None, |_| Ok(blackbox::read(log, &layout, limit)))?;
+    let frames = frames.map_err(unreadable)?;
+    let array = |table: Table| {
+        let fields = table.values.len().checked_div(table.rows).unwrap_or(0);
+        let values = Array2::from_shape_vec((fields, table.rows), table.values);
+        let values = values.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let before = table.before.into_pyarray(py).unbind();
+        Ok::<_, PyErr>((values.into_pyarray(py).unbind(), before))
+    };
+    let (main, _) = array(frames.main)?;
+    let (slow, slow_before) = array(frames.slow)?;
+    let (gps, gps_before) = array(frames.gps)?;
+    Ok(BlackboxFrames {
+        main,
+        slow,
+        slow_before,
+        gps,
+        gps_before,
+        ended: frames.ended,
+        damaged: frames.damaged,
+        unusable: frames.unusable,
+    })
 }

@@ -17,6 +17,7 @@ fn main() -> std::io::Result<()> {
         ("at_commands", common::at_corpus()),
         ("configuration", common::configuration_corpus()),
         ("loop_packet", common::loop_corpus()),
+        ("blackbox", common::blackbox_corpus()),
     ] {
         std::fs::create_dir_all(folder.join(target))?;
         for (number, packet) in packets.iter().enumerate() {

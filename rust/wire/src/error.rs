@@ -110,6 +110,30 @@ pub enum Fault {
     /// Bytes after the end of the configuration.
     #[error("bytes after the NUL that ends the configuration")]
     AfterEnd,
+    /// A field of a flight log with an encoding or a predictor that is not known.
+    #[error("the {name} {code} of a field is not known")]
+    Code {
+        /// Which of the two.
+        name: &'static str,
+        /// Its number in the log.
+        code: u8,
+    },
+    /// Fields of a flight log that are encoded together, but are not as many as it takes.
+    #[error("{run} fields have an encoding that takes {group} together")]
+    Group {
+        /// Number of fields.
+        run: usize,
+        /// Number of fields that the encoding takes.
+        group: usize,
+    },
+    /// Few bytes that decode to more values than any flight.
+    #[error(
+        "the frames decode to more than {limit} values, more than so few bytes of a flight hold"
+    )]
+    Values {
+        /// Upper limit.
+        limit: usize,
+    },
 }
 
 impl Fault {

@@ -10,7 +10,7 @@
 mod common;
 
 use common::checks;
-use deadtime_wire::{at, configuration, loop_packet, navdata};
+use deadtime_wire::{at, blackbox, configuration, loop_packet, navdata};
 use std::time::{Duration, Instant};
 
 /// Random numbers after Marsaglia's xorshift (2003), with a multiplier against its linearity.
@@ -51,6 +51,9 @@ const WORDS: &[&[u8]] = &[
     b"\x88\x77\x66\x55",
     b"a:b = c\n",
     b"\xc3\xa9",
+    b"E\xffEnd of log\0",
+    b"P\x04\0\0\0\0",
+    b"S\x03\0\x05",
 ];
 
 fn damage(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
@@ -189,4 +192,12 @@ fn packets_of_a_loop_are_read_or_refused() {
         loop_packet::read,
         checks::loop_packets,
     );
+}
+
+#[test]
+fn flight_logs_are_read_as_far_as_they_are_whole() {
+    let layout = checks::blackbox_layout();
+    let read = |bytes: &[u8]| blackbox::read(bytes, &layout, usize::MAX);
+    let corpus = common::blackbox_corpus();
+    survey("flight logs", &corpus, |_| (), read, checks::blackbox);
 }

@@ -6,6 +6,7 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::indexing_slicing)]
 
 use deadtime_wire::at::{self, Command};
+use deadtime_wire::blackbox::{self, Fields, Layout};
 use deadtime_wire::{configuration, loop_packet, navdata};
 
 pub(crate) fn navdata(bytes: &[u8]) -> bool {
@@ -91,4 +92,53 @@ pub(crate) fn loop_packets(bytes: &[u8]) -> bool {
         }
         Err(_) => false,
     }
+}
+
+/// Fields of every encoding and predictor.
+pub(crate) fn blackbox_layout() -> Layout {
+    let fields = |encodings: &[u8], predictors: &[u8]| Fields::new(encodings, predictors).unwrap();
+    Layout {
+        intra: fields(
+            &[1, 1, 0, 3, 1, 0, 0, 0, 0, 8, 8, 8, 8, 10, 10, 10],
+            &[0, 0, 4, 9, 11, 5, 8, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+        ),
+        inter: Some(fields(
+            &[9, 0, 8, 8, 8, 8, 7, 7, 7, 6, 6, 6, 6, 10, 10, 10],
+            &[6, 2, 1, 1, 3, 3, 3, 1, 1, 1, 1, 1, 1, 2, 3, 5],
+        )),
+        slow: Some(fields(&[1, 1, 7, 7, 7], &[0; 5])),
+        gps: Some(fields(&[1, 0, 0, 1], &[10, 7, 7, 0])),
+        home: Some(fields(&[0, 0], &[0, 0])),
+        iteration: 0,
+        time: 1,
+        first_motor: Some(4),
+        least_throttle: 1070,
+        least_motor: 158,
+        voltage: 1650,
+        interval: 8,
+        logged: (1, 2),
+    }
+}
+
+pub(crate) fn blackbox(bytes: &[u8]) -> bool {
+    let layout = blackbox_layout();
+    let frames = blackbox::read(bytes, &layout, usize::MAX).unwrap();
+    let tables = [
+        (&frames.main, 16),
+        (&frames.slow, layout.slow.as_ref().unwrap().count()),
+        (&frames.gps, layout.gps.as_ref().unwrap().count()),
+    ];
+    let mut held = 0;
+    for (table, fields) in tables {
+        assert_eq!(table.values.len(), table.rows * fields);
+        held += table.values.len() + table.rows;
+    }
+    assert_eq!(frames.slow.before.len(), frames.slow.rows);
+    assert!(frames.gps.before.is_sorted() && frames.slow.before.is_sorted());
+    // A frame has its letter and a byte at least.
+    let rows = frames.main.rows + frames.slow.rows + frames.gps.rows;
+    assert!(2 * rows <= bytes.len() && frames.damaged as usize <= bytes.len());
+    assert!(blackbox::read(bytes, &layout, held).is_ok());
+    assert!(held == 0 || blackbox::read(bytes, &layout, held - 1).is_err());
+    frames.main.rows > 0
 }

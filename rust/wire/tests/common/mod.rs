@@ -217,3 +217,45 @@ pub(crate) fn loop_corpus() -> Vec<Vec<u8>> {
         .map(|packet| loop_packet::write(packet).unwrap())
         .collect()
 }
+
+/// Frames of Blackbox logs, with the layout of [`checks::blackbox_layout`].
+pub(crate) fn blackbox_corpus() -> Vec<Vec<u8>> {
+    let intra = |iteration: u8, time: u8| {
+        let mut frame = vec![b'I', iteration, time, 3, 5, 40, 7, 8, 1, 2];
+        // Four values of 0, 4, 8 and 16 bits; three of 5, 5 and 4.
+        frame.extend([0b11_10_01_00, 0x78, 0x07, 0xff, 0xf0, 0b0110_0000, 0xf8]);
+        frame
+    };
+    let inter = [
+        b'P',
+        4,
+        0b01,
+        0x70,
+        0b0100_0111,
+        0x8f,
+        0b0101,
+        2,
+        3,
+        0b00_01_10_11,
+    ];
+    let slow = [b'S', 3, 8, 0b00_00_01_01];
+    let (home, gps) = ([b'H', 20, 21], [b'G', 9, 2, 3, 11]);
+    let end = b"E\xffEnd of log\0";
+    let short = [&intra(0, 10)[..], &slow, &inter, end].concat();
+    let mut long = intra(0, 10);
+    for number in 1..16u8 {
+        long.extend(slow);
+        if number % 4 == 0 {
+            long.extend(intra(8 * (number / 4), 10 + 2 * number));
+            long.extend(home);
+            long.extend(gps);
+        } else {
+            long.extend(inter);
+        }
+        long.extend([b'E', 30, number, 1]);
+    }
+    long.extend([b'E', 14, 90, 100]);
+    long.extend(intra(96, 101));
+    long.extend(end);
+    vec![short, long]
+}

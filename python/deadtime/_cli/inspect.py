@@ -1,0 +1,97 @@
+"""``deadtime inspect``: what the log of an autopilot holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from deadtime._cli import options as opt
+from deadtime._cli.show import print_json, print_points, print_table, print_text, results_table
+from deadtime.recordings import Log, LogLoop, open_log
+
+
+def command(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD.",
+            show_default=False,
+        ),
+    ],
+    loop: Annotated[
+        str | None,
+        typer.Option(
+            help="Tell about this loop only, for example 'roll rate'.", show_default=False
+        ),
+    ] = None,
+    as_json: opt.As_json = False,
+) -> None:
+    """Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains."""
+    found = open_log(log)
+    if loop is not None:
+        one = found.loop(loop)
+        if as_json:
+            print_json(one.to_dict())
+        else:
+            _print_loop(one)
+    elif as_json:
+        print_json(found.to_dict())
+    else:
+        _print_log(found)
+
+
+def _print_log(log: Log) -> None:
+    """The log, its loops as a table, and the reasons why some time of them is left out."""
+    vehicle = " ".join(part for part in (log.autopilot, log.vehicle) if part) or "unknown vehicle"
+    print_text(f"{log.source}: {log.format} of {vehicle}, {log.duration:.2f} s", "bold")
+    if log.firmware:
+        print_text(f"firmware: {log.firmware}")
+    if log.modes:
+        spans = ", ".join(f"{name} from {at:.2f} s" for at, name in log.modes)
+        print_text(f"modes: {spans}")
+    if log.loops:
+        heads = ("loop", "setpoint", "response", "unit", "Hz", "followed, s", "actuator")
+        left = ("loop", "setpoint", "response", "unit", "actuator")
+        print_table(results_table(heads, map(_row, log.loops.values()), left=left))
+        print_points(_reasons(log))
+    else:
+        print_text("no loop: setpoint and response of none are in the log", "yellow")
+    if log.key_parameters:
+        shown = ", ".join(f"{name} {value:g}" for name, value in log.key_parameters.items())
+        print_text(f"parameters: {shown}")
+    for remark in log.remarks:
+        print_text(remark, "yellow")
+
+
+def _row(loop: LogLoop) -> tuple[str, ...]:
+    return (
+        loop.name,
+        loop.setpoint.source,
+        loop.response.source,
+        loop.response.unit,
+        f"{loop.setpoint.rate:.4g}, {loop.response.rate:.4g}",
+        f"{loop.followed:.2f}" if loop.segments else "never",
+        "" if loop.actuator is None else loop.actuator.source,
+    )
+
+
+def _reasons(log: Log) -> list[str]:
+    """Each reason once, with the loops of which it leaves time out."""
+    names: dict[str, list[str]] = {}
+    for loop in log.loops.values():
+        for sentence in loop.why_left_out:
+            names.setdefault(sentence.partition(": ")[2] or sentence, []).append(loop.name)
+    return [
+        f"left out where {reason}: "
+        + ("all loops" if len(found) == len(log.loops) else ", ".join(found))
+        for reason, found in names.items()
+    ]
+
+
+def _print_loop(loop: LogLoop) -> None:
+    headline, *details = loop.summary().splitlines()
+    print_text(headline, "bold")
+    for line in details:
+        print_text(line)

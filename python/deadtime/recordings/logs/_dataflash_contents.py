@@ -1,0 +1,81 @@
+"""What the messages of a DataFlash log tell: vehicle, parameters, modes and events."""
+
+from __future__ import annotations
+
+import re
+from collections import ChainMap
+
+import numpy as np
+
+from deadtime.recordings.logs._ardupilot_modes import COPTER, PLANE, ROVER
+from deadtime.recordings.logs._contents import LogContents, Topic
+from deadtime.recordings.logs._dataflash_messages import Messages
+
+#: Numbers of events.
+ARMED, DISARMED, LANDED, FLYING = 10, 11, 18, 28
+
+#: The message that names vehicle and version.
+FIRMWARE = re.compile(r"(?:APM:|Ardu)?(?P<vehicle>Copter|Plane|Rover|Sub|Blimp\w*) V\S+.*")
+
+MODES = {"Copter": COPTER, "Plane": PLANE, "Rover": ROVER}
+
+
+def contents_of(form: str, messages: Messages, remarks: tuple[str, ...]) -> LogContents:
+    """The log's contents."""
+    texts = messages.texts("MSG", "Message")
+    firmware = next(filter(None, map(FIRMWARE.fullmatch, texts)), None)
+    vehicle = firmware["vehicle"] if firmware else ""
+    frame = next((text[6:].strip() for text in texts if text.startswith("Frame:")), "")
+    return LogContents(
+        format=form,
+        autopilot="ArduPilot",
+        vehicle=f"{vehicle} ({frame})" if vehicle and frame else vehicle or frame,
+        firmware=firmware[0] if firmware else "",
+        topics=ChainMap(_events(messages), messages),  # type: ignore[arg-type]
+        parameters=_parameters(messages),
+        modes=_modes(messages, vehicle),
+        remarks=remarks,
+    )
+
+
+def _parameters(messages: Messages) -> dict[str, float]:
+    topic = messages.get("PARM")
+    if topic is None or "Value" not in topic.columns:
+        return {}
+    pairs = zip(messages.texts("PARM", "Name"), topic.columns["Value"].tolist(), strict=False)
+    return {name: value for name, value in pairs if name}
+
+
+def _modes(messages: Messages, vehicle: str) -> tuple[tuple[float, str], ...]:
+    """The flight modes by their names."""
+    topic = messages.get("MODE")
+    if topic is None:
+        return ()
+    column = next((one for one in ("ModeNum", "Mode") if one in topic.columns), "")
+    numbers = messages.texts("MODE", column)
+    names = {str(number): name for number, name in MODES.get(vehicle, {}).items()}
+    found: list[tuple[float, str]] = []
+    for at, number in zip(topic.time.tolist(), numbers, strict=False):
+        # Text logs may hold the name in place of the number.
+        name = names.get(number, f"mode {number}" if number.isdigit() else number.upper())
+        if np.isfinite(at) and (not found or found[-1][1] != name):
+            found.append((at, name))
+    return tuple(found)
+
+
+def _events(messages: Messages) -> dict[str, Topic]:
+    """Topics "armed" and "landed" from the numbered events, if there are such events."""
+    topic = messages.get("EV")
+    if topic is None or "Id" not in topic.columns:
+        return {}
+    number = topic.columns["Id"]
+    found = {}
+    for name, on, off in (("armed", ARMED, DISARMED), ("landed", LANDED, FLYING)):
+        rows = ((number == on) | (number == off)) & np.isfinite(topic.time)
+        if rows.any():
+            state = (number[rows] == on).astype(float)
+            time = topic.time[rows]
+            # Before the first event the state was the other one.
+            time = np.concatenate(([np.nextafter(time[0], -np.inf)], time))
+            found[name] = Topic(time, {"state": np.concatenate(([1.0 - state[0]], state))})
+    return found

@@ -1,0 +1,118 @@
+"""Loops in logs of Betaflight, INAV and a Crazyflie, opened by their first bytes."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from blackbox_logs import END, SIGNED, UNSIGNED, Log, rate_log, rate_rows
+from crazyflie_logs import definitions, record, sealed
+from flights import flight_path
+
+DEGREE = np.pi / 180.0
+STATES = [
+    ("flightModeFlags", 0, (0, UNSIGNED)),
+    *((name, 0, (0, UNSIGNED)) for name in ("stateFlags", "failsafePhase")),
+]
+
+
+def opened(tmp_path, data):
+    path = tmp_path / "log"
+    path.write_bytes(data)
+    return dtm.open_log(path)
+
+
+def test_rates_of_betaflight(tmp_path):
+    log = rate_log()
+    rows = rate_rows(400, np.random.default_rng(0))
+    frames = [log.main(rows[0]), log.slow_frame([1, 0, 0, 1, 1]), *map(log.main, rows[1:300])]
+    frames += [log.slow_frame([0, 0, 0, 1, 1]), *map(log.main, rows[300:])]
+    found = opened(tmp_path, log.head() + b"".join(frames) + END)
+    assert list(found.loops) == ["roll rate", "pitch rate", "yaw rate"]
+    roll, yaw = found.loops["roll rate"], found.loops["yaw rate"]
+    truth = {name: np.array(rows, dtype=float)[:, k] for k, name in enumerate(log.names)}
+    np.testing.assert_allclose(roll.setpoint.values, DEGREE * truth["setpoint[0]"], rtol=1e-14)
+    np.testing.assert_allclose(yaw.response.values, DEGREE * truth["gyroADC[2]"], rtol=1e-14)
+    assert roll.setpoint.unit == "rad/s"
+    # Yaw has no D term.
+    total = sum(truth[f"axis{term}[0]"] for term in "PIDF")
+    np.testing.assert_array_equal(roll.actuator.values, total)
+    total = sum(truth[f"axis{term}[2]"] for term in "PIF")
+    np.testing.assert_array_equal(yaw.actuator.values, total)
+    # It is followed until the vehicle is disarmed.
+    (segment,) = roll.segments
+    start = rows[0][1] * 1e-6
+    assert segment[1] == pytest.approx(rows[300][1] * 1e-6 - start, abs=3e-4)
+
+
+def inav_log(flags):
+    names = [f"{name}[{k}]" for name in ("axisRate", "gyroADC") for k in range(3)]
+    names += [f"nav{name}[{k}]" for name in ("TgtVel", "Vel", "TgtPos", "Pos") for k in range(3)]
+    log = Log(
+        fields=[(name, 1, (0, SIGNED), (1, SIGNED)) for name in names],
+        revision="INAV 7.1.2 (a1b2c3d) MATEKF405",
+        slow=STATES,
+    )
+    random = np.random.default_rng(0)
+    rows = [[k, 1_000_000 + 2000 * k, *map(int, random.integers(-90, 90, 18))] for k in range(200)]
+    frames = [log.main(rows[0]), log.slow_frame([flags, 0, 0]), *map(log.main, rows[1:])]
+    return log, rows, log.head() + b"".join(frames) + END
+
+
+def test_rates_velocities_and_positions_of_inav(tmp_path):
+    log, rows, data = inav_log(1 | 1 << 9)
+    found = opened(tmp_path, data)
+    assert list(found.loops)[:4] == ["roll rate", "pitch rate", "yaw rate", "north velocity"]
+    assert len(found.loops) == 9
+    climb = found.loops["vertical speed"]
+    truth = np.array(rows, dtype=float)[:, log.names.index("navVel[2]")]
+    np.testing.assert_allclose(climb.response.values, 0.01 * truth, rtol=1e-14)
+    assert climb.response.unit == "m/s"
+    assert all(loop.segments for loop in found.loops.values())
+
+
+@pytest.mark.parametrize(
+    ("bits", "followed"),
+    [
+        (1 << 3, {"roll rate", "vertical speed", "altitude"}),
+        (1 << 1, {"roll rate"}),
+        (1 << 10, set()),
+    ],
+    ids=["altitude hold", "angle", "manual"],
+)
+def test_loops_that_the_mode_of_inav_closes(tmp_path, bits, followed):
+    _, _, data = inav_log(1 | bits)
+    loops = opened(tmp_path, data).loops
+    asked = {"roll rate", "vertical speed", "altitude", "east velocity", "north position"}
+    assert {name for name in asked if loops[name].segments} == followed
+
+
+def test_loops_of_a_crazyflie(tmp_path):
+    names = ["controller.pitchRate", "gyro.y", "controller.yaw", "stabilizer.yaw"]
+    names += ["posCtl.targetZ", "stateEstimateZ.z", "stabilizer.thrust"]
+    letters = "ffffhhf"
+    events = {1: ("fixedFrequency", list(zip(names, letters, strict=True)))}
+    random = np.random.default_rng(0)
+    rows = [[*random.normal(0, 20, 2), 175 + k % 10, k % 10 - 180, 1, 950 + k % 9, 4e4]
+            for k in range(300)]  # fmt: skip
+    frames = (record(events, 1, 1_000_000 + 2000 * k, row) for k, row in enumerate(rows))
+    found = opened(tmp_path, sealed(definitions(events) + b"".join(frames)))
+    assert list(found.loops) == ["pitch rate", "yaw", "altitude"]
+    truth = np.float32(rows).astype(float)
+    pitch = found.loops["pitch rate"]
+    # The controller counts pitch against the y axis of the gyroscope.
+    np.testing.assert_allclose(pitch.response.values, -DEGREE * truth[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(pitch.setpoint.values, DEGREE * truth[:, 0], rtol=1e-12)
+    height = found.loops["altitude"]
+    np.testing.assert_allclose(height.response.values, 1e-3 * truth[:, 5], rtol=1e-12)
+    assert all(loop.segments for loop in found.loops.values())
+
+
+def test_a_real_log_of_betaflight_has_its_rate_loops():
+    found = dtm.open_log(flight_path("betaflight_error_recovery.bbl"))
+    assert list(found.loops) == ["roll rate", "pitch rate", "yaw rate"]
+    assert "Betaflight" in found.summary()
+
+
+def test_a_real_log_of_motors_and_gyroscope_has_no_loop():
+    found = dtm.open_log(flight_path("crazyflie_log10.cfusd"))
+    assert not found.loops
+    assert found.summary().startswith("crazyflie_log10.cfusd: Crazyflie uSD, 50.01 s, Crazyflie")
