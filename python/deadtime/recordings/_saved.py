@@ -27,7 +27,7 @@ from deadtime._base.extras import library
 from deadtime.recordings.readers._arrow import INSTALLS, arrow_file, parquet_metadata
 from deadtime.recordings.readers._columns import read_table
 from deadtime.recordings.readers._csv import read_csv
-from deadtime.recordings.readers._first_bytes import HEAD, opened, table_format
+from deadtime.recordings.readers._first_bytes import HEAD, opened, table_format, whole
 from deadtime.recordings.readers._text import as_text
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -69,7 +69,7 @@ def load_table(path: str | os.PathLike[str]) -> dict[str, Any]:
             described = parquet_metadata(path).get(b"deadtime", b"")
             table = arrow_file(path, "Parquet", set(NAMES))
             return _described(path, described) | read_table(table, _signals(table.names), EVER)
-        text = as_text(path, head + stream.read(), NAMES, ",")
+        text = as_text(path, whole(stream, head), NAMES, ",")
     described = text.comments[1][1:].encode() if text.comments[:1] == (TITLE,) else b""
     return _described(path, described) | read_csv(text, _signals(text.header), EVER)
 

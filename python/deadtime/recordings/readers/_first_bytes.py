@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from typing import BinaryIO, Literal
+from io import FileIO
+from typing import Literal
 
 from deadtime._base.errors import RecordingError
 
@@ -58,16 +59,25 @@ OTHERS = {
 TLOG_TIMES = range(946_684_800_000_000, 4_102_444_800_000_000)
 
 
-def opened(path: str | os.PathLike[str]) -> BinaryIO:
+def opened(path: str | os.PathLike[str]) -> FileIO:
     """Open a file for its bytes, or say why it cannot be."""
     try:
-        return open(path, "rb")
+        return open(path, "rb", buffering=0)
     except FileNotFoundError:
         raise RecordingError(f"there is no file {path}") from None
     except IsADirectoryError:
         raise RecordingError(f"{path} is a folder: give a file") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def whole(stream: FileIO, head: bytes) -> bytes:
+    """All bytes of a file from which `head` was read."""
+    if stream.seekable():  # a long file is not copied to put its head before it
+        stream.seek(0)
+        head = b""
+    rest = stream.readall()
+    return head + rest if head else rest
 
 
 def table_format(path: object, head: bytes) -> Format:

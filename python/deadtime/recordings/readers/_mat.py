@@ -37,8 +37,8 @@ def mat_file(path: str | os.PathLike[str], wanted: set[str]) -> Table:
         first = {re.split(r"[.\[]", name)[0] for name in wanted}
         loaded = loadmat(path, variable_names=[*first] if first <= variables.keys() else None)
         columns: dict[str, NDArray[Any]] = {}
-        for name in variables.keys() & loaded.keys():
-            for address, column in _columns(name, loaded[name]):
+        for name in variables:
+            for address, column in _columns(name, loaded.get(name)):
                 columns[address] = column
                 check_addresses(path, len(columns))
         label = with_objects(path, not {"opaque", "object"}.isdisjoint(variables.values()))

@@ -12,7 +12,7 @@ from deadtime.recordings._recording import Recording
 from deadtime.recordings.readers._arrow import arrow_file
 from deadtime.recordings.readers._columns import Signals, read_table, widened
 from deadtime.recordings.readers._csv import read_csv
-from deadtime.recordings.readers._first_bytes import HEAD, opened, table_format
+from deadtime.recordings.readers._first_bytes import HEAD, opened, table_format, whole
 from deadtime.recordings.readers._mat import mat_file
 from deadtime.recordings.readers._mat73 import mat73_file
 from deadtime.recordings.readers._tables import LABEL, table_in_memory
@@ -130,7 +130,7 @@ def _from_file(path: Path, names: dict[str, str], ends: Range, delimiter: str | 
         head = stream.read(HEAD)
         kind = table_format(path, head)
         if kind in ("text", "gzip"):
-            return read_csv(as_text(path, head + stream.read(), wanted, delimiter), names, ends)
+            return read_csv(as_text(path, whole(stream, head), wanted, delimiter), names, ends)
     if delimiter is not None:
         raise ValueError(f"delimiter={delimiter!r}: {path} is a file of {kind}, which has none")
     if kind == "MAT v5":

@@ -35,21 +35,32 @@ class Text:
         Names of the columns.
     delimiter : str
         Separator of the columns; a space stands for any number of them.
-    body : bytes
-        The lines below the header.
+    raw : bytes
+        The text; every character that counts is one byte.
+    start : int
+        Where in it the lines below the header begin.
     encoding : str
-        Of the body; every character that counts is one byte.
+        Of the text.
     line : int
-        Number of the first line of the body, from 1.
+        Number of the first line below the header, from 1.
     """
 
     path: object
     comments: tuple[str, ...]
     header: list[str]
     delimiter: str
-    body: bytes
+    raw: bytes
+    start: int
     encoding: str
     line: int
+
+    def __contains__(self, sign: bytes) -> bool:
+        return self.raw.find(sign, self.start) >= 0
+
+    @property
+    def body(self) -> bytes:
+        """The lines below the header."""
+        return self.raw[self.start :]
 
 
 def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | None) -> Text:
@@ -69,9 +80,7 @@ def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | 
             if _CONTROL.search(line):
                 raise not_text(path)
             header, delimiter = _header(path, line, wanted, delimiter)
-            return Text(
-                path, tuple(comments), header, delimiter, text[start:], encoding, number + 1
-            )
+            return Text(path, tuple(comments), header, delimiter, text, start, encoding, number + 1)
     raise RecordingError(f"{path} is empty: a header line and samples are needed")
 
 
