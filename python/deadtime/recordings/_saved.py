@@ -70,7 +70,8 @@ def load_table(path: str | os.PathLike[str]) -> dict[str, Any]:
             table = arrow_file(path, "Parquet", set(NAMES))
             return _described(path, described) | read_table(table, _signals(table.names), EVER)
         text = as_text(path, whole(stream, head), NAMES, ",")
-    described = text.comments[1][1:].encode() if text.comments[:1] == (TITLE,) else b""
+    title, comment, *_ = (*text.comments, "", "")
+    described = comment[1:].encode() if title == TITLE else b""
     return _described(path, described) | read_csv(text, _signals(text.header), EVER)
 
 

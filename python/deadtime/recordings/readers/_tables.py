@@ -57,7 +57,7 @@ def _named(label: str, source: Any, names: Any, values: Any) -> Table:
 def _values(column: Any) -> Any:
     """Values of a column, masked where they are missing; NaN is a value where both can be."""
     if not hasattr(column, "isna"):  # polars and pyarrow
-        values, missing = column.to_numpy(), column.is_null().to_numpy()
+        values, missing = np.asarray(column), np.asarray(column.is_null())
     elif isinstance(column.dtype, np.dtype):
         return column.to_numpy()
     else:
