@@ -1,78 +1,150 @@
-"""MAT files of version 5, read by scipy, and their addresses, which version 7.3 has as well.
+"""MAT files of version 5: our own reader of their arrays of numbers and of their structures.
 
-``t`` is a vector, ``rates[1]`` the second signal of a matrix; the longer axis of a matrix is time.
-``log.signals.values`` is a field of a structure, ``log.signals[1].values`` that of its second
-element.
+On damaged files `scipy.io.loadmat` ends the whole process. A file is a header of 128 bytes and
+elements: type and size in 4 bytes each, then the data, filled up to a multiple of 8 bytes. At most
+4 bytes of data may stand in the place of the size instead. An array is an element that consists of
+elements: flags, dimensions, name, and numbers, or the fields of a structure, which are arrays.
 """
 
 from __future__ import annotations
 
 import os
-import re
-import warnings
+import struct
+import zlib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.errors import RecordingError
 from deadtime.recordings.readers._columns import Table
-from deadtime.recordings.readers._limits import errors_of
+from deadtime.recordings.readers._limits import errors_of, largest
+from deadtime.recordings.readers._mat_addresses import (
+    DEPTH,
+    check_columns,
+    signal_names,
+    signals,
+    with_objects,
+)
 
-#: Largest number of addresses that a file may have.
-ADDRESSES = 100_000
+HEADER = 128
 
-#: Deepest nesting of structures.
-DEPTH = 16
+#: Types of elements, besides those of numbers.
+ARRAY, PACKED = 14, 15
+NUMBERS = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
+
+#: Classes of arrays: structures, numbers from double to unsigned 64-bit, and objects of MATLAB.
+STRUCTURE, NUMERIC, OBJECTS = 2, range(6, 16), (3, 17)
+COMPLEX = 0x800
+
+Element = tuple[int, memoryview]
 
 
 def mat_file(path: str | os.PathLike[str], wanted: set[str]) -> Table:
-    """The table of a file, of which only the variables of `wanted` addresses are loaded."""
-    from scipy.io import loadmat, whosmat
-
-    with errors_of(path, "MAT v5"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of variables that are not wanted
-        variables = {name: kind for name, _, kind in whosmat(path)}
-        first = {re.split(r"[.\[]", name)[0] for name in wanted}
-        loaded = loadmat(path, variable_names=[*first] if first <= variables.keys() else None)
-        columns: dict[str, NDArray[Any]] = {}
-        for name in variables:
-            for address, column in _columns(name, loaded.get(name)):
-                columns[address] = column
-                check_addresses(path, len(columns))
-        label = with_objects(path, not {"opaque", "object"}.isdisjoint(variables.values()))
-    return Table(label, [*columns], columns.__getitem__)
-
-
-def _columns(name: str, value: Any, depth: int = 0) -> Iterator[tuple[str, NDArray[Any]]]:
-    """The columns in a variable, each with its address."""
-    if not isinstance(value, np.ndarray) or depth > DEPTH:
-        return
-    if value.dtype.names:
-        for i, one in enumerate(value.ravel(order="F")):
-            element = f"{name}[{i}]" if value.size > 1 else name
-            for field in value.dtype.names:
-                yield from _columns(f"{element}.{field}", one[field], depth + 1)
-    elif value.dtype.kind in "biufc":
-        yield from signals_of(name, np.squeeze(value))
+    """The table of a file, of which only the columns with `wanted` addresses are kept."""
+    columns: dict[str, NDArray[Any]] = {}
+    with errors_of(path, "MAT v5"):
+        raw = Path(path).read_bytes()
+        reader = _Reader(">" if raw[126:HEADER] == b"MI" else "<")
+        for kind, data in reader.elements(memoryview(raw)[HEADER:]):
+            if kind == PACKED:
+                kind, data = _next(reader.elements(_unpacked(data, largest(len(raw)))))
+            if kind == ARRAY:
+                for address, column in reader.columns(data, ""):
+                    # The columns that are not wanted are listed only.
+                    columns[address] = column if address in wanted else column[:0]
+                    check_columns(path, len(columns))
+    return Table(with_objects(path, reader.objects), [*columns], columns.__getitem__)
 
 
-def signals_of(name: str, matrix: Any) -> Iterator[tuple[str, Any]]:
-    """The signals of a matrix, or the vector itself."""
-    if matrix.ndim == 1:
-        yield name, matrix
-    elif matrix.ndim == 2:
-        signals = matrix if matrix.shape[0] < matrix.shape[1] else matrix.T
-        yield from ((f"{name}[{i}]", signal) for i, signal in enumerate(signals))
+def _unpacked(data: memoryview, limit: int) -> memoryview:
+    unpacking = zlib.decompressobj()
+    content = unpacking.decompress(data, limit)
+    if not unpacking.eof:
+        raise ValueError(f"a variable is cut off, or unpacks to more than {limit} bytes")
+    return memoryview(content)
 
 
-def check_addresses(path: object, count: int) -> None:
-    """Refuse a file with too many columns."""
-    if count > ADDRESSES:
-        raise RecordingError(f"{path} has more than {ADDRESSES} columns: save the ones you need")
+def _next(elements: Iterator[Element]) -> Element:
+    found = next(elements, None)
+    if found is None:
+        raise ValueError("a variable is cut off")
+    return found
 
 
-def with_objects(path: object, has_objects: bool) -> str:
-    """What messages call a file, with a remark if it has objects."""
-    return f"{path} (timeseries and other objects in it are left out)" if has_objects else str(path)
+class _Reader:
+    """Elements and arrays in one order of bytes."""
+
+    def __init__(self, order: str) -> None:
+        self.order = order
+        self.objects = False
+
+    def elements(self, data: memoryview) -> Iterator[Element]:
+        """The elements that follow one another, each with its type."""
+        at = 0
+        while at + 8 <= len(data):
+            kind, size = struct.unpack_from(f"{self.order}II", data, at)
+            if kind >> 16:  # a short one, with its data in the place of the size
+                kind, size, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+            else:
+                start = at + 8
+                after = start + size + (0 if kind == PACKED else -size % 8)
+            if start + size > min(after, len(data)):
+                raise ValueError(f"an element of {size} bytes ends after its variable or the file")
+            yield kind, data[start : start + size]
+            at = after
+
+    def numbers(self, element: Element) -> NDArray[Any]:
+        kind, data = element
+        if kind not in NUMBERS:
+            raise ValueError(f"numbers have the type {kind}, which there is not")
+        return np.frombuffer(data, f"{self.order}{NUMBERS[kind]}")
+
+    def columns(
+        self, data: memoryview, address: str, depth: int = 0
+    ) -> Iterator[tuple[str, NDArray[Any]]]:
+        """The columns of an array, each with its address; a variable has its name for address."""
+        if not data.nbytes:
+            return  # an empty field
+        parts = self.elements(data)
+        flags = int(self.numbers(_next(parts))[0])
+        kind = flags & 0xFF
+        self.objects = self.objects or kind in OBJECTS
+        if kind not in NUMERIC and kind != STRUCTURE:
+            return
+        shape = tuple(self.numbers(_next(parts)).tolist())
+        if min(shape) < 0:
+            raise ValueError(f"an array has the shape {shape}")
+        name = bytes(_next(parts)[1]).decode("latin-1")
+        address = address or name
+        if kind == STRUCTURE:
+            yield from self.fields(parts, shape, address, depth)
+        elif address:  # MATLAB keeps the content of objects in an array without a name
+            array = self.numbers(_next(parts)).reshape(shape, order="F")
+            if flags & COMPLEX:
+                array = array.astype(complex)
+            yield from zip(signal_names(address, shape), signals(array), strict=False)
+
+    def fields(
+        self, parts: Iterator[Element], shape: tuple[int, ...], address: str, depth: int
+    ) -> Iterator[tuple[str, NDArray[Any]]]:
+        """The columns of a structure: field by field for each of its elements."""
+        if depth > DEPTH:
+            raise ValueError("structures are nested too deeply")
+        length = int(self.numbers(_next(parts))[0])
+        text = bytes(_next(parts)[1])
+        names = [
+            text[at : at + length].split(b"\0")[0].decode("latin-1")
+            for at in range(0, len(text), length)
+        ]
+        count = int(np.prod(shape, dtype=object))
+        for i in range(count if names else 0):
+            element = f"{address}[{i}]" if count > 1 else address
+            for name in names:
+                kind, data = _next(parts)
+                if kind != ARRAY:
+                    raise ValueError(f"a field has the type {kind}")
+                yield from self.columns(data, f"{element}.{name}", depth + 1)

@@ -10,16 +10,16 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.extras import library
 from deadtime.recordings.readers._columns import Table
 from deadtime.recordings.readers._limits import check_numbers, errors_of
-from deadtime.recordings.readers._mat import (
+from deadtime.recordings.readers._mat_addresses import (
     DEPTH,
-    check_addresses,
-    signals_of,
+    check_columns,
+    signal_names,
+    signals,
     with_objects,
 )
 
@@ -31,15 +31,12 @@ def mat73_file(path: str | os.PathLike[str], wanted: set[str]) -> Table:
     loaded: dict[str, NDArray[Any]] = {}
     with errors_of(path, "MAT v7.3"), h5py.File(path, "r") as file:
         for name, array in _arrays(h5py, file, file, ""):
-            sides = [side for side in array.shape if side != 1]
-            if len(sides) not in (1, 2):
-                continue
-            check_addresses(path, len(names) + min(sides))
-            own = [name] if len(sides) == 1 else [f"{name}[{i}]" for i in range(min(sides))]
+            own = signal_names(name, array.shape)
             names += own
+            check_columns(path, len(names))
             if not wanted.isdisjoint(own):
                 check_numbers(path, os.path.getsize(path), array.size)
-                loaded.update(signals_of(name, np.squeeze(array[()]).T))
+                loaded.update(zip(own, signals(array[()].T), strict=True))
         label = with_objects(path, "#subsystem#" in file)
     return Table(label, names, loaded.__getitem__)
 
@@ -59,7 +56,7 @@ def _arrays(h5py: Any, file: Any, node: Any, name: str, depth: int = 0) -> Itera
         if getattr(child, "dtype", None) == h5py.ref_dtype:
             if "MATLAB_class" in child.attrs or not name:
                 continue  # a cell array
-            check_addresses(file.filename, child.size)
+            check_columns(file.filename, child.size)
             for i, reference in enumerate(child[()].ravel()):
                 yield from _arrays(h5py, file, file[reference], f"{name}[{i}].{field}", depth + 1)
         else:
