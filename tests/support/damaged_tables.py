@@ -1,4 +1,4 @@
-"""Damaged files for the readers of tables: each is read, or refused by a RecordingError.
+"""Damaged files for the readers of tables: each is read, or refused by an error of the package.
 
     python tests/support/damaged_tables.py text --count 1000000 --seed 1
 
@@ -203,7 +203,7 @@ def main() -> None:
         try:
             (dtm.Recording.load if draw.random() < 0.1 else dtm.read_recording)(path)
             counts["read"] += 1
-        except dtm.RecordingError as error:
+        except (dtm.RecordingError, dtm.MissingExtraError) as error:
             if len(str(error).splitlines()) != 1:
                 raise ValueError(f"the error has several lines: {error}") from error
             counts["refused"] += 1
