@@ -1,6 +1,7 @@
 """Without an extra, functions that need it name the line that installs it; the others work."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -115,3 +116,35 @@ def test_commands_that_draw_ask_for_it_before_they_work(arguments, tmp_path):
     assert "pip install 'deadtime[plot]'" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("head", "library"),
+    [(b"PAR1", "pyarrow"), (b"ARROW1\0\0", "pyarrow"), (b"MATLAB 7.3 MAT-file", "h5py")],
+)
+def test_reading_without_a_library_says_which_line_installs_it(
+    head, library, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, library, None)
+    path = tmp_path / "flight.csv"
+    path.write_bytes(head + bytes(64))
+    with pytest.raises(dtm.MissingExtraError, match=r"pip install 'deadtime\[logs\]'") as raised:
+        dtm.read_recording(path)
+    assert library in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("task", "library", "installs"),
+    [
+        (lambda flight, folder: flight.save(folder / "a.parquet"), "pyarrow", "'deadtime[logs]'"),
+        (lambda flight, _: flight.to_dataframe(), "pandas", "pandas"),
+        (lambda flight, _: flight.to_xarray(), "xarray", "xarray"),
+    ],
+)
+def test_handing_on_without_a_library_says_which_line_installs_it(
+    task, library, installs, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, library, None)
+    flight = record_step()[0]
+    with pytest.raises(dtm.MissingExtraError, match=re.escape(f"pip install {installs}")):
+        task(flight, tmp_path)

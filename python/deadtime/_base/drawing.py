@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from deadtime._base.errors import MissingExtraError
+from deadtime._base.extras import library
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,13 +24,7 @@ COLOURS = ("#0b6fb8", "#d1481f", "#2f8f4e", "#8a4fbf")
 
 def check_matplotlib() -> None:
     """Refuse to draw where matplotlib is missing, with the line that installs it."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise MissingExtraError(
-            "drawing needs matplotlib, which is not installed; this line installs it: "
-            "pip install 'deadtime[plot]'"
-        ) from error
+    library("matplotlib", "drawing", "'deadtime[plot]'")
 
 
 def empty_figure(width: float, height: float) -> Figure:

@@ -45,8 +45,8 @@ def command(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="CSV files with a header line, of one vehicle. FILE@LOW:HIGH is a file with a "
-            "window of its own.",
+            help="Tables of one vehicle: CSV with a header line, Parquet, Arrow or MAT. "
+            "FILE@LOW:HIGH is a file with a window of its own.",
             show_default=False,
         ),
     ],

@@ -36,7 +36,12 @@ def _drawn_later(path: Path | None) -> Path | None:
 #: The ends of a range.
 Ends = tuple[float, float]
 
-File = Annotated[Path, typer.Argument(help="CSV file with a header line.", show_default=False)]
+File = Annotated[
+    Path,
+    typer.Argument(
+        help="Table: CSV with a header line, Parquet, Arrow or MAT.", show_default=False
+    ),
+]
 Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
 Reference = Annotated[str, typer.Option(help="Column of the reference.")]
 Output = Annotated[str, typer.Option(help="Column of the measured output.")]

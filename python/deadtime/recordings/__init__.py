@@ -2,10 +2,10 @@
 
 from deadtime.recordings._check import RecordingCheck
 from deadtime.recordings._check_rows import Hole
-from deadtime.recordings._csv import read_recording
 from deadtime.recordings._findings import Finding
 from deadtime.recordings._recording import Recording, Step
 from deadtime.recordings.logs import Log, LogLoop, Series, open_log
+from deadtime.recordings.readers._read import read_recording
 
 __all__ = [
     "Finding",

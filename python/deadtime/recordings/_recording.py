@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -239,6 +240,83 @@ class Recording(ReadOnlyArrays):
             )
             for row in changed
         ]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the recording to a file from which `load` makes the same one, bit for bit.
+
+        Parameters
+        ----------
+        path : path-like
+            Ends in ``.csv`` or ``.parquet``. A CSV file begins with the comment
+            ``# deadtime recording`` and one with source and units in JSON; then come a header and
+            the rows. A Parquet file has this JSON in its metadata under ``deadtime``. Both have
+            the columns ``time``, ``reference``, ``output`` and, if there is one, ``command``.
+
+        Raises
+        ------
+        ValueError
+            When the path has another ending.
+        MissingExtraError
+            When the path ends in ``.parquet`` and pyarrow is not installed.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> t = np.arange(20) * 0.1
+        >>> recording = dtm.Recording(t, t > 0.5, np.zeros(20), units={"output": "m"})
+        >>> file = pathlib.Path(tempfile.mkdtemp()) / "run.csv"
+        >>> recording.save(file)
+        >>> dtm.Recording.load(file) == recording
+        True
+        """
+        from deadtime.recordings._saved import save_table
+
+        save_table(path, self._columns(), self.units, self.source)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Recording:
+        """Read a recording that `save` has written.
+
+        Raises
+        ------
+        RecordingError
+            When the file cannot be read, or was not written by `save`.
+        MissingExtraError
+            When it is a Parquet file and pyarrow is not installed.
+        """
+        from deadtime.recordings._saved import load_table
+
+        return cls(**load_table(path))
+
+    def to_dataframe(self) -> Any:
+        """Return the columns as a `pandas.DataFrame`, with source and units in its ``attrs``.
+
+        Raises
+        ------
+        MissingExtraError
+            When pandas is not installed.
+        """
+        from deadtime.recordings._saved import as_frame
+
+        return as_frame(self._columns(), self.units, self.source)
+
+    def to_xarray(self) -> Any:
+        """Return the columns as an `xarray.Dataset` over time, with source and units as attributes.
+
+        Raises
+        ------
+        MissingExtraError
+            When xarray is not installed.
+        """
+        from deadtime.recordings._saved import as_dataset
+
+        return as_dataset(self._columns(), self.units, self.source)
+
+    def _columns(self) -> dict[str, NDArray[np.float64]]:
+        columns = {"time": self.time, "reference": self.reference, "output": self.output}
+        return columns if self.command is None else columns | {"command": self.command}
 
 
 def _unmasked_rows(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.extras import library
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, Report, reported
@@ -246,13 +246,10 @@ class StabilityMap(ReadOnlyArrays):
 
         Raises
         ------
-        ImportError
+        MissingExtraError
             If xarray is not installed.
         """
-        try:
-            xarray = importlib.import_module("xarray")
-        except ImportError as error:
-            raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+        xarray = library("xarray", "to_xarray()", "xarray")
         arrays = {
             name: getattr(self, name) for name in ("unstable", "abscissa", "status", "stable")
         }

@@ -1,0 +1,41 @@
+"""Limits on the memory of a reader, and the errors of the libraries that read for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from deadtime._base.errors import DeadtimeError, RecordingError
+
+#: Largest size of what a file unpacks to, bytes: this much, and so many times the size of the file.
+#: Columns that hold still are packed a hundredfold; a file that promises more is damaged.
+UNPACKED, FACTOR = 50_000_000, 100
+
+
+def largest(size: int) -> int:
+    """How many bytes a file of `size` bytes may hold unpacked."""
+    return UNPACKED + FACTOR * size
+
+
+def check_numbers(path: object, size: int, count: int) -> None:
+    """Refuse a file that says it holds more numbers than its size allows."""
+    if 8 * count > largest(size):
+        raise RecordingError(
+            f"{path} has {size} bytes and says it holds {count} numbers: it is damaged, or packed "
+            "more than a hundredfold"
+        )
+
+
+@contextmanager
+def errors_of(path: object, what: str) -> Iterator[None]:
+    """Whatever a library raises on a file is one error, on one line."""
+    try:
+        yield
+    except DeadtimeError:
+        raise
+    except Exception as error:
+        told = " ".join(str(error).split())[:200] or "no reason is told"
+        raise RecordingError(
+            f"{path} cannot be read as {what}, it may be damaged or cut off: "
+            f"{type(error).__name__}: {told}"
+        ) from error

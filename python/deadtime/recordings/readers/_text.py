@@ -1,0 +1,162 @@
+"""The text of a CSV file: unpacked, in one encoding, with its header and its separator."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from deadtime._base.errors import RecordingError
+from deadtime.recordings.readers._columns import column_index
+from deadtime.recordings.readers._first_bytes import HEAD, table_format
+from deadtime.recordings.readers._limits import largest
+
+#: Separators, the likelier ones first.
+DELIMITERS = (",", ";", "\t", " ")
+
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+
+
+@dataclass(frozen=True)
+class Text:
+    """A table in text.
+
+    Attributes
+    ----------
+    path : object
+        The file, for messages.
+    comments : tuple of str
+        The lines before the header that begin with ``#``.
+    header : list of str
+        Names of the columns.
+    delimiter : str
+        Separator of the columns; a space stands for any number of them.
+    raw : bytes
+        The text; every character that counts is one byte.
+    start : int
+        Where in it the lines below the header begin.
+    encoding : str
+        Of the text.
+    line : int
+        Number of the first line below the header, from 1.
+    """
+
+    path: object
+    comments: tuple[str, ...]
+    header: list[str]
+    delimiter: str
+    raw: bytes
+    start: int
+    encoding: str
+    line: int
+
+    def __contains__(self, sign: bytes) -> bool:
+        return self.raw.find(sign, self.start) >= 0
+
+    @property
+    def body(self) -> bytes:
+        """The lines below the header."""
+        return self.raw[self.start :]
+
+
+def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | None) -> Text:
+    """Find the header of a file, and the separator under which it holds the `wanted` names."""
+    if delimiter is not None and len(delimiter) != 1:
+        raise RecordingError(f"the delimiter {delimiter!r} is not one character")
+    text, encoding = _decodable(path, raw)
+    comments = []
+    start, number = 0, 0
+    while start < len(text):
+        stop = text.find(b"\n", start) + 1 or len(text)
+        line = text[start:stop].decode(encoding).strip(" \r\n\f\v")
+        start, number = stop, number + 1
+        if line.startswith("#"):
+            comments.append(line)
+        elif line.strip():
+            if _CONTROL.search(line):
+                raise not_text(path)
+            header, delimiter = _header(path, line, wanted, delimiter)
+            return Text(path, tuple(comments), header, delimiter, text, start, encoding, number + 1)
+    raise RecordingError(f"{path} is empty: a header line and samples are needed")
+
+
+def not_text(path: object) -> RecordingError:
+    """What is wrong with a file of no known format."""
+    return RecordingError(
+        f"{path} is not a text file, and of no other format that is read: give a CSV, Parquet, "
+        "Arrow or MAT file"
+    )
+
+
+def _decodable(path: object, raw: bytes) -> tuple[bytes, str]:
+    """The text in UTF-8 or Latin-1 without a mark, with lines that end in a line feed."""
+    if raw.startswith(b"\x1f\x8b"):
+        raw = _unpacked(path, raw)
+        if table_format(path, raw[:HEAD]) != "text":
+            raise RecordingError(f"{path} is packed by gzip and holds no text: unpack it")
+    encoding = "utf-8"
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        try:
+            raw = raw.decode("utf-16").encode()
+        except UnicodeError:
+            raise not_text(path) from None
+    elif not raw.isascii():
+        raw = raw.removeprefix(b"\xef\xbb\xbf")
+        try:
+            raw.decode()
+        except UnicodeDecodeError:
+            encoding = "latin-1"
+    if b"\0" in raw:
+        raise not_text(path)
+    if b"\r" in raw and b"\n" not in raw:
+        raw = raw.replace(b"\r", b"\n")
+    return raw, encoding
+
+
+def _unpacked(path: object, raw: bytes) -> bytes:
+    limit = largest(len(raw))
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
+            text = stream.read(limit + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise RecordingError(f"{path} cannot be unpacked, it is damaged: {error}") from None
+    if len(text) > limit:
+        raise RecordingError(
+            f"{path} has {len(raw)} bytes and unpacks to more than {limit}: unpack it yourself if "
+            "that is right"
+        )
+    return text
+
+
+def _header(
+    path: object, line: str, wanted: Collection[str], delimiter: str | None
+) -> tuple[list[str], str]:
+    """Names of the columns, and the separator: where none is given, one that finds most of them."""
+    headers, wrong = {}, None
+    for one in delimiter or DELIMITERS:
+        try:
+            headers[one] = cells(line, one)
+        except csv.Error as error:
+            wrong = error
+    if not headers:
+        raise RecordingError(f"{path} is not a CSV file: {wrong}")
+    best = max(headers, key=lambda one: (len({*wanted} & {*headers[one]}), len(headers[one]) > 1))
+    return headers[best], best
+
+
+def cells(line: str, delimiter: str) -> list[str]:
+    """The cells of one line, without the blanks round them."""
+    if delimiter == " ":
+        line = " ".join(line.split())
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=True))]
+
+
+def indices(text: Text, names: dict[str, str]) -> dict[str, int]:
+    """Index of the column for each signal."""
+    return {
+        signal: column_index(text.path, text.header, signal, name) for signal, name in names.items()
+    }
