@@ -55,6 +55,22 @@ def test_a_method_by_its_name(files, method, error):
     assert out["delay"] == pytest.approx(0.36, abs=error)
 
 
+def test_a_file_of_another_format_gives_the_same_estimate(files, tmp_path):
+    pytest.importorskip("pyarrow", reason="pyarrow reads Parquet files")
+    saved = tmp_path / "flight.parquet"
+    dtm.read_recording(files["quick"], command="command").save(saved)
+    options = ["--kp", 2, *FLOWN, *LOGGED, "--method", "auto"]
+    first, second = (found("estimate", file, *options) for file in (files["quick"], saved))
+    assert first["delay"] == second["delay"]
+
+
+def test_the_log_of_an_autopilot_is_refused_by_its_name(tmp_path):
+    log = tmp_path / "flight.csv"
+    log.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(100))
+    told = one_clear_line(run("estimate", log, "--kp", 2))
+    assert "is a ULog file of PX4" in told
+
+
 def test_every_method_is_named_in_the_help():
     told = run("estimate", "--help").stdout
     for name in ("all", "auto", *METHODS):

@@ -114,7 +114,7 @@ def test_the_separator_is_the_one_that_finds_the_names(passes, tmp_path):
         (("\n0.5,", "\n0.4,"), "line 7: the time repeats"),
         (("\n0.5,", "\n0.5\n"), "line 7: 1 cells, so the column 'ref_m' has none"),
         (("\n0.5,", '\n0.5,"'), "not a CSV file"),
-        (("\n0.5,0.0,", '\n0.5,"0,0",'), "line 7: '0,0' .* a decimal comma, and line 2 has the ot"),
+        (("\n0.5,0.0,", '\n0.5,"0,0",'), "line 7: '0,0' .* a decimal comma, and line 2 has "),
         (("\n0.5,0.0,", '\n0.5,"1,000,000",'), "line 7: '1,000,000' .* no comma"),
     ],
 )  # fmt: skip
