@@ -80,8 +80,8 @@ def first_series(
 
 
 def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
-    columns = [np.asarray(topic.columns[name], dtype=float) for name in signal.columns]
     with np.errstate(all="ignore"):  # damaged logs hold any number
+        columns = [np.asarray(topic.columns[name], dtype=float) for name in signal.columns]
         values = columns[0] if signal.derive is None else signal.derive(*columns)
         told = topic.units.get(signal.columns[0], "") if signal.derive is None else ""
         logged = told if told in UNITS else signal.unit

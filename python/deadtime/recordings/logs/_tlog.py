@@ -73,7 +73,7 @@ def read_tlog(data: bytes, source: str) -> LogContents:
         remarks.append("the file is cut off in a packet")
     if damaged:
         remarks.append(f"{damaged} packets with a wrong checksum are left out")
-    found, clock = _one_session(found, vehicle, remarks)
+    found, clock = _one_session(found, vehicle, remarks, source)
     topics = _topics(found, vehicle, clock)
     heartbeat = topics["HEARTBEAT"]
     kind, pilot = (int(heartbeat.columns[name][-1]) for name in ("type", "autopilot"))
@@ -109,7 +109,7 @@ def _vehicle(found: list[Batch]) -> Sender | None:
 
 
 def _one_session(
-    found: list[Batch], vehicle: Sender, remarks: list[str]
+    found: list[Batch], vehicle: Sender, remarks: list[str], source: str
 ) -> tuple[list[Batch], Clock]:
     """The messages of the longest time without a restart, and its pairs of both clocks.
 
@@ -128,7 +128,7 @@ def _one_session(
             boot.append(time[rows])
     at = np.concatenate([*places, np.empty(0, dtype=np.int64)])
     if not at.size:
-        raise RecordingError("no message of the autopilot in this tlog has a time of its clock")
+        raise RecordingError(f"{source}: no message of the autopilot holds a time of its clock")
     order = np.argsort(at, kind="stable")
     at = at[order]
     received = np.concatenate(ground)[order]

@@ -42,7 +42,7 @@ def read_ulog(data: bytes, source: str) -> LogContents:
         ) from error
     with contextlib.redirect_stdout(io.StringIO()):  # the library prints what it finds damaged
         try:
-            log = ULog(io.BytesIO(data))
+            log = ULog(_Endless(data))
         except ULogException as error:
             raise RecordingError(f"{source} is a damaged ULog file: {error}") from None
     topics: dict[str, Topic] = {}
@@ -51,9 +51,7 @@ def read_ulog(data: bytes, source: str) -> LogContents:
             name = found.name if found.multi_id == 0 else f"{found.name}[{found.multi_id}]"
             topics.setdefault(name, _topic(found.data))
     if not topics:
-        raise RecordingError(
-            f"{source} is a ULog file without a message: the header is all there is"
-        )
+        raise RecordingError(f"{source} is a ULog file without a message that can be read")
     parameters = dict(log.initial_parameters)
     parameters.update({name: value for _, name, value in log.changed_parameters})
     information = log.msg_info_dict
@@ -63,7 +61,11 @@ def read_ulog(data: bytes, source: str) -> LogContents:
         vehicle=_vehicle(topics, str(information.get("ver_hw", ""))),
         firmware=_firmware(information),
         topics=topics,
-        parameters={name: float(value) for name, value in parameters.items()},
+        parameters={
+            name: float(value)
+            for name, value in parameters.items()
+            if isinstance(value, (int, float))  # damaged ones are bytes
+        },
         modes=_modes(topics),
         remarks=_remarks(log),
         span=(log.start_timestamp * MICROSECOND, log.last_timestamp * MICROSECOND),
@@ -72,6 +74,21 @@ def read_ulog(data: bytes, source: str) -> LogContents:
             for one in log.dropouts
         ),
     )
+
+
+class _Endless(io.BytesIO):
+    """A file in which a read beyond the end moves on as if all bytes were there.
+
+    The library goes back by the length it has asked for, also where the file ended before; on a
+    file that is cut off it then reads the same bytes for ever.
+    """
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        start = self.tell()
+        found = super().read(size)
+        if size is not None and size > len(found):
+            self.seek(start + size)
+        return found
 
 
 def _topic(data: dict[str, Any]) -> Topic:

@@ -1,0 +1,52 @@
+"""``deadtime inspect``: what a log holds, as text and as JSON."""
+
+import pytest
+from command_line import found, one_clear_line, run
+from made_logs import copter
+
+
+@pytest.fixture
+def log(tmp_path):
+    path = tmp_path / "flight.bin"
+    path.write_bytes(copter().data)
+    return path
+
+
+def test_the_log_as_text(log, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    result = run("inspect", log)
+    assert result.returncode == 0
+    for words in (
+        "flight.bin: DataFlash of ArduPilot Copter (QUAD/X), 3.99 s",
+        "ALT_HOLD from 0.00 s",
+        "ATT.DesRoll",
+        "ATC_RAT_RLL_P 0.135",
+    ):
+        assert words in result.stdout, words
+
+
+def test_the_log_as_json(log):
+    told = found("inspect", log)
+    assert told["autopilot"] == "ArduPilot"
+    assert told["parameters"]["BATT_CAPACITY"] == 5000.0
+    roll, pitch = told["loops"]
+    assert (roll["name"], pitch["name"]) == ("roll", "pitch")
+    assert roll["signals"]["setpoint"]["conversion"] == "ATT.DesRoll [deg] to rad"
+    assert roll["signals"]["setpoint"]["rate"] == pytest.approx(50.0)
+    assert roll["segments"] == [[pytest.approx(0.009, abs=0.01), pytest.approx(3.98, abs=0.02)]]
+
+
+def test_one_loop(log):
+    result = run("inspect", log, "--loop", "roll")
+    assert result.returncode == 0
+    assert "converted: ATT.Roll [deg] to rad" in result.stdout
+    assert "pitch" not in result.stdout
+    assert found("inspect", log, "--loop", "pitch")["axis"] == "pitch"
+
+
+def test_what_is_wrong_is_one_line(log, tmp_path):
+    assert "its loops are roll, pitch" in one_clear_line(run("inspect", log, "--loop", "yaw"))
+    assert "there is no file" in one_clear_line(run("inspect", tmp_path / "no.ulg"))
+    text = tmp_path / "flight.csv"
+    text.write_text("time,reference\n")
+    assert "is no log of a known format" in one_clear_line(run("inspect", text))
