@@ -151,7 +151,8 @@ class _Columns(Mapping[str, Array]):
         self._divisors = {name: DIVISORS[letter] for name, letter in pairs if letter in DIVISORS}
 
     def __getitem__(self, name: str) -> Array:
-        values: Array = self._records[name].astype(float) / self._divisors[name]
+        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+            values: Array = self._records[name].astype(float) / self._divisors[name]
         return values
 
     def __contains__(self, name: object) -> bool:

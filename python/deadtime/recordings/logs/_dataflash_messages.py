@@ -37,7 +37,8 @@ class Layout:
     def makes_sense(self) -> bool:
         """Whether there are as many letters as columns, all known."""
         return (
-            bool(self.name and self.columns)
+            bool(self.name)
+            and all(column.strip() for column in self.columns)
             and len(self.form) == len(self.columns) == len(set(self.columns))
             and all(letter in TYPES for letter in self.form)
         )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
 
-import numpy as np
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
@@ -15,7 +14,7 @@ from deadtime._base.plain import plain
 from deadtime.recordings.logs._contents import LogContents
 from deadtime.recordings.logs._names import AutopilotNames, Kind, LoopNames
 from deadtime.recordings.logs._segments import segments_of
-from deadtime.recordings.logs._series import Series, first_series, increasing
+from deadtime.recordings.logs._series import DAY, Series, first_series, increasing
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,10 +257,12 @@ def _span(contents: LogContents, source: str) -> tuple[float, float]:
     for topic in contents.topics.values():
         time = topic.time[increasing(topic.time)]
         if time.size:
-            ends.append((float(time[0]), float(time[-1])))
+            ends.append((time.size, float(time[0]), float(time[-1])))
     if not ends:
         raise RecordingError(f"{source} is a {contents.format} log without a message")
-    return float(np.min(ends)), float(np.max(ends))
+    _, first, last = max(ends)
+    near = [(low, high) for _, low, high in ends if low > first - DAY and high < last + DAY]
+    return min(low for low, _ in near), max(high for _, high in near)
 
 
 def _loop(

@@ -15,8 +15,9 @@ from deadtime.recordings.logs._windows import held_rows, length, outside, shared
 #: Fewest rows of setpoint and response in a segment.
 FEWEST = 8
 
-#: So many equal values in a row are a copy.
+#: Fewest different values, and least time, s, of a setpoint that is a copy of the response.
 COPIED = 5
+COPY_LASTS = 0.5
 
 
 def segments_of(
@@ -69,19 +70,19 @@ def _copies(setpoint: Series, response: Series) -> Windows:
     """Where the setpoint moves and takes the values of the response, a few rows late at most.
 
     Firmware resets the setpoint of a loop that is not closed to the estimate. Log rows of both
-    may be a row or two apart, so the setpoint is compared with the response around its time. A
-    setpoint that rests, and equals a response in coarse steps, is no copy.
+    may be a row or two apart, so the setpoint is compared with the response around its time, as
+    many rows late throughout. A setpoint that rests, or that moves slowly over coarse steps, equals
+    the response of a closed loop now and then; that is no copy.
     """
     values = setpoint.values
     nearest = np.searchsorted(response.time, setpoint.time)
-    equal = np.zeros(values.size, dtype=bool)
+    copied = np.zeros(values.size, dtype=bool)
     for shift in (-3, -2, -1, 0, 1):
         found = response.values[np.clip(nearest + shift, 0, len(response) - 1)]
-        equal |= np.abs(values - found) <= 1e-6 * np.abs(values)
-    copied = np.zeros_like(equal)
-    for first, stop in _runs(equal):
-        if stop - first >= COPIED and np.unique(values[first:stop]).size >= COPIED:
-            copied[first:stop] = True
+        for first, stop in _runs(np.abs(values - found) <= 1e-6 * np.abs(values)):
+            lasts = setpoint.time[stop - 1] - setpoint.time[first] >= COPY_LASTS
+            if lasts and np.unique(values[first:stop]).size >= COPIED:
+                copied[first:stop] = True
     return held_rows(setpoint.time, copied)
 
 

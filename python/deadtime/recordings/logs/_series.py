@@ -16,6 +16,9 @@ from deadtime.recordings.logs._names import UNITS, Signal
 #: A pause of this many usual periods is a gap.
 PAUSE = 5.0
 
+#: No log has a pause of a day, s: what follows is a damaged time.
+DAY = 86400.0
+
 
 @dataclass(frozen=True, eq=False)
 class Series(ReadOnlyArrays):
@@ -91,8 +94,8 @@ def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
     time = np.asarray(topic.time, dtype=float) - start
     kept = increasing(time)
     source = f"{signal.topic}.{signal.columns[0]}"
-    if len(signal.columns) > 1:
-        source += f"…{signal.columns[-1]}"
+    if signal.columns[0].partition("[")[0] == signal.columns[-1].partition("[")[0]:
+        source += f"…{signal.columns[-1]}" * (len(signal.columns) > 1)
     steps = [signal.rule] if signal.rule else []
     if factor != 1.0:
         steps.append(f"[{logged}] to {unit}")
@@ -102,7 +105,7 @@ def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
 
 
 def increasing(time: Array) -> NDArray[np.bool_]:
-    """The most rows whose times increase strictly.
+    """The most rows whose times increase strictly, with no pause of a day.
 
     One wrong time far ahead then takes no later rows with it, and one far behind no earlier ones.
     """
@@ -112,8 +115,10 @@ def increasing(time: Array) -> NDArray[np.bool_]:
     rows = np.delete(rows, repeated)
     if np.any(np.diff(time[rows]) <= 0.0):
         rows = rows[_longest(time[rows].tolist())]
+    edges = [0, *(np.flatnonzero(np.diff(time[rows]) > DAY) + 1).tolist(), rows.size]
+    longest = int(np.argmax(np.diff(edges)))
     kept[:] = False
-    kept[rows] = True
+    kept[rows[edges[longest] : edges[longest + 1]]] = True
     return kept
 
 
