@@ -8,11 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.frozen import equal
+
 Array = NDArray[np.float64]
 
 
+class Compared:
+    """Equal to another of its type with equal attributes, arrays and mappings included."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return equal(vars(self), vars(other))
+
+    def __hash__(self) -> int:
+        return hash((type(self).__qualname__, *vars(self)))
+
+
 @dataclass(frozen=True, eq=False)
-class Topic:
+class Topic(Compared):
     """One series of messages.
 
     Attributes
@@ -31,7 +45,7 @@ class Topic:
 
 
 @dataclass(frozen=True, eq=False)
-class LogContents:
+class LogContents(Compared):
     """What a reader makes of a log file.
 
     Attributes
