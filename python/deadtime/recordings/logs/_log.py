@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
 
-
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
