@@ -11,6 +11,7 @@ import numpy as np
 from deadtime._base.errors import MissingExtraError, RecordingError
 from deadtime.recordings.logs._contents import LogContents, Topic
 from deadtime.recordings.logs._px4_modes import MODES, VEHICLES
+from deadtime.recordings.logs._series import DAY
 
 #: Seconds of one count of the clock.
 MICROSECOND = 1e-6
@@ -55,6 +56,7 @@ def read_ulog(data: bytes, source: str) -> LogContents:
     parameters = dict(log.initial_parameters)
     parameters.update({name: value for _, name, value in log.changed_parameters})
     information = log.msg_info_dict
+    span = (log.start_timestamp * MICROSECOND, log.last_timestamp * MICROSECOND)
     return LogContents(
         format="ULog",
         autopilot="PX4" if information.get("sys_name", "PX4") == "PX4" else "",
@@ -68,7 +70,7 @@ def read_ulog(data: bytes, source: str) -> LogContents:
         },
         modes=_modes(topics),
         remarks=_remarks(log),
-        span=(log.start_timestamp * MICROSECOND, log.last_timestamp * MICROSECOND),
+        span=span if 0.0 < span[1] - span[0] < DAY else None,
         gaps=tuple(
             (one.timestamp * MICROSECOND, one.timestamp * MICROSECOND + 1e-3 * one.duration)
             for one in log.dropouts
