@@ -11,9 +11,9 @@ SURVEY = Path(__file__).parents[1] / "support" / "damaged_tables.py"
 
 #: The library that reads the format, and how many damaged files are read in the survey.
 FORMATS = {
-    "text": (None, 20_000),
-    "text-pyarrow": ("pyarrow", 20_000),
-    "mat": (None, 20_000),
+    "text": (None, 5000),
+    "text-pyarrow": ("pyarrow", 5000),
+    "mat": (None, 5000),
     "parquet": ("pyarrow", 2000),
     "arrow": ("pyarrow", 2000),
     "mat73": ("h5py", 2000),
