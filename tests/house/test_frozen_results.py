@@ -8,7 +8,6 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.recordings.logs._contents import LogContents
 from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
@@ -37,10 +36,6 @@ def estimated():
 
 def planned(**more):
     return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
-
-
-def series():
-    return dtm.recordings.Series(np.arange(2.0), np.zeros(2), "rad", "ATT.Roll")
 
 
 def lag_of(lag):
@@ -83,25 +78,6 @@ MADE = {
     "PI": lambda: dtm.PI(2.0, 0.1),
     "PID": lambda: dtm.PID(2.0, 0.1, 0.1),
     "PV": lambda: dtm.PV(2.0, 0.1),
-    "Log": lambda: dtm.recordings.Log(
-        "a.bin",
-        "DataFlash",
-        "",
-        "",
-        "",
-        0.0,
-        1.0,
-        {},
-        {},
-        (),
-        {},
-        (),
-        (),
-        LogContents("DataFlash", "", "", "", {}),
-    ),
-    "LogLoop": lambda: dtm.recordings.LogLoop(
-        "roll", "roll", "attitude", series(), series(), None, ((0.0, 1.0),), ()
-    ),
     "ParametricPlant": lambda: dtm.ParametricPlant(lag_of, {"lag": 0.3}),
     "Parameter": lambda: Kp,
     "ParametricQuasiPolynomial": lambda: FAMILY,
@@ -123,7 +99,6 @@ MADE = {
     ),
     "RootSet": LOOP.rightmost,
     "RootSensitivity": lambda: h.root_sensitivity(h.rightmost()[0]),
-    "Series": series,
     "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),

@@ -8,25 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.frozen import equal
-
 Array = NDArray[np.float64]
 
 
-class Compared:
-    """Equal to another of its type with equal attributes, arrays and mappings included."""
-
-    def __eq__(self, other: object) -> bool:
-        if type(self) is not type(other):
-            return NotImplemented
-        return equal(vars(self), vars(other))
-
-    def __hash__(self) -> int:
-        return hash((type(self).__qualname__, *vars(self)))
-
-
 @dataclass(frozen=True, eq=False)
-class Topic(Compared):
+class Topic:
     """One series of messages.
 
     Attributes
@@ -45,7 +31,7 @@ class Topic(Compared):
 
 
 @dataclass(frozen=True, eq=False)
-class LogContents(Compared):
+class LogContents:
     """What a reader makes of a log file.
 
     Attributes
