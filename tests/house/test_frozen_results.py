@@ -4,10 +4,13 @@ import copy
 import dataclasses
 import json
 import pickle
+import tempfile
+from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
 import pytest
+from made_logs import copter
 from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
@@ -42,6 +45,13 @@ def lag_of(lag):
     return [1.0], [lag, 1.0]
 
 
+def logged():
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "flight.bin"
+        path.write_bytes(copter().data)
+        return dtm.open_log(path)
+
+
 #: An expression for one object of every public type that is not an error or a plain number.
 MADE = {
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
@@ -71,6 +81,8 @@ MADE = {
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
+    "Log": logged,
+    "LogLoop": lambda: logged().loops["roll"],
     "Margins": CONTINUOUS.margin,
     "MonteCarlo": lambda: planned().monte_carlo(3, processes=1, noise_in_loop=False),
     "P": lambda: dtm.P(2.0),
@@ -102,6 +114,7 @@ MADE = {
     "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
+    "Series": lambda: logged().loops["roll"].setpoint,
     "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
     "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
