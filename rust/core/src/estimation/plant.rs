@@ -71,9 +71,9 @@ impl Plant {
         self.den.len() - 1 + lags
     }
 
-    /// Is it proper with a zero, without lags?
+    /// Does its response have no jumps with a zero, without lags?
     pub(super) fn takes_zero(&self) -> bool {
-        self.num.last() == Some(&0.0)
+        self.num.len() > 2 && self.num.iter().rev().take(2).all(|c| *c == 0.0)
     }
 
     /// Does a constant input let the output grow without end?
@@ -175,7 +175,8 @@ mod tests {
     #[test]
     fn the_state_space_has_the_transfer_function() {
         let s = Complex64::new(0.3, 1.7);
-        let plants: [(&[f64], &[f64]); 4] = [
+        let plants: [(&[f64], &[f64]); 5] = [
+            (&[3.0], &[1.0, 0.4, 4.0]),
             (&[1.0], &[1.0, 0.0]),
             (&[1.0], &[1.0]),
             (&[0.15265, 5.1529], &[1.0, 5.82, 0.0]),
@@ -184,8 +185,8 @@ mod tests {
         for (num, den) in plants {
             let value = |c: &[f64]| c.iter().fold(Complex64::ZERO, |sum, c| sum * s + c);
             for lags in [&[] as &[f64], &[0.2], &[0.3, 0.0, 0.1]] {
-                let is_proper = num.len() < den.len();
-                let zero = if lags.is_empty() && !is_proper {
+                let takes_zero = num.len() + 1 < den.len();
+                let zero = if lags.is_empty() && !takes_zero {
                     0.0
                 } else {
                     0.25
