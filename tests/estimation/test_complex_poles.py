@@ -150,9 +150,9 @@ def test_a_plan_knows_the_numbers_of_any_plant():
 @pytest.mark.parametrize("air", [0.0, 0.03])
 def test_intervals_hold_the_truth(air):
     held = dict.fromkeys((*TRUTH, "delay+lag"), 0)
-    for seed in range(40):
+    for seed in range(20):
         fit = dtm.estimate_delay(recorded(seed, air), KNOWN, free=NAMES)
         for name, truth in (TRUTH | {"delay+lag": SUM}).items():
             held[name] += holds(fit, name, truth, 0.95)
-    # 95 % of 40 are 38; four standard deviations below are 32.5.
-    assert min(held.values()) >= 33, held
+    # 95 % of 20 are 19; four standard deviations below are 15.1.
+    assert min(held.values()) >= 15, held

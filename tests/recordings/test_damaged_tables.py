@@ -11,12 +11,12 @@ SURVEY = Path(__file__).parents[1] / "support" / "damaged_tables.py"
 
 #: The library that reads the format, and how many damaged files are read in the survey.
 FORMATS = {
-    "text": (None, 5000),
-    "text-pyarrow": ("pyarrow", 5000),
-    "mat": (None, 5000),
-    "parquet": ("pyarrow", 2000),
-    "arrow": ("pyarrow", 2000),
-    "mat73": ("h5py", 2000),
+    "text": (None, 2000),
+    "text-pyarrow": ("pyarrow", 2000),
+    "mat": (None, 2000),
+    "parquet": ("pyarrow", 500),
+    "arrow": ("pyarrow", 500),
+    "mat73": ("h5py", 500),
 }
 
 #: What a reader may take for a file of 4 kB, bytes.
