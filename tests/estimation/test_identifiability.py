@@ -599,7 +599,9 @@ def test_a_script_without_a_main_guard_gets_an_error_with_advice(tmp_path):
         [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=60
     )
     assert run.returncode != 0
-    assert "processes=1" in run.stderr.splitlines()[-1]
+    # Python itself may add that the processes it ended left semaphores behind.
+    last = [line for line in run.stderr.splitlines() if "resource_tracker" not in line][-1]
+    assert "processes=1" in last
 
 
 def test_the_parameters_of_the_loop_are_free_by_default():
