@@ -12,6 +12,7 @@
 
 mod disturbance;
 mod fit;
+mod kept;
 mod likelihood;
 mod mean;
 mod orthogonal;

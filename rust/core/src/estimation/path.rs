@@ -3,16 +3,10 @@
 //! Exact: the state is propagated from event to event, an event being a row or the arrival of an
 //! input. Step lengths repeat on even rows, so that few propagators are made.
 
+use super::kept::Kept;
 use super::plant::PlantSpace;
 use crate::dde::propagator::Propagator;
 use crate::{Error, Task};
-
-/// Number of propagators that are kept.
-const KEPT: usize = 6;
-
-/// Step lengths that differ by less than this share of the time and of the step are one.
-pub(super) const SAME: f64 = 1e-15;
-pub(super) const SAME_STEP: f64 = 1e-12;
 
 /// Events between two checks for a stop.
 const CHECKED: u32 = 4096;
@@ -61,7 +55,6 @@ pub(super) fn respond(
 
 /// Φ − I and Γ of one step length.
 struct Step<const N: usize> {
-    length: f64,
     growth: [[f64; N]; N],
     gamma: [f64; N],
 }
@@ -71,7 +64,6 @@ impl<const N: usize> Step<N> {
         let made = Propagator::new(&plant.a, &[&plant.b], length);
         let (growth, gamma) = (made.growth(), made.gamma(0));
         Self {
-            length,
             growth: std::array::from_fn(|i| std::array::from_fn(|j| growth[i * N + j])),
             gamma: std::array::from_fn(|i| gamma[i]),
         }
@@ -99,9 +91,7 @@ fn run<const N: usize>(
     let by_state: [f64; N] =
         std::array::from_fn(|j| (0..N).map(|i| plant.c[i] * plant.a[i * N + j]).sum());
     let by_input: f64 = plant.c.iter().zip(&plant.b).map(|(c, b)| c * b).sum();
-    let mut kept: Vec<Step<N>> = Vec::with_capacity(KEPT);
-    let (mut recent, mut oldest) = (0, 0);
-    let mut follower = [0; KEPT];
+    let mut steps = Kept::new();
     let mut state = [0.0; N];
     let mut arrivals = inputs.time.iter().zip(inputs.value);
     let mut coming = arrivals.next();
@@ -121,24 +111,8 @@ fn run<const N: usize>(
             let until = time.min(arrival);
             let length = until - now;
             if N > 0 && length > 0.0 {
-                let tolerance = SAME * until.abs() + SAME_STEP * length;
-                let fits = |step: &Step<N>| (step.length - length).abs() <= tolerance;
-                // Steps alternate on even rows: what followed the last one is the likeliest.
-                let before = recent;
-                recent = if kept.get(follower[before]).is_some_and(fits) {
-                    follower[before]
-                } else if let Some(place) = kept.iter().position(fits) {
-                    place
-                } else if kept.len() < KEPT {
-                    kept.push(Step::new(plant, length));
-                    kept.len() - 1
-                } else {
-                    oldest = (oldest + 1) % KEPT;
-                    kept[oldest] = Step::new(plant, length);
-                    oldest
-                };
-                follower[before] = recent;
-                state = kept[recent].apply(&state, input);
+                let step = steps.at(length, until, || Step::new(plant, length));
+                state = step.apply(&state, input);
                 now = until;
             }
             if let Some((_, value)) = coming.filter(|_| arrival <= time) {

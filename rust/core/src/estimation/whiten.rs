@@ -8,7 +8,8 @@
 //! and is kept.
 
 use super::disturbance::{Disturbance, Joint};
-use super::path::{SAME, SAME_STEP, SETTLED, dot, settled};
+use super::kept::{Kept, SAME, SAME_STEP};
+use super::path::{SETTLED, dot, settled};
 use super::plant::Plant;
 use super::propagation::{Propagation, Square};
 use super::rows::check_times;
@@ -131,7 +132,7 @@ fn pass<const N: usize>(
     let mut states = [[0.0; LANES]; N];
     let mut p = square::<N>(&joint.start);
     let (a, noise) = (square::<N>(&joint.a), square::<N>(&joint.noise));
-    let mut by_step = Propagation::new(&a, &noise, 0.0);
+    let mut steps = Kept::new();
     let mut gain = [0.0; N];
     let (mut step, mut steady) = (f64::NAN, false);
     // The covariance of the row before, if that was used and as far away as this one.
@@ -150,12 +151,12 @@ fn pass<const N: usize>(
             let tolerance = SAME * time[row].abs() + SAME_STEP * between;
             // No step is known before the first.
             if step.is_nan() || (between - step).abs() > tolerance {
-                by_step = Propagation::new(&a, &noise, between);
                 (step, steady, before) = (between, false, None);
             }
             if !known.used[row] || kicks.peek().is_some_and(|kick| kick.row <= row) {
                 (steady, before) = (false, None);
             }
+            let by_step = steps.at(step, time[row], || Propagation::new(&a, &noise, step));
             if !steady {
                 p = by_step.predicted(&p);
             }
