@@ -3,7 +3,7 @@
 from deadtime.recordings._check import RecordingCheck
 from deadtime.recordings._check_rows import Hole
 from deadtime.recordings._findings import Finding
-from deadtime.recordings._recording import Recording, Step
+from deadtime.recordings._recording import Recording, SentCommands, Step
 from deadtime.recordings.logs import Log, LogLoop, Series, open_log
 from deadtime.recordings.readers._read import read_recording
 
@@ -14,6 +14,7 @@ __all__ = [
     "LogLoop",
     "Recording",
     "RecordingCheck",
+    "SentCommands",
     "Series",
     "Step",
     "open_log",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +51,21 @@ class Step:
         return self.after - self.before
 
 
+class SentCommands(NamedTuple):
+    """Commands that were sent at times of their own.
+
+    Attributes
+    ----------
+    time : ndarray, shape (m,)
+        When each was sent, s, strictly increasing; each holds until the next.
+    values : ndarray, shape (m,)
+        The commands, after any limit.
+    """
+
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class Recording(ReadOnlyArrays):
     """Reference and output of a loop over time, with the command where it was logged.
@@ -69,6 +84,10 @@ class Recording(ReadOnlyArrays):
         Unit of each signal, for labels.
     source : str, optional
         Origin of the recording, for messages and labels.
+    sent : (array_like, array_like), each of shape (m,), optional
+        Instead of `command`: times at which commands were sent and their values, where these are
+        not the times of the rows. The first is not after the first row. `command` then has the
+        last one sent at each row.
 
     Raises
     ------
@@ -76,6 +95,8 @@ class Recording(ReadOnlyArrays):
         When the time does not increase, lengths differ, values are not finite or beyond 1e100,
         or there are fewer than 8 samples; when a masked row hides a change of the reference or
         of the command.
+    TypeError
+        When both `command` and `sent` are given.
 
     Notes
     -----
@@ -97,6 +118,7 @@ class Recording(ReadOnlyArrays):
     command: NDArray[np.float64] | None = None
     units: dict[str, str] = field(default_factory=dict)
     source: str = ""
+    sent: SentCommands | None = None
 
     def __init__(
         self,
@@ -106,7 +128,10 @@ class Recording(ReadOnlyArrays):
         command: ArrayLike | None = None,
         units: dict[str, str] | None = None,
         source: str = "",
+        sent: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> None:
+        if command is not None and sent is not None:
+            raise TypeError("give the command of each row or those sent between, not both")
         columns = {"time": time, "reference": reference, "output": output}
         if command is not None:
             columns["command"] = command
@@ -115,7 +140,12 @@ class Recording(ReadOnlyArrays):
         if len(set(lengths.values())) > 1:
             raise RecordingError(f"the columns of a recording differ in length: {lengths}")
         _check_time(arrays["time"])
-        held = {"command": None, **arrays, "units": FrozenDict(units or {}), "source": source}
+        commands = None
+        if sent is not None:
+            commands = _sent(*sent)
+            arrays["command"] = _last_sent(commands, arrays["time"])
+        held: dict[str, Any] = {"command": None, **arrays, "source": source, "sent": commands}
+        held["units"] = FrozenDict(units or {})
         for name, value in held.items():
             object.__setattr__(self, name, value)
 
@@ -144,13 +174,12 @@ class Recording(ReadOnlyArrays):
             When fewer than 8 samples lie in the window.
         """
         rows = self.rows(start, stop)
-        return replace(
-            self,
-            time=self.time[rows],
-            reference=self.reference[rows],
-            output=self.output[rows],
-            command=None if self.command is None else self.command[rows],
-        )
+        parts: dict[str, Any] = {name: one[rows] for name, one in self._columns().items()}
+        if self.sent is not None:
+            kept = int(np.searchsorted(self.sent.time, parts["time"][-1], side="right"))
+            sent = SentCommands(self.sent.time[:kept], self.sent.values[:kept])
+            parts |= {"command": None, "sent": sent}
+        return replace(self, **parts)
 
     def rows(self, start: float | None = None, stop: float | None = None) -> slice:
         """The rows with ``start <= time <= stop``, as a slice."""
@@ -273,7 +302,7 @@ class Recording(ReadOnlyArrays):
         """
         from deadtime.recordings._saved import save_table
 
-        save_table(path, self._columns(), self.units, self.source)
+        save_table(path, self._columns(), self.units, self.source, self.sent)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recording:
@@ -356,7 +385,7 @@ def _unmasked_rows(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
     return {name: np.ma.getdata(values)[kept] for name, values in columns.items()}
 
 
-def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def _column(name: str, values: ArrayLike, fewest: int = MINIMUM_SAMPLES) -> NDArray[np.float64]:
     try:
         given = np.asarray(unmasked(name, values))
         if given.dtype.kind == "c":
@@ -366,10 +395,8 @@ def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise RecordingError(f"the {name} is not an array of numbers: {error}") from None
     if array.ndim != 1:
         raise RecordingError(f"the {name} has shape {array.shape}: give a column (n,)")
-    if array.size < MINIMUM_SAMPLES:
-        raise RecordingError(
-            f"the {name} has {array.size} samples, at least {MINIMUM_SAMPLES} are needed"
-        )
+    if array.size < fewest:
+        raise RecordingError(f"the {name} has {array.size} samples, at least {fewest} are needed")
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise RecordingError(
@@ -385,12 +412,34 @@ def _column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def _check_time(time: NDArray[np.float64]) -> None:
+def _sent(time: ArrayLike, values: ArrayLike) -> SentCommands:
+    found = SentCommands(_column("time of the commands", time, 1), _column("commands", values, 1))
+    if found.time.size != found.values.size:
+        raise RecordingError(
+            f"{found.values.size} commands were sent at {found.time.size} times: give one time each"
+        )
+    _check_time(found.time, "time of the commands")
+    return found
+
+
+def _last_sent(sent: SentCommands, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The command that holds at each row."""
+    if sent.time[0] > time[0]:
+        raise RecordingError(
+            f"the first command is sent at {sent.time[0]:g} s, after the first row at {time[0]:g} "
+            "s: begin the recording at a row by which one was sent"
+        )
+    found: NDArray[np.float64] = sent.values[np.searchsorted(sent.time, time, side="right") - 1]
+    found.flags.writeable = False
+    return found
+
+
+def _check_time(time: NDArray[np.float64], name: str = "time") -> None:
     backward = np.flatnonzero(np.diff(time) <= 0)
     if backward.size:
         row = int(backward[0]) + 1
         what = "repeats" if time[row] == time[row - 1] else "goes back"
         raise RecordingError(
-            f"the time {what} at row {row}: {time[row - 1]!r} is followed by {time[row]!r} "
+            f"the {name} {what} at row {row}: {time[row - 1]!r} is followed by {time[row]!r} "
             f"({backward.size} such places); sort the rows and keep one of each time stamp"
         )

@@ -8,14 +8,15 @@ header and the rows, each number with the fewest digits that give the same doubl
     time,reference,output
     0.0,0.0,0.012
 
-A Parquet file has the same columns, and the same JSON in its metadata under ``deadtime``.
+A Parquet file has the same columns, and the same JSON in its metadata under ``deadtime``. Commands
+with times of their own are in the JSON, as ``{"sent": [times, values]}``.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,11 +43,16 @@ EVER = (-np.inf, np.inf)
 
 
 def save_table(
-    path: str | os.PathLike[str], columns: Columns, units: Mapping[str, str], source: str
+    path: str | os.PathLike[str],
+    columns: Columns,
+    units: Mapping[str, str],
+    source: str,
+    sent: Sequence[NDArray[np.float64]] | None = None,
 ) -> None:
-    """Write columns, units and source as the suffix of the path says."""
+    """Write columns, units, source and commands sent as the suffix of the path says."""
     file = Path(path)
-    described = json.dumps({"source": source, "units": dict(units)})
+    apart = {} if sent is None else {"sent": [part.tolist() for part in sent]}
+    described = json.dumps({"source": source, "units": dict(units), **apart})
     if file.suffix == ".csv":
         rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
         with file.open("w", encoding="utf-8", newline="\n") as stream:
@@ -68,11 +74,11 @@ def load_table(path: str | os.PathLike[str]) -> dict[str, Any]:
         if table_format(path, head) == "Parquet":
             described = parquet_metadata(path).get(b"deadtime", b"")
             table = arrow_file(path, "Parquet", set(NAMES))
-            return _described(path, described) | read_table(table, _signals(table.names), EVER)
+            return read_table(table, _signals(table.names), EVER) | _described(path, described)
         text = as_text(path, whole(stream, head), NAMES, ",")
     title, comment, *_ = (*text.comments, "", "")
     described = comment[1:].encode() if title == TITLE else b""
-    return _described(path, described) | read_csv(text, _signals(text.header), EVER)
+    return read_csv(text, _signals(text.header), EVER) | _described(path, described)
 
 
 def _signals(names: Iterable[str]) -> dict[str, str]:
@@ -85,6 +91,9 @@ def _described(path: object, text: bytes) -> dict[str, Any]:
         source, units = told["source"], told["units"]
         if not isinstance(source, str) or not all(isinstance(one, str) for one in units.values()):
             raise TypeError
+        if "sent" in told:
+            times, values = told["sent"]
+            return {"source": source, "units": units, "command": None, "sent": (times, values)}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RecordingError(
             f"{path} was not written by Recording.save: read it by dtm.read_recording, with the "

@@ -57,17 +57,18 @@ def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]
     the command of other controllers depends on samples before the log.
     """
     if recording.command is not None:
-        return _limited(recording.command, loop), "logged"
+        return limited(recording.command, loop), "logged"
     if not isinstance(loop.controller, P):
         raise NotIdentifiableError(
             "the recording holds no command, and only that of a P controller can be computed from "
             "reference and output: log the command, or use method='waveform'"
         )
     command = loop.controller.Kp * (recording.reference - recording.output)
-    return _limited(command, loop), "computed from reference and output"
+    return limited(command, loop), "computed from reference and output"
 
 
-def _limited(command: Array, loop: ControlLoop) -> Array:
+def limited(command: Array, loop: ControlLoop) -> Array:
+    """Commands within the limit of the loop."""
     limit = math.inf if loop.limit is None else loop.limit
     return np.clip(command, -limit, limit)
 
@@ -77,7 +78,9 @@ def moves_between_rows(recording: Recording, loop: ControlLoop) -> bool:
 
     Any other logged command, such as a setpoint, is taken as held between rows.
     """
-    if loop.is_sampled or recording.command is None or not isinstance(loop.controller, P):
+    if loop.is_sampled or recording.command is None or recording.sent is not None:
+        return False
+    if not isinstance(loop.controller, P):
         return False
     computed, _ = known_commands(replace(recording, command=None), loop)
     logged, _ = known_commands(recording, loop)
@@ -99,7 +102,7 @@ def commands_over_samples(recording: Recording, loop: ControlLoop) -> tuple[Arra
     if jumps.size and isinstance(loop.controller, P):
         Kp, output = loop.controller.Kp, recording.output[jumps + 1]
         old, new = (
-            _limited(Kp * (recording.reference[rows] - output), loop) for rows in (jumps, jumps + 1)
+            limited(Kp * (recording.reference[rows] - output), loop) for rows in (jumps, jumps + 1)
         )
         before[jumps] -= new - old
     return np.append(0.5 * (command[:-1] + before), command[-1]), source

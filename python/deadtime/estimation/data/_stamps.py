@@ -27,6 +27,8 @@ def on_regular_times(run: Run) -> Run | None:
     check, loop = run.check, run.loop
     if check is None or check.stamps != "jittered" or loop.sample_time is None:
         return None
+    if run.recording.sent is not None:
+        return None
     time = run.recording.time
     between = loop.sample_time * (check.rate_ratio or 1)
     number = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.rint(np.diff(time) / between)))])

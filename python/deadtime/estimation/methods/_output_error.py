@@ -27,6 +27,7 @@ from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, check_moves, ch
 from deadtime.estimation.data._simulated import (
     commands_over_samples,
     known_commands,
+    limited,
     moves_between_rows,
 )
 from deadtime.estimation.data._stamps import on_regular_times
@@ -471,8 +472,12 @@ def _model(
             "widen the window"
         )
     check_moves(data.output, command)
-    commands = with_missing(recording, loop, command)
-    if isinstance(loop.plant, RateLimited) and commands.time.size > command.size:
+    if data.sent is not None and not computed:
+        commands = HeldCommands(data.sent.time, limited(data.sent.values, loop))
+    else:
+        commands = with_missing(recording, loop, command)
+    missing = data.sent is None and commands.time.size > command.size
+    if isinstance(loop.plant, RateLimited) and missing:
         raise NotIdentifiableError(
             "rows are further apart than the samples of the controller, and what a plant that "
             "limits the rate of its command got depends on every command: choose a window without "
@@ -498,7 +503,7 @@ def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[
         if moves_between_rows(recording, loop):
             return commands_over_samples(recording, loop)
         return known_commands(recording, loop)
-    found = known_commands(replace(recording, command=None), loop)
+    found = known_commands(replace(recording, command=None, sent=None), loop)
     if loop.sample_time is None:
         raise NotIdentifiableError(
             "the recording holds no command, and that of a continuous controller cannot be "

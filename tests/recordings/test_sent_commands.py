@@ -1,0 +1,112 @@
+"""Recordings whose commands were sent at times of their own, between the rows."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+#: Rows of a simulated flight.
+ROWS = 500
+
+TIME = np.linspace(0.0, 1.9, 20)
+SENT = (np.array([-0.5, 0.33, 0.34, 1.2, 5.0]), np.array([0.0, 1.0, 2.0, -1.0, 3.0]))
+
+
+def recording(sent=SENT, **more):
+    return dtm.Recording(TIME, np.zeros(20), TIME**2, sent=sent, **more)
+
+
+def test_each_row_has_the_last_command_sent():
+    found = recording()
+    last = [max((t, u) for t, u in zip(*SENT, strict=True) if t <= row)[1] for row in TIME]
+    assert found.command.tolist() == last
+    assert found.sent.time.tolist() == SENT[0].tolist()
+    assert not found.command.flags.writeable
+    assert not found.sent.values.flags.writeable
+
+
+def test_a_window_keeps_the_commands_before_it():
+    found = recording().window(1.0, 1.9)
+    assert found.sent.time.tolist() == [-0.5, 0.33, 0.34, 1.2]
+    assert found.command[0] == 2.0
+    assert found.window(1.0, 1.9) == found
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_it_is_saved_bit_for_bit(tmp_path, ending):
+    if ending == ".parquet":
+        pytest.importorskip("pyarrow", reason="pyarrow writes Parquet files")
+    found = recording(units={"output": "m"}, source="flight")
+    found.save(tmp_path / f"run{ending}")
+    assert dtm.Recording.load(tmp_path / f"run{ending}") == found
+
+
+@pytest.mark.parametrize(
+    ("sent", "match"),
+    [
+        (([0.1], [1.0]), "the first command is sent at 0.1 s, after the first row at 0 s"),
+        (([-1.0, -1.0], [1.0, 2.0]), "the time of the commands repeats at row 1"),
+        (([-1.0, 0.0], [1.0]), "1 commands were sent at 2 times"),
+        (([-1.0], [np.nan]), "the commands is nan at row 0"),
+        (([], []), "0 samples, at least 1"),
+    ],
+)
+def test_what_is_wrong_is_said(sent, match):
+    with pytest.raises(dtm.RecordingError, match=match):
+        recording(sent)
+
+
+def test_a_command_and_sent_ones_exclude_each_other():
+    with pytest.raises(TypeError, match="not both"):
+        recording(command=np.zeros(20))
+
+
+def flight(seed, integrates):
+    """A vehicle of one lag told at 50 Hz and logged at 150 Hz with scattered times, in closed form.
+
+    Between commands u the velocity v decays to u; a plant that integrates moves by its integral.
+    """
+    random = np.random.default_rng(seed)
+    delay, lag = random.uniform(0.004, 0.03), random.uniform(0.02, 0.06)
+    told = np.arange(-25, 200) * 0.02
+    square = np.sign(np.sin(2.0 * np.pi * told / 0.9 + 0.3)) * (told > 0.0)
+    value = square * np.repeat(random.uniform(0.5, 1.0, 9), 25)
+    time = np.cumsum(0.0067 * (1.0 + 0.3 * random.uniform(-1.0, 1.0, ROWS)))
+    output, arrived = np.empty(ROWS), told + delay
+    v, x, now, held, k = 0.0, 0.0, arrived[0], 0.0, 0
+    for row, at in enumerate(time):
+        while True:
+            until = min(at, arrived[k] if k < told.size else np.inf)
+            decay = np.exp(-(until - now) / lag)
+            x += held * (until - now) + (v - held) * lag * (1.0 - decay)
+            v, now = held + (v - held) * decay, until
+            if until == at:
+                break
+            held, k = value[k], k + 1
+        output[row] = x if integrates else v
+    output += (0.002 if integrates else 0.02) * random.standard_normal(ROWS)
+    return (told, value), time, output, delay, lag
+
+
+@pytest.mark.parametrize("integrates", [True, False])
+def test_the_times_of_commands_are_those_of_the_estimate(integrates):
+    errors, covered = [], 0
+    for seed in range(2):
+        sent, time, output, delay, lag = flight(seed, integrates)
+        told = dtm.Recording(time, np.zeros(time.size), output, sent=sent)
+        loop = dtm.ControlLoop(dtm.FactoredPlant([0.04], integrator=integrates), dtm.P(1.0))
+        fit = dtm.estimate_delay(told, loop, free=["delay", "gain", "lag_1"])
+        errors.append((fit.delay_plus_lag - delay - lag) / fit.stderr["delay+lag"])
+        low, high = fit.ci(0.95, "delay+lag")
+        covered += low < delay + lag < high
+        assert fit.stderr["delay+lag"] < 1.5e-3  # less than a fourth of the time between rows
+    assert covered >= 1
+    assert np.all(np.abs(errors) < 4.0)
+
+
+@given(cut=st.floats(0.0, 1.2))
+def test_any_window_has_the_commands_of_the_whole(cut):
+    whole = recording()
+    part = whole.window(cut, None)
+    assert part.command.tolist() == whole.command[whole.rows(cut, None)].tolist()
