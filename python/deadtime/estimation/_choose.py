@@ -259,7 +259,7 @@ def choose_plant(
                     refusals[label] = str(error)
             if fits:
                 refusals.pop(label, None)
-                estimates[label] = fit = min(fits, key=_bic)
+                estimates[label] = fit = min(fits, key=bic)
                 best = best or cast(FactoredPlant, fit.loop.plant)
         return best
 
@@ -280,7 +280,7 @@ def choose_plant(
             tried(f"a pair, {_lags(len(rest))}" if rest else "a pair", paired)
     if not estimates:
         raise NotIdentifiableError(next(iter(refusals.values())))
-    criteria = {name: _bic(fit) for name, fit in estimates.items()}
+    criteria = {name: bic(fit) for name, fit in estimates.items()}
     chosen = min(_adequate(estimates), key=lambda name: criteria[name])
     return PlantChoice(estimates, criteria, refusals, chosen)
 
@@ -302,7 +302,7 @@ def _first(loop: ControlLoop, sample: float) -> FactoredPlant:
     return FactoredPlant(lags, loop.parameters.get("gain", 1.0), integrator=integrator)
 
 
-def _bic(fit: DelayEstimate) -> float:
+def bic(fit: DelayEstimate) -> float:
     """Schwarz's criterion of the fit, from the plain likelihood."""
     rows = sum(run.residuals.size for run in fit.runs)
     unknown = len(fit.free)

@@ -203,7 +203,9 @@ def common_covariance(fit: NoiseFit) -> Array:
     blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
     if len(blocks) == 1:
         return blocks[0]
-    return np.asarray(np.linalg.inv(sum(np.linalg.inv(block) for block in blocks)))
+    # A number that one recording does not move at all, as a second lag of zero, has no variance.
+    information = sum(np.linalg.pinv(block, hermitian=True) for block in blocks)
+    return np.asarray(np.linalg.pinv(information, hermitian=True))
 
 
 def _common(inverse: Array, linear: int, fit: NoiseFit) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
@@ -14,6 +14,9 @@ from deadtime.recordings.logs._contents import LogContents
 from deadtime.recordings.logs._names import AutopilotNames, Kind, LoopNames
 from deadtime.recordings.logs._segments import segments_of
 from deadtime.recordings.logs._series import DAY, Series, first_series, increasing
+
+if TYPE_CHECKING:
+    from deadtime.recordings._recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +69,45 @@ class LogLoop(ReadOnlyArrays):
     def followed(self) -> float:
         """Length of all segments, s."""
         return float(sum(stop - start for start, stop in self.segments))
+
+    def recording(
+        self,
+        start: float | None = None,
+        stop: float | None = None,
+        *,
+        command: Literal["setpoint", "actuator"] = "setpoint",
+        between: Literal["held", "lines"] | None = None,
+    ) -> Recording:
+        """The loop as a recording: how the response follows the setpoint, or the actuator.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            The part to take, s; by default the longest window in which the setpoint is followed.
+        command : {"setpoint", "actuator"}
+            What counts as the command. With ``"setpoint"`` the loop is closed inside the vehicle,
+            and a plant that follows the command describes it; with ``"actuator"`` it is what the
+            controller of this loop commands.
+        between : {"held", "lines"}, optional
+            Whether a command holds from its row to the next, as one does that is logged each time
+            it is computed, or moves in a straight line, as one does that is logged less often. By
+            default one that changes on most of its rows moves.
+
+        Returns
+        -------
+        Recording
+            Its rows are those of the response. Commands have their own times (`Recording.sent`);
+            of one that moves each value is the mean until the next.
+
+        Raises
+        ------
+        RecordingError
+            When the loop is never followed and no part is given, when the actuator is not logged,
+            or when fewer than 8 rows lie in the part.
+        """
+        from deadtime.recordings.logs._recording import recording_of
+
+        return recording_of(self, start, stop, command, between)
 
     def headline(self) -> str:
         """The loop in one line."""
