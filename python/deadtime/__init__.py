@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         sweep,
     )
     from deadtime.recordings import Recording, open_log, read_recording
+    from deadtime.reports import latency
     from deadtime.roots import (
         QuasiPolynomial,
         crossings,
@@ -89,7 +90,7 @@ _ROOMS = {
     "links": "",
     "estimation": "damping_ratio estimate_delay identifiability",
     "tuning": "design design_filter",
-    "reports": "",
+    "reports": "latency",
     "flights": "",
     "internet": "",
     "paper": "",
@@ -145,6 +146,7 @@ __all__ = [
     "lambertw0",
     "lambertwm1",
     "largest_stable_box",
+    "latency",
     "open_log",
     "parameters",
     "proved_boxes",

@@ -119,3 +119,45 @@ class Tlog:
         packet = message.pack(self.link, force_mavlink1=old)
         self.link.seq = (self.link.seq + 1) % 256
         self.data += struct.pack(">Q", round(received * 1e6)) + bytes(packet)
+
+
+#: Truth of the rate loop in `flown_copter`: delay from the controller's command, lag, gain.
+DELAY, LAG, GAIN = 0.012, 0.030, 8.0
+
+
+def flown_copter(seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=True):
+    """A DataFlash log in which the roll rate follows doublets under a P controller of gain 0.9.
+
+    The vehicle is gain/(s (lag s + 1)) behind a delay, exact where that is a multiple of 0.5 ms.
+    """
+    random = np.random.default_rng(seed)
+    log = DataFlash()
+    log.define("MSG", 1, "QZ", "TimeUS,Message")
+    log.define("PARM", 2, "QNf", "TimeUS,Name,Value")
+    log.define("MODE", 3, "QMB", "TimeUS,Mode,ModeNum")
+    log.define("EV", 4, "QB", "TimeUS,Id")
+    log.define("RATE", 5, "Qfff", "TimeUS,RDes,R,ROut")
+    log.add("MSG", 0, "ArduCopter V4.5.7 (01234567)")
+    log.add("MSG", 0, "Frame: QUAD/X")
+    for name, value in (("INS_GYRO_FILTER", 20.0), ("SCHED_LOOP_RATE", float(rate))):
+        log.add("PARM", 0, name, value)
+    log.add("MODE", 1000, 2, 2)
+    log.add("EV", 1000, 10)
+    log.add("EV", 2000, 28)
+    step = 5e-4
+    late, every = round(delay / step), round(1.0 / (rate * step))
+    decay = np.exp(-step / LAG)
+    told = np.zeros(round(seconds / step))
+    torque, velocity, sent = 0.0, 0.0, 0.0
+    for k in range(told.size):
+        at = k * step
+        if k % every == 0:
+            asked = 40.0 * np.sign(np.sin(2.0 * np.pi * at / 1.1)) * (steps and at > 1.0)
+            seen = np.degrees(velocity) + np.degrees(noise) * random.standard_normal()
+            sent = 0.9 * np.radians(asked - seen)
+            log.add("RATE", 10_000 + round(at * 1e6), asked, seen, sent)
+        told[k] = sent
+        arrived = told[k - late] if k >= late else 0.0
+        velocity += GAIN * (arrived * step + (torque - arrived) * LAG * (1.0 - decay))
+        torque = arrived + (torque - arrived) * decay
+    return log

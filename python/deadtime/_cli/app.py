@@ -27,6 +27,8 @@ INTERRUPTED = 130
 COMMANDS = {
     "estimate": "Estimate the delay of a loop from a recording of it, or from several together.",
     "inspect": "Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
+    "latency": "Tell how long each loop of a vehicle takes to respond, by stage, and what that "
+    "costs.",
     "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
     "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
     "design": "Find the gains that are best in the worst case, within margins.",

@@ -1,0 +1,100 @@
+"""``deadtime latency``: how long the loops of a vehicle take to respond, from one log or two."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from deadtime._base.digits import between, stated
+from deadtime._base.drawing import check_matplotlib
+from deadtime._cli import options as opt
+from deadtime._cli.show import print_json, print_table, print_text, results_table, stages
+from deadtime.recordings import Log, open_log
+from deadtime.reports import Latency, compare_latencies, latency
+from deadtime.reports.latencies._latency import loops_asked_for
+
+LEFT = ("loop", "from", "why")
+
+
+def command(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="A log file, or two to compare: ULog, DataFlash (.bin or .log), tlog, Blackbox.",
+            show_default=False,
+        ),
+    ],
+    axis: Annotated[
+        list[str] | None,
+        typer.Option(help="Only loops of this axis; may be repeated.", show_default=False),
+    ] = None,
+    loop: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Only this loop, for example 'roll rate'; may be repeated.", show_default=False
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write a page with all fits, for one log.", show_default=False),
+    ] = None,
+    as_json: opt.As_json = False,
+) -> None:
+    """Tell how long each loop of a vehicle takes to respond, by stage, and what that costs."""
+    if len(logs) > 2:
+        raise ValueError(f"{len(logs)} logs were given: give one, or two to compare")
+    if out is not None:
+        check_matplotlib()
+        if len(logs) > 1:
+            raise ValueError("--out writes the page of one log: give one, or leave it out")
+    found = [_told(open_log(one), axis, loop, as_json) for one in logs]
+    if as_json and len(found) == 1:
+        print_json(found[0].to_dict())
+    elif as_json:
+        changes = [one.to_dict() for one in compare_latencies(*found)]
+        print_json({"logs": [one.to_dict() for one in found], "changes": changes})
+    else:
+        for one in found:
+            _print(one)
+        if len(found) == 2:
+            _print_changes(*found)
+    if out is not None:
+        written = found[0].report(out)
+        if not as_json:
+            print_text(f"report: {written}")
+
+
+def _told(log: Log, axes: list[str] | None, loops: list[str] | None, quiet: bool) -> Latency:
+    count = loops_asked_for(log, axes, loops)
+    with stages(count, quiet=quiet) as begin:
+        return latency(log, axes=axes, loops=loops, progress=begin)
+
+
+def _print(found: Latency) -> None:
+    first, headline, *rest = found.summary().splitlines()
+    print_text(first, "bold")
+    print_text(headline, "bold")
+    for line in rest:
+        print_text(line)
+
+
+def _print_changes(one: Latency, other: Latency) -> None:
+    changes = compare_latencies(one, other)
+    if not changes:
+        print_text("no loop is told by both logs", "yellow")
+        return
+    rows = [
+        (
+            change.loop,
+            change.command,
+            stated(change.before, change.before_error, "s"),
+            stated(change.after, change.after_error, "s"),
+            between(*change.ci, change.stderr, "s"),
+            change.verdict,
+        )
+        for change in changes
+    ]
+    heads = ("loop", "from", one.source, other.source, "change, 95 %", "verdict")
+    print_table(results_table(heads, rows, left=(*LEFT, "verdict")))

@@ -1,0 +1,51 @@
+"""How often an autopilot computes its commands, by the parameters of a log."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, TypeAlias
+
+from deadtime.recordings import Log
+from deadtime.recordings.logs._names import Kind
+from deadtime.recordings.logs._recording import moves
+from deadtime.recordings.logs._series import Series
+
+#: Whether commands hold from row to row of a log, or move in straight lines.
+Between: TypeAlias = Literal["held", "lines"]
+
+#: Rows further apart than this many periods do not hold each command.
+EACH = 1.5
+
+#: Least rate of PX4's loops of velocity and position, Hz: that of its estimates.
+PX4_OUTER = 50.0
+
+
+class Period(NamedTuple):
+    """The time between commands, s, and the parameter that tells it."""
+
+    time: float
+    source: str
+
+
+def period_of(log: Log, kind: Kind) -> Period | None:
+    """The period of the controller of a loop, if it is known."""
+    told = log.parameters
+    if log.autopilot == "PX4" and kind in ("velocity", "position"):
+        return Period(1.0 / PX4_OUTER, f"at least {PX4_OUTER:g} Hz")
+    for name in ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX"):
+        if told.get(name, 0.0) > 0.0:
+            return Period(1.0 / told[name], f"{name} {told[name]:g}")
+    steps = max(told.get("pid_process_denom", 1.0), 1.0)
+    if log.autopilot in ("Betaflight", "INAV") and told.get("looptime", 0.0) > 0.0:
+        time = told["looptime"] * steps
+        return Period(1e-6 * time, f"looptime {told['looptime']:g} µs, times {steps:g}")
+    return None
+
+
+def between_rows(log: Log, kind: Kind, told: Series) -> Between | None:
+    """Whether commands hold between the rows of a log; None where that is not known."""
+    if not moves(told):
+        return "held"
+    period = period_of(log, kind)
+    if period is None:
+        return None
+    return "held" if told.period < EACH * period.time else "lines"

@@ -1,0 +1,338 @@
+"""`latency`: the time from command to response of every loop in a log."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from deadtime._base.digits import stated
+from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
+from deadtime._base.plain import plain
+from deadtime._base.progress import Stages, stage_report
+from deadtime.estimation import DelayEstimate
+from deadtime.recordings import Log, LogLoop, Recording, open_log
+from deadtime.reports.latencies._budget import Stage, stages_of
+from deadtime.reports.latencies._controller import between_rows
+from deadtime.reports.latencies._filters import FilterDelay, filters_of
+from deadtime.reports.latencies._relation import LoopLatency, relation_of
+from deadtime.reports.latencies._windows import Command, Window, best_windows, window_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Latency(ReadOnlyArrays):
+    """Where in a vehicle the time goes, from one log.
+
+    Attributes
+    ----------
+    source, vehicle : str
+        The file, and autopilot and vehicle.
+    loops : tuple of LoopLatency
+        For each loop the time from setpoint to response, and from what its controller commands to
+        the response; with the reason where it was refused.
+    stages : dict of str to tuple of Stage
+        The budget of each loop.
+    filters : tuple of FilterDelay
+        The filters that the parameters of the log name.
+    remarks : tuple of str
+        What was damaged or left out of the log.
+    """
+
+    source: str
+    vehicle: str
+    loops: tuple[LoopLatency, ...]
+    stages: Mapping[str, tuple[Stage, ...]] = field(default_factory=dict)
+    filters: tuple[FilterDelay, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def loop(self, name: str, command: Command = "setpoint") -> LoopLatency:
+        """The time of one loop.
+
+        Raises
+        ------
+        ValueError
+            When there is no such loop; the message lists those there are.
+        """
+        for one in self.loops:
+            if one.loop == name and one.command == command:
+                return one
+        has = ", ".join(f"{one.loop!r} from {one.command}" for one in self.loops) or "none"
+        raise ValueError(f"no time of {name!r} from its {command}: there are {has}")
+
+    @property
+    def estimated(self) -> tuple[LoopLatency, ...]:
+        """The loops whose time was not refused."""
+        return tuple(one for one in self.loops if one.estimate is not None)
+
+    def headline(self) -> str:
+        """The shortest answer: the fastest loop of the vehicle that is told, in one line."""
+        told = sorted(self.estimated, key=_order)
+        if not told:
+            return f"{self.source}: no loop in it tells how long it takes to respond"
+        return told[0].headline()
+
+    def summary(self) -> str:
+        """All loops, their budget and what it costs, in lines of text."""
+        lines = [f"{self.source}: {self.vehicle}", self.headline(), ""]
+        for one in self.estimated:
+            lines += self._lines(one)
+        refused = [one for one in self.loops if one.estimate is None]
+        if refused:
+            lines.append("refused:")
+            lines += [f"  {one.name}: {one.refusal}" for one in refused]
+        return "\n".join([*lines, *self.remarks])
+
+    def _lines(self, one: LoopLatency) -> list[str]:
+        fit = one.estimate
+        assert fit is not None
+        lines = [one.headline()]
+        lines.append(f"  {', '.join(numbers_of(fit))}")
+        if not fit.adequate:
+            lines.append(f"  not adequate: {why_inadequate(fit)}")
+        if one.cost is not None:
+            lines.append(f"  {cost_in_words(one)}")
+        if one.command == "actuator" or (one.loop, "actuator") not in {
+            (other.loop, other.command) for other in self.estimated
+        }:
+            lines += [f"  {stage.line()}" for stage in self.stages.get(one.loop, ()) if stage.part]
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """All results as plain values for JSON."""
+        found: dict[str, Any] = plain(
+            {
+                "source": self.source,
+                "vehicle": self.vehicle,
+                "loops": [one.to_dict() for one in self.loops],
+                "stages": {
+                    name: [one.to_dict() for one in some] for name, some in self.stages.items()
+                },
+                "filters": [one._asdict() for one in self.filters],
+                "remarks": self.remarks,
+            }
+        )
+        return found
+
+    def plot(self) -> Figure:
+        """Draw delay and lag of each loop with their intervals. Needs matplotlib."""
+        from deadtime.reports.latencies._plots import plot_latency
+
+        return plot_latency(self)
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write one HTML file with all of it: the budget, each fit and the gains.
+
+        Needs matplotlib.
+        """
+        from deadtime._base.page import write_page
+        from deadtime.reports.latencies._page import render
+
+        return write_page(render(self), Path(path))
+
+    def __repr__(self) -> str:
+        return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops told>"
+
+
+def numbers_of(fit: DelayEstimate) -> list[str]:
+    """Every number of the fitted plant, with its standard error."""
+    single = sum(name.startswith("lag") for name in fit.free) == 1
+    found = []
+    for name in fit.free:
+        low, high = fit.ci(0.95, name)
+        shown = "lag" if single and name == "lag_1" else name.replace("_", " ")
+        unit = "" if name == "gain" else "s"
+        found.append(f"{shown} {stated(fit._value(name), (high - low) / 3.92, unit)}")
+    return found
+
+
+def why_inadequate(fit: DelayEstimate) -> str:
+    """The reasons why the model of an estimate is not adequate."""
+    _, _, why = fit.message.partition("; not adequate: ")
+    return why.partition(" (try ")[0] or "the residuals are not white"
+
+
+def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
+    """Adequate estimates first, inner loops before outer ones, then the vehicle alone."""
+    kinds = ("rate", "attitude", "velocity", "position", "")
+    assert one.estimate is not None
+    kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
+    return (not one.estimate.adequate, kind, one.command == "setpoint", one.promise)
+
+
+def cost_in_words(one: LoopLatency) -> str:
+    """What delay and lag cost in gain, in a sentence."""
+    cost = one.cost
+    assert cost is not None
+    half = 0.25 * (cost.largest_ci[1] - cost.largest_ci[0])
+    damped = 0.25 * (cost.well_damped_ci[1] - cost.well_damped_ci[0])
+    text = (
+        f"a proportional gain is stable up to {stated(cost.largest, half)} and well damped "
+        f"(Ms 1.7) up to {stated(cost.well_damped, damped)}"
+    )
+    if cost.flown is not None:
+        text += f"; {cost.flown:.3g} is flown"
+        if cost.delay_margin is None or math.isnan(cost.delay_margin):
+            text += ", which this model says is not stable"
+        elif math.isfinite(cost.delay_margin):
+            text += f", which leaves a delay margin of {stated(cost.delay_margin, 0.0, 's')}"
+    return text
+
+
+def latency(
+    log: Log | Recording | str | os.PathLike[str],
+    *,
+    axes: Iterable[str] | None = None,
+    loops: Iterable[str] | None = None,
+    progress: Stages = False,
+) -> Latency:
+    """Estimate for every loop of a log how long it takes to respond.
+
+    Parameters
+    ----------
+    log : Log, path or Recording
+        A log of an autopilot, or one recording, whose response to its command, or to its reference
+        if it has none, is taken.
+    axes : iterable of str, optional
+        Only loops of these axes, such as ``("roll", "pitch")``.
+    loops : iterable of str, optional
+        Only loops of these names, such as ``("roll rate",)``.
+    progress : bool or callable, optional
+        Print each loop as it begins, or call a function with its name.
+
+    Returns
+    -------
+    Latency
+
+    Raises
+    ------
+    RecordingError
+        When the file is no log.
+    ValueError
+        When the log has no loop of these axes or names.
+
+    Notes
+    -----
+    Of each loop the windows are ranked by the Cramér-Rao bound of delay and lag together that they
+    promise; the best, and up to two others, are fitted together: gain, delay and one lag, or two
+    lags where one is not adequate. From the setpoint the plant follows its command; from what the
+    controller commands it integrates.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> time = np.arange(600) * 0.01
+    >>> told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    >>> vehicle = dtm.FactoredPlant([0.08]).transfer_function() * dtm.delay(0.03)
+    >>> angle = np.ravel(vehicle.simulate(time, told).outputs)
+    >>> angle = angle + 0.003 * np.random.default_rng(1).standard_normal(600)
+    >>> found = dtm.latency(dtm.Recording(time, told, angle))
+    >>> time, stderr, (low, high) = found.loops[0].sum_of()
+    >>> low < 0.11 < high
+    True
+    """
+    report = stage_report(progress)
+    if isinstance(log, Recording):
+        return _of_recording(log)
+    if not isinstance(log, Log):
+        log = open_log(log)
+    chosen = _chosen(log, axes, loops)
+    found = _all_told(log, [(loop, one) for loop in chosen for one in _commands(loop)], report)
+    filters = filters_of(log)
+    stages = {loop.name: stages_of(log, loop.name, found, filters) for loop in chosen}
+    vehicle = " ".join(one for one in (log.autopilot, log.vehicle, log.firmware) if one)
+    return Latency(
+        source=log.source,
+        vehicle=vehicle or log.format,
+        loops=tuple(found),
+        stages=FrozenDict({name: some for name, some in stages.items() if some}),
+        filters=filters,
+        remarks=log.remarks,
+    )
+
+
+def _chosen(log: Log, axes: Iterable[str] | None, names: Iterable[str] | None) -> list[LogLoop]:
+    """The loops asked for."""
+    found = list(log.loops.values())
+    for what, wanted in (("axis", axes), ("name", names)):
+        if wanted is None:
+            continue
+        asked = [wanted] if isinstance(wanted, str) else list(wanted)
+        has = list(dict.fromkeys(getattr(loop, what) for loop in log.loops.values()))
+        for one in asked:
+            if one not in has:
+                raise ValueError(
+                    f"{log.source} has no loop with the {what} {one!r}, it has "
+                    f"{', '.join(has) or 'none'}"
+                )
+        found = [loop for loop in found if getattr(loop, what) in asked]
+    return found
+
+
+def loops_asked_for(
+    log: Log, axes: Iterable[str] | None = None, loops: Iterable[str] | None = None
+) -> int:
+    """How many times `latency` will estimate."""
+    return sum(len(list(_commands(loop))) for loop in _chosen(log, axes, loops))
+
+
+def _all_told(
+    log: Log, wanted: list[tuple[LogLoop, Command]], report: Callable[[str], object]
+) -> list[LoopLatency]:
+    """Each in a thread: the kernel computes beside the interpreter."""
+    pool = ThreadPoolExecutor(min(len(wanted), os.cpu_count() or 1) or 1)
+    try:
+        begun = [pool.submit(_told, log, loop, command) for loop, command in wanted]
+        found = []
+        for (loop, command), one in zip(wanted, begun, strict=True):
+            report(f"{loop.name} from its {command}")
+            found.append(one.result())
+        return found
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _commands(loop: LogLoop) -> Iterator[Command]:
+    yield "setpoint"
+    if loop.actuator is not None:
+        yield "actuator"
+
+
+def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
+    integrates = command == "actuator"
+    if not loop.segments:
+        why = "; ".join(loop.why_left_out) or "it is never followed"
+        return LoopLatency(loop.name, loop.axis, loop.kind, command, (), math.inf, None, why)
+    told = loop.signals[command]
+    between = between_rows(log, loop.kind, told)
+    windows = best_windows(loop, command, integrates, between)
+
+    def held(window: Window) -> Recording:
+        return loop.recording(window.start, window.stop, command=command, between="held")
+
+    return relation_of(
+        loop.name, loop.axis, loop.kind, command, integrates, windows, between,
+        held if between is None else None,
+    )  # fmt: skip
+
+
+def _of_recording(recording: Recording) -> Latency:
+    """A single recording: from its command, or from its reference where it has none."""
+    follows = recording.command is None
+    command: Command = "setpoint" if follows else "actuator"
+    told = recording
+    if follows:
+        told = Recording(
+            recording.time, recording.reference, recording.output,
+            command=recording.reference, units=recording.units, source=recording.source,
+        )  # fmt: skip
+    window = window_of(told, not follows)
+    one = relation_of(recording.source or "recording", "", "", command, not follows, [window])
+    return Latency(recording.source or "recording", "a recording", (one,))

@@ -1,0 +1,261 @@
+"""The time from a command of one loop to its response, estimated over its best windows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from deadtime._base.digits import between, stated
+from deadtime._base.errors import DeadtimeError, NotIdentifiableError
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.plain import plain
+from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.estimation._choose import bic
+from deadtime.loops import ControlLoop, FactoredPlant, P
+from deadtime.recordings import Recording
+from deadtime.reports.latencies._controller import Between
+from deadtime.reports.latencies._cost import GainCost, cost_of
+from deadtime.reports.latencies._windows import LONGEST, OF_A_ROW, Command, Window
+
+#: The second lag that is tried, as a share of the first.
+SECOND = 0.3
+
+#: Difference of BIC at which commands hold, or move, between rows, and what it may be worth
+#: otherwise, as a share of the 95 % interval.
+CLEARLY, WORTH = 6.0, 0.25
+
+#: What is before the reasons in the message of an estimate.
+NOT_ADEQUATE = "; not adequate: "
+
+#: What an estimate says whose plant has too few lags.
+LACKING = "a further lag of"
+
+#: Probability of such differences between windows, were they alike, at which they count as real,
+#: and half of a 95 % interval in standard errors.
+DIFFERENT, TWO_SIDED = 0.01, 1.96
+
+
+@dataclass(frozen=True, eq=False)
+class LoopLatency(ReadOnlyArrays):
+    """The time from a command of one loop to its response.
+
+    Attributes
+    ----------
+    loop, axis, kind : str
+        The loop, as in the log.
+    command : {"setpoint", "actuator"}
+        From what the time counts: the setpoint, with the loop closed, or what its controller
+        commands, which is the vehicle alone.
+    windows : tuple of (float, float)
+        Where it was estimated, s from the start of the log, the one that promises most first.
+    promise : float
+        Standard error of delay and lag together that the first window promises, s.
+    estimate : DelayEstimate or None
+        Gain, delay and one or two lags, over all windows together; None where it was refused.
+    refusal : str
+        Why there is no estimate; empty where there is one.
+    cost : GainCost or None
+        Gains of a proportional controller for the estimated vehicle.
+    between : {"held", "lines"} or None
+        Whether commands are known to hold between the rows of the log, or to move.
+    """
+
+    loop: str
+    axis: str
+    kind: str
+    command: Command
+    windows: tuple[tuple[float, float], ...]
+    promise: float
+    estimate: DelayEstimate | None
+    refusal: str = ""
+    cost: GainCost | None = None
+    between: Between | None = None
+
+    @property
+    def name(self) -> str:
+        """Such as ``"roll rate, setpoint to response"``."""
+        return f"{self.loop}, {self.command} to response"
+
+    def sum_of(self) -> tuple[float, float, tuple[float, float]]:
+        """Delay and lag together, the error that its interval amounts to, and that, s.
+
+        The interval is the 95 % one; the error a standard error, (high - low)/3.92.
+        """
+        if self.estimate is None:
+            raise ValueError(f"{self.name} was refused: {self.refusal}")
+        low, high = self.estimate.ci(0.95, "delay+lag")
+        return self.estimate.delay_plus_lag, (high - low) / (2.0 * TWO_SIDED), (low, high)
+
+    def headline(self) -> str:
+        """The time in one line."""
+        if self.estimate is None:
+            return f"{self.name}: refused, {self.refusal}"
+        value, error, (low, high) = self.sum_of()
+        doubt = "" if self.estimate.adequate else "; NOT ADEQUATE"
+        return (
+            f"{self.name}: {stated(value, error, 's')} "
+            f"(95 %: {between(low, high, error, 's')}){doubt}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The time as plain values for JSON."""
+        found: dict[str, Any] = plain(
+            {
+                "loop": self.loop,
+                "axis": self.axis,
+                "kind": self.kind,
+                "command": self.command,
+                "windows": self.windows,
+                "promise": self.promise,
+                "refusal": self.refusal,
+                "estimate": None if self.estimate is None else self.estimate.to_dict(),
+                "cost": None if self.cost is None else self.cost.to_dict(),
+            }
+        )
+        return found
+
+
+def relation_of(
+    loop: str,
+    axis: str,
+    kind: str,
+    command: Command,
+    integrates: bool,
+    windows: list[Window],
+    between: Between | None = None,
+    held: Callable[[Window], Recording] | None = None,
+) -> LoopLatency:
+    """Fit the plant of a loop to its windows, or say why that tells nothing.
+
+    Where it is not known whether commands hold or move between rows, `held` gives a window with
+    commands that hold; the likelier of the two is taken.
+    """
+    ends = tuple((one.start, one.stop) for one in windows)
+    told = [one for one in windows if one.tells]
+    promise = windows[0].promise if windows else float("inf")
+
+    def refused(why: str) -> LoopLatency:
+        return LoopLatency(loop, axis, kind, command, ends, promise, None, why)
+
+    if not windows:
+        return refused("it is never followed for long enough")
+    if not told:
+        return refused(_says_nothing(windows[0], command))
+    try:
+        fit = _fitted(told, integrates, held)
+    except DeadtimeError as error:
+        return refused(str(error).partition("; check ")[0])
+    if why := _no_answer(fit, told[0]):
+        return refused(why)
+    cost = None
+    if command == "actuator":
+        cost = cost_of(fit, told[0].recording)
+    ends = tuple((one.start, one.stop) for one in told)
+    return LoopLatency(loop, axis, kind, command, ends, promise, fit, "", cost, between)
+
+
+def _no_answer(fit: DelayEstimate, window: Window) -> str:
+    """Why the fit is no answer of a vehicle to this command; empty if it may be one."""
+    value, error = fit.delay_plus_lag, fit.stderr["delay+lag"]
+    if fit.gain is not None and fit.gain <= 0.0:
+        return f"the response moves against its command (gain {fit.gain:.3g})"
+    longest = LONGEST * (window.stop - window.start)
+    if value > longest:
+        return (
+            f"delay and lag together come out as {stated(value, error, 's')}, longer than the "
+            f"{longest:.3g} s that a window of {window.stop - window.start:.3g} s can tell"
+        )
+    if not np.isfinite(error) or error > max(value, OF_A_ROW * window.recording.sample_time):
+        return f"delay and lag together come out as {stated(value, error, 's')}: that says nothing"
+    return ""
+
+
+def _says_nothing(window: Window, command: str) -> str:
+    """Why the best window of a loop says nothing."""
+    if not np.isfinite(window.promise):
+        return f"the {command} does not move"
+    share = f"{100.0 * window.explained:.0f} % of the response follows the {command}"
+    promise = stated(window.time, window.promise, "s")
+    return f"too little moves: even in the best window {share}, which promises {promise}"
+
+
+def _fitted(
+    windows: list[Window], integrates: bool, held: Callable[[Window], Recording] | None
+) -> DelayEstimate:
+    """The plant that fits all windows, or the first of them where they contradict one another."""
+    first = max(0.5 * windows[0].time, windows[0].recording.sample_time)
+
+    def tried(parts: list[Recording], lags: tuple[float, ...]) -> DelayEstimate:
+        plant = FactoredPlant(lags, integrator=integrates)
+        names = ["delay", *(name for name in plant.parameters if name != "zero")]
+        loop = ControlLoop(plant, P(1.0))
+        return estimate_delay(parts, loop, method="output_error", free=names)
+
+    alone = [tried([windows[0].recording], (first,))]
+    parts, doubt = [one.recording for one in windows], ""
+    if held is not None:
+        still = tried([held(windows[0])], (first,))
+        better = bic(alone[0]) - bic(still)
+        if abs(better) < CLEARLY:
+            doubt = _either(alone[0], still)
+        if better > 0.0:
+            alone, parts = [still], [held(one) for one in windows]
+    for part in parts[1:]:
+        # A further part that tells nothing by itself is left out.
+        with suppress(NotIdentifiableError):
+            alone.append(tried([part], (first,)))
+    if why := doubt or _contradiction(alone):
+        return _doubted(alone[0], why)
+    used = [fit.recording for fit in alone]
+    fit = alone[0] if len(alone) == 1 else tried(used, (first,))
+    if fit.adequate or LACKING not in fit.message:
+        return fit
+    try:
+        more = tried(used, (first, SECOND * first))
+    except NotIdentifiableError:
+        return fit
+    return more if more.adequate or bic(more) < bic(fit) else fit
+
+
+def _doubted(fit: DelayEstimate, why: str) -> DelayEstimate:
+    """The estimate as one that is not adequate, for this reason."""
+    known = NOT_ADEQUATE in fit.message
+    message = f"{fit.message}{'; ' if known else NOT_ADEQUATE}{why}"
+    return replace(fit, adequate=False, message=message)
+
+
+def _either(moving: DelayEstimate, still: DelayEstimate) -> str:
+    """What it is worth that commands hold or move between rows; empty if next to nothing."""
+    apart = abs(moving.delay_plus_lag - still.delay_plus_lag)
+    low, high = moving.ci(0.95, "delay+lag")
+    if apart < WORTH * (high - low):
+        return ""
+    return (
+        "the log does not tell whether commands hold or move between its rows, which is worth "
+        f"{stated(apart, 0.0, 's')}"
+    )
+
+
+def _contradiction(fits: list[DelayEstimate]) -> str:
+    """In which way the sums of delay and lag from several windows differ; empty if they agree.
+
+    The homogeneity test of Cochran (1954): Q = sum of ((s_i - mean)/stderr_i)^2 is chi-squared.
+    """
+    from scipy import special
+
+    ends = np.array([fit.ci(0.95, "delay+lag") for fit in fits])
+    sums = np.array([fit.delay_plus_lag for fit in fits])
+    errors = np.maximum((ends[:, 1] - ends[:, 0]) / (2.0 * TWO_SIDED), 1e-12)
+    weights = errors**-2.0
+    mean = float(weights @ sums / weights.sum())
+    square = float(np.sum(((sums - mean) / errors) ** 2))
+    if len(fits) < 2 or special.chdtrc(len(fits) - 1, square) > DIFFERENT:
+        return ""
+    shown = ", ".join(
+        stated(s, e, "s") for s, e in zip(sums.tolist(), errors.tolist(), strict=True)
+    )
+    return f"the windows contradict one another: {shown}"

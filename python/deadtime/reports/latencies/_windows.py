@@ -1,0 +1,184 @@
+"""The windows of a loop that promise the most about its delay.
+
+In a window of length L the response y is compared with that of a plant with few numbers: gain,
+offset, trim, and a delay T that stands for delay and lag. The Cramér-Rao bound of T for residuals
+of variance v is
+
+    std(T) >= sqrt(v c / sum(d_i^2)),
+
+d the slope of the response with what gain, offset and trim explain taken out, and
+c = (1 + rho)/(1 - rho) for residuals of lag-1 autocorrelation rho, which are worth fewer rows.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.estimation.models._held import HeldResponse
+from deadtime.recordings import LogLoop, Recording
+from deadtime.reports.latencies._controller import Between
+
+Array = NDArray[np.float64]
+
+#: What is followed: the setpoint of the loop, or what its controller commands.
+Command: TypeAlias = Literal["setpoint", "actuator"]
+
+#: Length of a window, s, for each kind of loop, and its fewest and most rows.
+LENGTHS = {"rate": 4.0, "attitude": 8.0, "velocity": 12.0, "position": 20.0}
+FEWEST, MOST = 24, 6000
+
+#: Shares of that length that are tried, and of its own by which one window comes after another.
+SIZES, SHIFT = (1.0, 0.5), 0.5
+
+#: Delays and lags that are tried, in rows.
+TRIED = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+
+#: Longest time from command to response, as a share of the window.
+LONGEST = 0.2
+
+#: Further windows that are used with the best, and by how much less they may promise.
+FURTHER, LESS = 2, 3.0
+
+#: A window says something if it promises the time to this share of itself, or of a row.
+SHARE, OF_A_ROW = 0.5, 2.0
+
+#: Size of a response, as a share of the command, that is rounding.
+TINY = 1e-12
+
+#: Share of the variance of the response that a command has to explain, beyond what noise would.
+EXPLAINED = 0.1
+
+
+class Window(NamedTuple):
+    """A part of a loop's recording.
+
+    Attributes
+    ----------
+    start, stop : float
+        s from the start of the log.
+    recording : Recording
+        The part.
+    promise : float
+        Standard error of the time from command to response that the part promises, s.
+    time : float
+        That time, roughly, s.
+    explained : float
+        Share of the variance of the response that the command explains.
+    """
+
+    start: float
+    stop: float
+    recording: Recording
+    promise: float
+    time: float
+    explained: float
+
+    @property
+    def tells(self) -> bool:
+        """Whether the window says anything about the time."""
+        row = self.recording.sample_time
+        return self.explained > EXPLAINED and self.promise < max(SHARE * self.time, OF_A_ROW * row)
+
+
+class _Shape(NamedTuple):
+    """The best of the tried responses: sum of squares left, time, gain, residuals, slope."""
+
+    square: float
+    time: float
+    gain: float
+    left: Array
+    turn: Array
+
+
+def best_windows(
+    loop: LogLoop, command: Command, integrates: bool, between: Between | None
+) -> list[Window]:
+    """The windows to fit, the one that promises most first; none where no row is left."""
+    found = [_seen(part, integrates) for part in _parts(loop, command, between)]
+    found.sort(key=lambda one: one.promise if one.tells else np.inf)
+    chosen: list[Window] = found[:1]
+    for one in found[1:]:
+        apart = all(one.stop <= other.start or one.start >= other.stop for other in chosen)
+        if apart and one.tells and one.promise < LESS * chosen[0].promise:
+            chosen.append(one)
+        if len(chosen) > FURTHER:
+            break
+    return chosen
+
+
+def window_of(recording: Recording, integrates: bool) -> Window:
+    """A whole recording as a window."""
+    return _seen(recording, integrates)
+
+
+def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Recording]:
+    """Parts of the segments of a loop, as long as its kind asks for, half over one another."""
+    longest = min(LENGTHS[loop.kind], MOST * loop.response.period)
+    parts = []
+    for (start, stop), length in product(loop.segments, [size * longest for size in SIZES]):
+        shift = SHIFT * length
+        count = max(1, int(np.floor((stop - start - length) / shift + 1e-9)) + 1)
+        for k in range(count):
+            low = start + k * shift
+            # The last part of a segment takes what is left of it.
+            high = stop if k == count - 1 and stop - low < length + shift else low + length
+            inside = np.isfinite(loop.response.values) & (
+                (loop.response.time >= low) & (loop.response.time <= high)
+            )
+            if np.count_nonzero(inside) >= FEWEST:
+                parts.append(loop.recording(low, high, command=command, between=between))
+    return parts
+
+
+def _seen(part: Recording, integrates: bool) -> Window:
+    """What a part says about the time from command to response."""
+    time, output = part.time, part.output
+    if part.sent is not None:
+        response = HeldResponse(*part.sent)
+    else:
+        told = part.reference if part.command is None else part.command
+        response = HeldResponse(time, told)
+    row = part.sample_time
+    trend = np.stack([np.ones(time.size), time - time.mean()], axis=1)
+    trend, _ = np.linalg.qr(trend)
+
+    def without(basis: Array, values: Array) -> Array:
+        return np.asarray(values - basis @ (basis.T @ values))
+
+    moved = without(trend, output)
+    power = float(moved @ moved)
+    best = _Shape(np.inf, 0.0, 0.0, moved, moved)
+    for delay, lag in product(TRIED, TRIED):
+        if not 0.0 < (delay + lag) * row < LONGEST * (time[-1] - time[0]):
+            continue
+        path = response.at(time - delay * row, lag * row)
+        shape = without(trend, path.value if integrates else path.rate)
+        size = float(np.linalg.norm(shape))
+        if size <= TINY * (1.0 + float(np.max(np.abs(path.rate)))):
+            continue
+        unit = shape / size
+        gain = float(unit @ moved)
+        left = moved - gain * unit
+        if float(left @ left) < best.square:
+            slope = path.rate
+            if not integrates:
+                ahead, behind = (
+                    response.at(time - (delay + half) * row, lag * row).rate for half in (0.5, -0.5)
+                )
+                slope = (behind - ahead) / row
+            turn = without(trend, slope) * (gain / size)
+            turn -= unit * float(unit @ turn)
+            best = _Shape(float(left @ left), (delay + lag) * row, gain / size, left, turn)
+    ends = float(time[0]), float(time[-1])
+    if best.gain == 0.0 or power == 0.0:
+        return Window(*ends, part, np.inf, 0.0, 0.0)
+    left, turn = best.left, best.turn
+    rho = float(np.clip((left[1:] @ left[:-1]) / max(best.square, 1e-300), 0.0, 0.999))
+    variance = best.square / time.size * (1.0 + rho) / (1.0 - rho)
+    information = float(turn @ turn)
+    promise = np.sqrt(variance / information) if information > 0.0 else np.inf
+    return Window(*ends, part, float(promise), best.time, 1.0 - best.square / power)

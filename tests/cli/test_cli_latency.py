@@ -1,0 +1,39 @@
+"""``deadtime latency``: how long the loops in a log take, as text, as JSON and as a page."""
+
+import pytest
+from command_line import found, one_clear_line, run
+from made_logs import flown_copter
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "flight.bin"
+    path.write_bytes(flown_copter(seconds=5.0).data)
+    return path
+
+
+def test_text_and_page(log, monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", "200")
+    result = run("latency", log, "--out", tmp_path / "page.html")
+    assert result.returncode == 0, result.stderr
+    first, headline, *_ = result.stdout.splitlines()
+    assert first.startswith("flight.bin: ArduPilot Copter")
+    assert headline.startswith("roll rate, ")
+    assert " ms (95 %: " in headline
+    assert "gyro low-pass: 11.25 ms (INS_GYRO_FILTER 20)" in result.stdout
+    assert (tmp_path / "page.html").stat().st_size > 10_000
+
+
+def test_json_and_two_logs(log):
+    told = found("latency", log, "--loop", "roll rate")
+    assert [one["command"] for one in told["loops"]] == ["setpoint", "actuator"]
+    told = found("latency", log, log)
+    assert len(told["logs"]) == 2
+    assert all(one["change"] == 0.0 for one in told["changes"])
+    assert "flight.bin" in run("latency", log, log).stdout
+
+
+def test_what_is_wrong_is_one_line(log, tmp_path):
+    assert "no loop with the axis 'yaw'" in one_clear_line(run("latency", log, "--axis", "yaw"))
+    assert "give one, or two" in one_clear_line(run("latency", log, log, log))
+    assert "page of one log" in one_clear_line(run("latency", log, log, "--out", "page.html"))

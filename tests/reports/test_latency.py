@@ -1,0 +1,201 @@
+"""The latency report, on logs with known truth and on recorded flights."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime._base.digits import between, rounded, stated
+from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
+from flights import flight_path
+from hypothesis import given
+from hypothesis import strategies as st
+from made_logs import DELAY, GAIN, LAG, flown_copter
+from scipy import signal
+
+
+def log_of(folder, **options):
+    path = folder / "flight.bin"
+    path.write_bytes(flown_copter(**options).data)
+    return dtm.open_log(path)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    return dtm.latency(log_of(tmp_path_factory.mktemp("log")))
+
+
+def test_the_vehicle_is_told_from_its_own_log(found):
+    one = found.loop("roll rate", "actuator")
+    value, error, (low, high) = one.sum_of()
+    assert low < DELAY + LAG < high
+    assert error < 2e-3
+    assert one.estimate.adequate
+    low, high = one.estimate.ci(0.95, "gain")
+    assert low < GAIN < high
+    assert value == one.estimate.delay_plus_lag
+    assert found.headline() == one.headline()
+
+
+def test_the_cost_in_gain_holds_that_of_the_true_vehicle(found):
+    cost = found.loop("roll rate", "actuator").cost
+    true = dtm.ControlLoop(dtm.Integrator(GAIN, LAG), dtm.P(0.9), delay=DELAY)
+    largest = dtm.tuning.critical_gain(true)
+    assert cost.largest_ci[0] < largest < cost.largest_ci[1]
+    assert cost.flown == pytest.approx(0.9, rel=1e-3)
+    assert cost.delay_margin == pytest.approx(true.margin().delay_margin, rel=0.15)
+    # The gain of a sensitivity peak of 1.7, from its definition.
+    omega = np.geomspace(0.1, 1e3, 20_000)
+    vehicle = found.loop("roll rate", "actuator").estimate.loop
+    G = vehicle.plant.transfer_function().frequency_response(omega)
+    G = np.ravel(G) * np.exp(-1j * omega * vehicle.delay)
+    assert np.max(1.0 / np.abs(1.0 + cost.well_damped * G)) == pytest.approx(1.7, rel=1e-3)
+
+
+def test_the_stages_add_up(found):
+    stages = found.stages["roll rate"]
+    whole = next(one for one in stages if one.name == "controller's command to response")
+    parts = [one.time for one in stages if one.part]
+    assert sum(parts) == pytest.approx(whole.time)
+    names = [one.name for one in stages]
+    assert "gyro low-pass" in names
+    assert "half a period of the controller" not in names  # each command is in the log
+    gyro = stages[names.index("gyro low-pass")]
+    assert gyro.time == pytest.approx(np.sqrt(2.0) / (2.0 * np.pi * 20.0))
+    assert gyro.source == "INS_GYRO_FILTER 20"
+
+
+def test_summary_dict_and_page(found, tmp_path):
+    text = found.summary()
+    assert "roll rate, actuator to response" in text
+    assert "a proportional gain is stable up to" in text
+    told = found.to_dict()
+    assert told["loops"][0]["loop"] == "roll rate"
+    assert told["filters"][0]["source"] == "INS_GYRO_FILTER 20"
+    page = found.report(tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 1 + len(found.estimated)
+    assert "src=" not in page
+    assert "<link" not in page
+    assert found.plot().axes[0].get_xlabel().endswith("[ms]")
+
+
+def test_without_excitation_every_loop_is_refused_by_name(tmp_path):
+    still = dtm.latency(log_of(tmp_path, steps=False, seconds=6.0))
+    assert still.estimated == ()
+    for one in still.loops:
+        assert one.refusal
+        assert f"{one.name}: {one.refusal}" in still.summary()
+    assert "no loop in it tells" in still.headline()
+    with pytest.raises(ValueError, match="no loop tells how long"):
+        still.plot()
+
+
+def test_a_longer_delay_is_seen_as_a_real_change(found, tmp_path):
+    later = dtm.latency(log_of(tmp_path, delay=DELAY + 0.010, seed=6))
+    changes = dtm.reports.compare_latencies(found, later)
+    one = next(one for one in changes if one.command == "actuator")
+    assert one.ci[0] < 0.010 < one.ci[1]
+    assert one.verdict.startswith("really longer")
+    again = dtm.latency(log_of(tmp_path, seed=7))
+    changes = dtm.reports.compare_latencies(found, again)
+    one = next(one for one in changes if one.command == "actuator")
+    assert one.ci[0] < 0.0 < one.ci[1]
+    assert one.to_dict()["verdict"].startswith("no difference is seen")
+
+
+def test_only_what_is_asked_for(tmp_path):
+    log = log_of(tmp_path, seconds=4.0)
+    begun = []
+    found = dtm.latency(log, axes=("roll",), progress=begun.append)
+    assert {one.axis for one in found.loops} == {"roll"}
+    assert begun == ["roll rate from its setpoint", "roll rate from its actuator"]
+    with pytest.raises(ValueError, match="no loop with the axis 'yaw', it has roll"):
+        dtm.latency(log, axes="yaw")
+    with pytest.raises(ValueError, match="no time of 'yaw rate' from its setpoint"):
+        found.loop("yaw rate")
+
+
+def test_logs_that_never_fly_are_refused():
+    pytest.importorskip("pyulog", reason="pyulog reads ULog files")
+    found = dtm.latency(flight_path("px4_sample.ulg"))
+    assert found.loops
+    assert all("disarmed" in one.refusal for one in found.loops)
+
+
+def test_a_recorded_rate_sweep():
+    flight = dtm.read_recording(
+        flight_path("px4_sitl_roll_rate_sweep.csv"),
+        time="t_s",
+        reference="roll_torque_setpoint",
+        output="roll_rate_rad_s",
+        command="roll_torque_setpoint",
+    )
+    # Every fourth second has all that a test needs of the time.
+    (one,) = dtm.latency(flight.window(4.0, 16.0)).loops
+    value, _, _ = one.sum_of()
+    assert 0.016 <= value <= 0.0205  # with half of a hold of 4 ms
+
+
+def test_a_recorded_flight_is_right_or_says_that_it_is_not():
+    found = dtm.latency(flight_path("arducopter_2014-10-18_21-19-07.bin"), loops=("roll", "pitch"))
+    for name, low, high in (("roll", 0.2, 0.32), ("pitch", 0.15, 0.32)):
+        one = found.loop(name)
+        value, _, _ = one.sum_of()
+        assert low < value < high
+        assert not one.estimate.adequate
+
+
+#: Centre of a notch of 120 Hz, rad/s.
+W0 = 2.0 * np.pi * 120.0
+
+# --- filters --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("delay", "num", "den"),
+    [
+        (one_pole(20.0), [1.0], [1.0 / (2.0 * np.pi * 20.0), 1.0]),
+        (two_poles(30.0), *signal.butter(2, 2.0 * np.pi * 30.0, analog=True)),
+        (notch(120.0, 4.0), [1.0, 0.0, W0**2], [1.0, W0 / 4.0, W0**2]),
+    ],
+)
+def test_delays_of_filters_are_their_group_delays(delay, num, den):
+    omega = np.array([1e-3, 2e-3])
+    _, response = signal.freqs(num, den, omega)
+    found = -np.diff(np.unwrap(np.angle(response)))[0] / 1e-3
+    assert delay == pytest.approx(found, rel=1e-4)
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_poles_in_a_row_have_their_corner_together(number):
+    corner = 70.0
+    own = number / (2.0 * np.pi * poles_in_row(number, corner))
+    assert abs(1.0 / (1.0 + 1j * corner / own)) ** number == pytest.approx(np.sqrt(0.5))
+
+
+# --- digits ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "text"),
+    [
+        (0.00342, 0.00005, "s", "3.42 ± 0.05 ms"),
+        (0.4302, 0.0151, "s", "430 ± 15 ms"),
+        (1.0, 0.0299, "", "1.00 ± 0.03"),
+        (0.999, 0.0951, "", "1.00 ± 0.10"),
+        (12345.6, 2100.0, "", "12300 ± 2100"),
+        (0.0, 0.0, "s", "0 ms"),
+        (2.0, float("nan"), "m", "2 m"),
+        (1.5, 0.2, "s", "1.50 ± 0.20 s"),
+    ],
+)
+def test_numbers_have_the_digits_of_their_error(value, error, unit, text):
+    assert stated(value, error, unit) == text
+
+
+def test_ends_of_an_interval_have_them_too():
+    assert between(0.003312, 0.003529, 0.00005, "s") == "3.31 to 3.53 ms"
+    assert between(0.0, 0.0, 0.0, "s") == "0 to 0 ms"
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6))
+def test_what_is_left_out_is_less_than_the_error(value, error):
+    assert abs(float(rounded(value, error)) - value) <= 0.25 * error + 1e-11
