@@ -20,6 +20,10 @@ Run ``python benches/estimation.py --reality [--runs N] [--rows NAME,NAME] [--fr
 air, lost rows, wrong clocks and other properties of real flights, from a generator that does not
 use the package (`reality`).
 
+Run ``python benches/estimation.py --reality --oracle [--unknown-noise] [--runs N]
+[--rows NAME,NAME] [--quick]`` for the rows that have a bound: estimates by one who knows the
+process that made them, beside ours on the same runs (`reality.oracle`).
+
 Run ``python benches/estimation.py --designs [--runs N] [--quick]`` to design gains from such
 estimates, 200 a row, and to print the gain margin of the true loop beside the demanded one.
 
@@ -50,6 +54,7 @@ from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Wavefor
 from deadtime.estimation._estimate import METHODS
 from reality import firmware
 from reality.designs import print_designs
+from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
 
 SAMPLE = 0.065
@@ -469,6 +474,10 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     reality = parser.add_argument_group("recordings like those of real flights")
     reality.add_argument("--reality", action="store_true", help="print their table alone")
+    reality.add_argument("--oracle", action="store_true", help="compare with an oracle instead")
+    reality.add_argument(
+        "--unknown-noise", action="store_true", help="the oracle does not know the sizes of noise"
+    )
     reality.add_argument("--rows", default="", help="only the rows of these names")
     reality.add_argument("--free", help="fit in every row: delay,gain or delay,gain,lag")
     reality.add_argument("--json", type=Path, help="write the numbers of the rows to this file")
@@ -487,12 +496,15 @@ def main() -> None:
         print_designs(given.runs or (1 if given.quick else 200), given.processes)
         return
     if given.reality:
-        runs = given.runs or (2 if given.quick else 1000)
+        runs = given.runs or (2 if given.quick else 300 if given.oracle else 1000)
         try:
             conditions = chosen(given.rows.split(",") if given.rows else [])
             free = free_of(given.free) if given.free else None
         except ValueError as error:
             parser.error(str(error))
+        if given.oracle:
+            print_oracle(conditions, runs, given.unknown_noise, given.processes)
+            return
         print_table(conditions, runs, free, given.processes, given.json)
         return
     compare_methods(given)

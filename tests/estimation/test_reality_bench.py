@@ -13,7 +13,7 @@ import pytest
 BENCHES = Path(__file__).resolve().parents[2] / "benches"
 sys.path.append(str(BENCHES))
 
-from reality import bound, table  # noqa: E402
+from reality import bound, oracle, table  # noqa: E402
 from reality.conditions import CONDITIONS, LIMIT, MAY_REFUSE, SAMPLE, Condition  # noqa: E402
 from reality.generator import air_response, ramp, record  # noqa: E402
 
@@ -26,7 +26,7 @@ def test_names_differ_because_they_are_seeds():
 
 
 def test_the_generator_does_not_use_the_package():
-    for name in ("generator", "conditions", "bound"):
+    for name in ("generator", "conditions", "bound", "oracle"):
         tree = ast.parse((BENCHES / "reality" / f"{name}.py").read_text(encoding="utf-8"))
         used = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
         used += [one.name for n in ast.walk(tree) if isinstance(n, ast.Import) for one in n.names]
@@ -283,3 +283,41 @@ def test_every_condition_is_estimated():
 def test_ramp_is_continuous_in_its_lags():
     age = np.linspace(-1.0, 3.0, 9)
     np.testing.assert_allclose(ramp(age, (0.1, 1e-9)), ramp(age, (0.1,)), atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "unknown"),
+    [
+        ("white", False),
+        ("hole of 1 s", False),
+        ("half rate", False),
+        ("quantised 1 cm", False),
+        ("trim -0.02", False),
+        ("lag free white", False),
+        ("sensor AR 0.9", True),
+    ],
+)
+def test_the_oracle_is_near_the_bound(name, unknown):
+    found = oracle.oracle_estimate(NAMED[name], 0, unknown)
+    assert abs(found.errors[0]) < 4.0 * found.bounds[0]
+    assert abs(found.errors[2]) < 4.0 * found.bounds[1]
+
+
+def test_the_likelihood_of_rounded_rows_has_the_derivative_of_its_difference_quotient():
+    condition, random = NAMED["quantised 1 cm"], np.random.default_rng(0)
+    mean = random.normal(0.0, 0.03, 40)
+    rounded = condition.quantum * np.round(mean / condition.quantum)
+    rounded[::7] += condition.quantum  # improbable rows, beyond the half of a step
+    _, slope = oracle.rounded_likelihood(condition, rounded, mean)
+    for i, step in enumerate(1e-7 * np.eye(40)):
+        up, down = (
+            oracle.rounded_likelihood(condition, rounded, mean + s)[0] for s in (step, -step)
+        )
+        assert slope[i] == pytest.approx((up - down) / 2e-7, rel=1e-5, abs=1e-3)
+
+
+def test_the_oracle_tries_each_sample_at_which_the_reference_may_have_changed():
+    condition = replace(NAMED["white"], every=2)
+    counts = {len(list(oracle.references(record(condition, number)))) for number in range(6)}
+    assert counts == {2}
+    assert len(list(oracle.references(record(NAMED["white"], 0)))) == 1

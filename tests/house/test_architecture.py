@@ -38,6 +38,7 @@ NUMERICS = {"special", "dde", "roots", "systems", "loops", "stability"}
 LIKELIHOOD = {
     "estimation.likelihood._adequacy",
     "estimation.likelihood._air_at_rest",
+    "estimation.likelihood._lost_commands",
     "estimation.likelihood._power",
     "estimation.likelihood._profile",
     "estimation.likelihood._search",

@@ -15,6 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+#: Excess of the variance of Q over that of chi-squared, in lags over rows, by simulation: without
+#: it, the 1 % level calls 2.5 % of white residuals of 120 rows coloured.
+EXCESS = 1.6
+
 #: Significance level of the whiteness test: this share of white residuals is called coloured.
 SIGNIFICANCE = 0.01
 
@@ -59,7 +63,7 @@ def whiteness_of(
     """
     from scipy import special
 
-    statistic, freedom, first, weight = 0.0, -parameters, 0.0, 0.0
+    statistic, freedom, first, weight, excess = 0.0, -parameters, 0.0, 0.0, 0.0
     longest = 1
     for piece in pieces_of(residuals, sizes):
         n = piece.size
@@ -67,12 +71,16 @@ def whiteness_of(
         power = float(centred @ centred)
         lags = max(1, min(20, n // 4))
         longest, freedom = max(longest, lags), freedom + lags
+        excess += EXCESS * lags**2 / n
         if power == 0.0:
             continue
         rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
         statistic += float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
         first, weight = first + n * float(rho[0]), weight + n
-    p_value = float(special.chdtrc(max(1, freedom), statistic))
+    # A multiple of chi-squared with that mean and variance.
+    freedom = max(1, freedom)
+    wider = 1.0 + excess / freedom
+    p_value = float(special.chdtrc(freedom / wider, statistic / wider))
     return Whiteness(statistic, p_value, longest, first / weight if weight else 0.0)
 
 

@@ -81,7 +81,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
     fit = profile.fit
     used = [rows.used for rows in fit.runs]
     whitened = [part.whitened[mask] for part, mask in zip(fit.parts, used, strict=True)]
-    whiteness = whiteness_of(np.concatenate(whitened), numbers, [piece.size for piece in whitened])
+    whiteness = whiteness_of(np.concatenate(whitened), 0, [piece.size for piece in whitened])
     reasons = []
     if not whiteness.white and not all(
         rounding_explains(part.residuals[mask], rows)

@@ -34,7 +34,7 @@ HOLE = 3
 SHARED = 2.0
 
 #: Lengths in rows over which neighbours are averaged, and the farthest neighbour.
-LENGTHS, REACH = (0.3, 0.7, 1.5, 3.0, 6.0), 20
+LENGTHS, REACH = (0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 24.0), 48
 
 #: Most unknown commands, as a share of the rows; the longest gaps come first.
 MOST_UNKNOWN = 0.1
@@ -43,7 +43,7 @@ MOST_UNKNOWN = 0.1
 ALIKE = 0.2
 
 #: Change of the commands, as a share of their range, at which that has settled.
-SETTLED = 1e-6
+SETTLED = 1e-5
 
 #: Rounds of predicting the output of a plant and computing the commands from it.
 ROUNDS = 6
@@ -81,6 +81,7 @@ def with_missing(
     command: Array,
     predicted: Predicted | None = None,
     step: int | None = None,
+    shared: float | None = None,
 ) -> HeldCommands:
     """The commands of all samples of the controller, from those of the first rows.
 
@@ -94,6 +95,9 @@ def with_missing(
     step : int, optional
         After how many missing samples the reference changes, where it changes between rows that
         are further apart than samples. If not given, the mean command there is unknown.
+    shared : float, optional
+        Error of the predicted output that many missing rows share, in deviations of the white
+        noise. If not given, their mean command is unknown besides.
     """
     time = recording.time[: command.size]
     plain = HeldCommands(time, command)
@@ -107,12 +111,21 @@ def with_missing(
     if not gaps.size:
         return plain
     law = _law(recording, loop, command)
-    times, commands, ambiguous, steps = [], [], [], 1
+    commands, ambiguous, steps = [], [], 1
     computed: list[tuple[float, float, float]] = []
-    for gap in gaps:
-        count = int(whole[gap]) - 1
-        share = np.arange(1, count + 1) / (count + 1)
-        at = time[gap] + share * (time[gap + 1] - time[gap])
+    counts = whole[gaps].astype(int) - 1
+    shares = [np.arange(1, count + 1) / (count + 1) for count in counts]
+    places = [
+        time[gap] + share * (time[gap + 1] - time[gap])
+        for gap, share in zip(gaps, shares, strict=True)
+    ]
+    outputs = np.interp(np.concatenate(places), time, recording.output[: time.size])
+    if predicted is not None:
+        outputs = predicted(np.concatenate(places))
+    between = np.split(outputs, np.cumsum(counts)[:-1])
+    error = SHARED if shared is None else shared
+    for gap, at, output in zip(gaps, places, between, strict=True):
+        count = at.size
         before, after = recording.reference[gap], recording.reference[gap + 1]
         ends = (float(at[0]), float(time[gap + 1]))
         known = law is not None and (before == after or step is not None)
@@ -120,27 +133,24 @@ def with_missing(
             sent = np.full(count, 0.5 * (command[gap] + command[gap + 1]))
         else:
             reference = np.where(np.arange(count) < (step or 0), before, after)
-            outputs = recording.output[gap : gap + 2]
-            line = outputs[0] + share * (outputs[1] - outputs[0])
-            sent = law(reference, line if predicted is None else predicted(at))
+            sent = law(reference, output)
             if before != after:
                 steps = max(steps, count + 1)
-        times.append(at)
         commands.append(sent)
         until = np.append(at[1:], time[gap + 1])
         slopes = _slopes(loop, sent)
         computed += zip(at.tolist(), until.tolist(), slopes.tolist(), strict=True)
         if count >= HOLE:
-            # The plant that predicts the output has errors too, which all these commands share.
+            # The output that is predicted has errors too, which all these commands share.
             free = at[slopes > 0.0]
             if free.size:
-                computed.append((float(free[0]), ends[1], SHARED * float(slopes.max())))
-        if not known or count >= HOLE:
+                computed.append((float(free[0]), ends[1], error * float(slopes.max())))
+        if not known or (count >= HOLE and shared is None):
             ambiguous.append((count, ends))
     ambiguous.sort(key=lambda pair: -pair[0])
     most = max(1, int(MOST_UNKNOWN * time.size))
     unknown = tuple(sorted(ends for _, ends in ambiguous[:most]))
-    every = np.concatenate([time, *times])
+    every = np.concatenate([time, *places])
     order = np.argsort(every, kind="stable")
     values = np.concatenate([command, *commands])
     return HeldCommands(every[order], values[order], unknown, tuple(computed), steps)
@@ -153,9 +163,12 @@ def _slopes(loop: ControlLoop, sent: Array) -> Array:
     return np.where(np.abs(sent) < limit, gain, 0.0)
 
 
-def smoothed(values: Array) -> Array:
-    """Weighted means of neighbours, over the length that predicts each value best from the rest."""
-    best, least = values, math.inf
+def smoothed(values: Array) -> tuple[Array, float]:
+    """Weighted means of neighbours, and their deviation by white noise of one.
+
+    They are over the length that predicts each value best from the rest.
+    """
+    best, least, error_of_best = values, math.inf, 1.0
     offsets = np.arange(-REACH, REACH + 1)
     inside = np.ones(values.size)
     for length in LENGTHS:
@@ -166,7 +179,10 @@ def smoothed(values: Array) -> Array:
         error = float(np.median(np.abs(values - sums / shares)))
         if error < least:
             least, best = error, (sums + values) / (shares + 1.0)
-    return np.asarray(best)
+            # At an end, as beside a hole, there are neighbours on one side.
+            half = weights[REACH + 1 :]
+            error_of_best = math.sqrt(1.0 + half @ half) / (1.0 + float(half.sum()))
+    return np.asarray(best), error_of_best
 
 
 def _law(
@@ -186,7 +202,12 @@ def _law(
 
 
 def predicted_commands(
-    recording: Recording, loop: ControlLoop, command: Array, first: HeldCommands, step: int | None
+    recording: Recording,
+    loop: ControlLoop,
+    command: Array,
+    first: HeldCommands,
+    step: int | None,
+    unsure: bool = True,
 ) -> HeldCommands:
     """Commands between rows from the output that `loop` predicts there, starting from `first`."""
     commands = first
@@ -199,12 +220,12 @@ def predicted_commands(
         def modelled(times: Array, path: Path = path) -> Array:
             return np.asarray(known["gain"] * path.value(times - known["delay"], known))
 
-        left = smoothed(output - modelled(time))
+        left, error = smoothed(output - modelled(time))
 
         def predicted(times: Array, left: Array = left, modelled: Predicted = modelled) -> Array:
             return modelled(times) + np.interp(times, time, left)
 
-        again = with_missing(recording, loop, command, predicted, step)
+        again = with_missing(recording, loop, command, predicted, step, None if unsure else error)
         moved = float(np.max(np.abs(again.command - commands.command)))
         commands = again
         if moved <= SETTLED * float(np.ptp(command)):

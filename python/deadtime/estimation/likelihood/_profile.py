@@ -86,11 +86,15 @@ class LikelihoodProfile:
         """Rows less unknowns of the mean."""
         return sum(part.freedom for part in self.fit.parts)
 
+    @property
+    def common(self) -> Array:
+        """Covariance of the common numbers, for the fitted noise."""
+        return common_covariance(self.fit)
+
     @cached_property
     def bounds(self) -> dict[str, float]:
         """Standard errors for the fitted noise."""
-        cov = common_covariance(self.fit)
-        squares = {name: float(w @ cov @ w) for name, w in self._weights.items()}
+        squares = {name: float(w @ self.common @ w) for name, w in self._weights.items()}
         if not all(square > 0.0 for square in squares.values()):
             raise NotIdentifiableError(
                 f"{', '.join(self.fit.model.names)} cannot be told apart by this recording: give "
@@ -150,14 +154,17 @@ class LikelihoodProfile:
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
         """Ends of the interval around the fitted `value`; long recordings: from the curvature."""
         if is_long(self.fit.runs):
-            reach = self._quantile(name, level) * self.stderr[name]
-            low = value - reach
-            return low if self.names[name] == "gain" else max(0.0, low), value + reach
+            return self._from_curvature(name, value, level)
         key = (name, level)
         if key not in self._ends:
             self._ends[key], _ = self.ends(name, level)
         low, high = self._ends[key]
         return low + self._outside(name), high + self._outside(name)
+
+    def _from_curvature(self, name: str, value: float, level: float) -> tuple[float, float]:
+        reach = self._quantile(name, level) * self.stderr[name]
+        low = value - reach
+        return low if self.names[name] == "gain" else max(0.0, low), value + reach
 
     def _outside(self, name: str) -> float:
         """What a sum of times holds besides the numbers of the kernel, s."""

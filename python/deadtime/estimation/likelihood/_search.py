@@ -182,12 +182,15 @@ class NoiseFit:
     trim : bool
         Whether there is a constant input besides the command.
     numbers : PlantNumbers
+    given_gain : float, optional
+        The gain, where it is not that of least squares on the rows of one recording.
     """
 
     model: PlantModel
     runs: tuple[FlightRows, ...]
     trim: bool
     numbers: PlantNumbers
+    given_gain: float | None = None
 
     @cached_property
     def likelihood(self) -> FlightLikelihood:
@@ -211,12 +214,12 @@ class NoiseFit:
         return float(total)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return NoiseFit, (self.model, self.runs, self.trim, self.numbers)
+        return NoiseFit, (self.model, self.runs, self.trim, self.numbers, self.given_gain)
 
     @property
     def gain(self) -> float:
         """The gain at the maximum."""
-        return self.parts[0].gain
+        return self.parts[0].gain if self.given_gain is None else self.given_gain
 
     @cached_property
     def with_gain(self) -> PlantNumbers:

@@ -16,11 +16,7 @@ from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._free_numbers import NumbersProfile
 from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
-from deadtime.estimation.likelihood._profile import (
-    LikelihoodProfile,
-    common_covariance,
-    profile_of,
-)
+from deadtime.estimation.likelihood._profile import LikelihoodProfile, profile_of
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import (
     SHORTER,
@@ -78,12 +74,17 @@ def _in_order(fit: NoiseFit) -> NoiseFit:
 
 def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
     """The profile over the names, and over the sum of delay and lag."""
-    kernel = dict(fit.model.order)
+    return profile_of(fit, profiled(fit.model, names))
+
+
+def profiled(model: PlantModel, names: tuple[str, ...]) -> dict[str, str]:
+    """The kernel's name of each quantity that has an interval."""
+    kernel = dict(model.order)
     wanted = {name: kernel[name] for name in names}
     if "delay" in names:
         slow = "time_constant" if "time_constant" in names else "lag"
         wanted[f"delay+{slow}"] = "total"
-    return profile_of(fit, wanted)
+    return wanted
 
 
 def _start(model: PlantModel, first: PlantNumbers, rows: Sequence[FlightRows]) -> PlantNumbers:
@@ -115,7 +116,7 @@ def concluded_flight(
     """Make the estimate of a fit."""
     fit = profile.fit
     values = values_of(fit, names, known)
-    cov = common_covariance(fit)
+    cov = profile.common
     order = [name for name, _ in fit.model.order]
     place = [order.index(name) for name in names]
     cov = cov[np.ix_(place, place)]

@@ -45,6 +45,11 @@ from deadtime.estimation.likelihood._free_numbers import (
     fit_numbers,
     numbers_under_white_noise,
 )
+from deadtime.estimation.likelihood._lost_commands import (
+    LostCommandsProfile,
+    Refilled,
+    with_lost_commands,
+)
 from deadtime.estimation.likelihood._missing import (
     HeldCommands,
     predicted_commands,
@@ -59,7 +64,7 @@ from deadtime.estimation.likelihood._search import (
     PlantModel,
     names_in_kernel,
 )
-from deadtime.estimation.likelihood._start import excited_part, least_squares
+from deadtime.estimation.likelihood._start import excited_part, is_long, least_squares
 from deadtime.estimation.methods._conclusion import (
     check_fit,
     concluded,
@@ -72,6 +77,7 @@ from deadtime.estimation.methods._flight_conclusion import (
     fitted_flight,
     gain_is_certain,
     profile_for,
+    profiled,
     values_of,
     without_the_plant,
 )
@@ -85,7 +91,7 @@ Array = NDArray[np.float64]
 #: Rounds of predicting the commands between rows and fitting again, the most samples at which a
 #: reference may have changed that are tried, and by how much of Akaike's criterion one of them has
 #: to be the best.
-REFILLS, MOST_STEPS, CLEARLY = 2, 5, 6.0
+REFILLS, MOST_STEPS, CLEARLY = 2, 8, 6.0
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
 NEARLY_EXACT = 1e-4
@@ -211,9 +217,17 @@ def _estimated(
         fit, free_numbers = fit_numbers(fit, partial(_given, linear, models, fit.runs), numbers)
         fitted = [run._replace(loop=run.loop.replace(**free_numbers.values)) for run in fitted]
     doubts: tuple[str, ...] = ()
+    joint = None
     if any(one.commands.computed for one in models):
-        fit, doubts = _with_predicted_commands(linear, fit, models, runs)
-    profile = profile_for(fit, linear)
+        fit, step, doubts = _with_predicted_commands(linear, fit, models, runs)
+        # Single rows are predicted well enough.
+        if any(one.commands.unknown for one in models) and not (numbers or is_long(rows)):
+            joint = with_lost_commands(fit, _refilling(linear, models, runs, step))
+    if joint is not None:
+        fit, cov = joint
+        profile: LikelihoodProfile = LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
+    else:
+        profile = profile_for(fit, linear)
     if free_numbers is not None:
         profile = NumbersProfile(
             profile.fit, profile.names, profile.preferred, profile._ends, free_numbers
@@ -296,7 +310,7 @@ def _given(
 
 def _with_predicted_commands(
     names: tuple[str, ...], fit: NoiseFit, models: Sequence[_Model], runs: Sequence[Run]
-) -> tuple[NoiseFit, tuple[str, ...]]:
+) -> tuple[NoiseFit, int | None, tuple[str, ...]]:
     """The fit with the commands between rows that its plant predicts, and doubts about them.
 
     Where the reference changes between rows that are further apart than samples, each sample at
@@ -304,24 +318,55 @@ def _with_predicted_commands(
     """
     steps = [one.commands.steps for one in models]
     unclear = max(steps) > 1 and sum(step > 1 for step in steps) == 1
-    tried: list[NoiseFit] = []
+    tried: list[tuple[NoiseFit, int | None]] = []
     for step in range(max(steps)) if unclear and max(steps) <= MOST_STEPS else (None,):
-        again = fit
+        again, refilled = fit, _refilling(names, models, runs, step, unsure=True)
         for _ in range(REFILLS):
-            values = values_of(again, names, models[0].known)
-            rows = [
-                one.refilled(run.recording, run.loop.replace(**values), step, kept, again.gain)
-                for one, run, kept in zip(models, runs, again.runs, strict=True)
-            ]
-            again = fitted_flight(again.model, rows, again.with_gain)
-        tried.append(again)
-    tried.sort(key=lambda one: one.criterion)
-    if len(tried) > 1 and tried[1].criterion - tried[0].criterion < CLEARLY:
-        return tried[0], (
-            "the reference changes between rows that are further apart than samples, and the "
-            "recording does not tell when",
+            again = fitted_flight(again.model, refilled(again), again.with_gain)
+        tried.append((again, step))
+    tried.sort(key=lambda one: one[0].criterion)
+    best, step = tried[0]
+    if len(tried) > 1 and tried[1][0].criterion - best.criterion < CLEARLY:
+        return (
+            best,
+            step,
+            (
+                "the reference changes between rows that are further apart than samples, and the "
+                "recording does not tell when",
+            ),
         )
-    return tried[0], ()
+    return best, step, ()
+
+
+def _refilling(
+    names: tuple[str, ...],
+    models: Sequence[_Model],
+    runs: Sequence[Run],
+    step: int | None,
+    unsure: bool = False,
+) -> Refilled:
+    """The rows of a fit with the commands between them that its plant predicts.
+
+    If `unsure`, the mean command over many missing rows is unknown all the same.
+    """
+    commands = [one.commands for one in models]
+
+    def refilled(fit: NoiseFit) -> list[FlightRows]:
+        values = values_of(fit, names, models[0].known)
+        found = []
+        for i, (one, run, rows) in enumerate(zip(models, runs, fit.runs, strict=True)):
+            if one.commands.computed:
+                loop = run.loop.replace(**values)
+                # The next plant is near.
+                commands[i] = predicted_commands(
+                    run.recording, loop, one.logged, commands[i], step, unsure
+                )
+                error = math.hypot(1.0, fit.numbers.noise[i].sensor)
+                rows = one.refilled(rows, commands[i], abs(fit.gain) * error)
+            found.append(rows)
+        return found
+
+    return refilled
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,25 +381,16 @@ class _Model(ModelOfOne):
     commands: HeldCommands
     start: Array
 
-    def refilled(
-        self,
-        recording: Recording,
-        loop: ControlLoop,
-        step: int | None,
-        rows: FlightRows,
-        gain: float,
-    ) -> FlightRows:
-        """The rows with the commands between them from the output that `loop` predicts."""
-        if not self.commands.computed:
-            return rows
-        commands = predicted_commands(recording, loop, self.logged, self.commands, step)
+    def refilled(self, rows: FlightRows, commands: HeldCommands, error: float) -> FlightRows:
+        """The rows with these commands, computed from outputs with errors.
+
+        They and the gain of the plant are in `error`, in deviations of the white noise.
+        """
         return rows._replace(
             command_time=commands.time,
             command=commands.command,
             unknown=(*self._before, *commands.unknown),
-            uncertain=tuple(
-                (a, b, abs(gain) * slope) for a, b, slope in commands.computed if slope
-            ),
+            uncertain=tuple((a, b, error * slope) for a, b, slope in commands.computed if slope),
         )
 
     def rows(self, initial_output: float | None, check: RecordingCheck | None) -> FlightRows:

@@ -1,0 +1,51 @@
+"""Commands in missing rows follow from the plant that is fitted, and tell of it."""
+
+import sys
+from pathlib import Path
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
+
+from reality import table
+from reality.bound import bounds
+from reality.conditions import CONDITIONS
+from reality.generator import record
+
+NAMED = {condition.name: condition for condition in CONDITIONS}
+
+
+def estimate(name, number):
+    condition = NAMED[name]
+    run = record(condition, number)
+    recording = table.recording_of(condition, run)
+    loop = table.given_loop(condition, run, condition.free)
+    return run, dtm.estimate_delay(recording, loop, free=condition.free)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_a_hole_in_the_rise_costs_no_more_than_the_bound_says(number):
+    # With the mean command in the hole unknown, run 0 was 10 bounds away.
+    run, fit = estimate("hole of 1 s", number)
+    least, _ = bounds(NAMED["hole of 1 s"], run, ("delay", "gain"))
+    assert abs(fit.delay - run.vehicle.delay) < 3.5 * least
+    assert fit.stderr["delay"] < 3.0 * least
+    low, high = fit.ci(0.95)
+    assert low < fit.delay < high
+
+
+def test_the_reference_may_change_in_any_of_many_missing_rows():
+    # Five rows are missing around the step, which begins in the fourth of them.
+    run, fit = estimate("rows lost 20 %", 118)
+    assert abs(fit.delay - run.vehicle.delay) < 0.01
+
+
+@pytest.mark.parametrize("rows", [60, 120, 300])
+def test_white_residuals_are_called_coloured_as_often_as_the_level_says(rows):
+    random = np.random.default_rng(0)
+    runs = 3000
+    coloured = sum(not whiteness_of(random.standard_normal(rows)).white for _ in range(runs))
+    assert 0.5 * SIGNIFICANCE < coloured / runs < 1.8 * SIGNIFICANCE
