@@ -59,6 +59,7 @@ ORDER = {
         "plant",
         "disturbance",
         "rows",
+        "kept",
         "path",
         "propagation",
         "orthogonal",

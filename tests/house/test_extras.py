@@ -31,6 +31,15 @@ def filtered():
     return dtm.design_filter(LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9)
 
 
+def told():
+    time = np.arange(200) * 0.02
+    square = np.where(np.sin(3.7 * time) > 0.0, 1.0, -1.0)
+    vehicle = dtm.FactoredPlant([0.1]).transfer_function() * dtm.delay(0.05)
+    output = np.ravel(vehicle.simulate(time, square).outputs)
+    output = output + 0.01 * np.random.default_rng(1).standard_normal(200)
+    return dtm.latency(dtm.Recording(time, square, output))
+
+
 SYSTEM = dtm.DelaySystem(A={0.0: -1.0, 0.3: -0.5}, B=1.0)
 Kp, T = dtm.parameters("Kp T")
 FAMILY = dtm.s + Kp * dtm.delay(T)
@@ -45,6 +54,7 @@ DRAWN = {
     "Design.plot": lambda: designed().plot(),
     "FilterChoice.plot": lambda: filtered().plot(),
     "Identifiability.plot": lambda: planned().plot(),
+    "Latency.plot": lambda: told().plot(),
     "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),
     "Response.plot": lambda: LOOP.step_response().plot(),
     "RobustMap.plot": lambda: dtm.robust_map(

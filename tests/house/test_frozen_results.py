@@ -157,6 +157,7 @@ def test_the_list_of_types_is_complete():
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW", "NoiseModel", "DisturbanceModel",
         "Comparison", "MethodDifference", "ConfidenceRegion", "RecordingCheck", "Finding", "Hole",
+        "SentCommands",
     }  # fmt: skip
 
 

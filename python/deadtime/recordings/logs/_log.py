@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
+from deadtime.recordings._recording import Recording
 from deadtime.recordings.logs._contents import LogContents
 from deadtime.recordings.logs._names import AutopilotNames, Kind, LoopNames
+from deadtime.recordings.logs._recording import recording_of
 from deadtime.recordings.logs._segments import segments_of
 from deadtime.recordings.logs._series import DAY, Series, first_series, increasing
-
-if TYPE_CHECKING:
-    from deadtime.recordings._recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +104,19 @@ class LogLoop(ReadOnlyArrays):
             When the loop is never followed and no part is given, when the actuator is not logged,
             or when fewer than 8 rows lie in the part.
         """
-        from deadtime.recordings.logs._recording import recording_of
-
-        return recording_of(self, start, stop, command, between)
+        if command not in ("setpoint", "actuator"):
+            raise ValueError(f"command={command!r} is not one of 'setpoint', 'actuator'")
+        if command not in self.signals:
+            raise RecordingError(
+                f"the log does not hold what the controller of {self.name} commands"
+            )
+        if start is None and stop is None:
+            if not self.segments:
+                why = "; ".join(self.why_left_out)
+                raise RecordingError(f"{self.name} is never followed: {why}")
+            start, stop = max(self.segments, key=lambda ends: ends[1] - ends[0])
+        told = self.signals[command]
+        return recording_of(self.name, self.setpoint, self.response, told, (start, stop), between)
 
     def headline(self) -> str:
         """The loop in one line."""

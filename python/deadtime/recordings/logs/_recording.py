@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
@@ -10,9 +10,6 @@ from deadtime._base.errors import RecordingError
 from deadtime.recordings._recording import Recording
 from deadtime.recordings.logs._contents import Array
 from deadtime.recordings.logs._series import Series
-
-if TYPE_CHECKING:
-    from deadtime.recordings.logs._log import LogLoop
 
 #: A signal that changes on more than this share of its rows moves between them.
 MOVES = 0.5
@@ -22,45 +19,38 @@ EARLIER = 0.5
 
 
 def recording_of(
-    loop: LogLoop,
-    start: float | None,
-    stop: float | None,
-    command: str,
-    between: str | None = None,
+    name: str,
+    setpoint: Series,
+    response: Series,
+    told: Series,
+    part: tuple[float | None, float | None],
+    between: Literal["held", "lines"] | None = None,
 ) -> Recording:
-    """The response of a loop, and what it answers to, over a part of the log."""
-    if command not in ("setpoint", "actuator"):
-        raise ValueError(f"command={command!r} is not one of 'setpoint', 'actuator'")
+    """The response of a loop, and what it is told, over a part of the log."""
     if between not in (None, "held", "lines"):
         raise ValueError(f"between={between!r} is not one of 'held', 'lines', None")
-    told = loop.setpoint if command == "setpoint" else loop.actuator
-    if told is None:
-        raise RecordingError(f"the log does not hold what the controller of {loop.name} commands")
-    if start is None and stop is None:
-        if not loop.segments:
-            raise RecordingError(f"{loop.name} is never followed: {'; '.join(loop.why_left_out)}")
-        start, stop = max(loop.segments, key=lambda ends: ends[1] - ends[0])
+    start, stop = part
     low = -np.inf if start is None else start
     high = np.inf if stop is None else stop
     lines = moves(told) if between is None else between == "lines"
     sent, values = commands_of(told, high, lines)
     low = max(low, float(sent[0])) if sent.size else np.inf
-    time, output = loop.response.time, loop.response.values
+    time, output = response.time, response.values
     rows = (time >= low) & (time <= high) & np.isfinite(output)
     if not rows.any():
         raise RecordingError(
-            f"{loop.name} has no rows from {low:g} to {high:g} s that follow a {command}"
+            f"{name} has no rows from {low:g} to {high:g} s that follow {told.source}"
         )
     time, output = time[rows], output[rows]
     kept = sent >= time[0] - EARLIER * (time[-1] - time[0])
     kept |= sent >= sent[np.searchsorted(sent, time[0], side="right") - 1]
-    units = {"output": loop.response.unit, "reference": loop.setpoint.unit, "command": told.unit}
+    units = {"output": response.unit, "reference": setpoint.unit, "command": told.unit}
     return Recording(
         time,
-        _held(loop.setpoint, time),
+        _held(setpoint, time),
         output,
-        units={name: unit for name, unit in units.items() if unit},
-        source=f"{loop.name}, {told.source} to {loop.response.source}",
+        units={signal: unit for signal, unit in units.items() if unit},
+        source=f"{name}, {told.source} to {response.source}",
         sent=(sent[kept], values[kept]),
     )
 

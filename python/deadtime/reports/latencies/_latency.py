@@ -10,17 +10,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from deadtime._base.digits import stated
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
 from deadtime._base.progress import Stages, stage_report
-from deadtime.estimation import DelayEstimate
 from deadtime.recordings import Log, LogLoop, Recording, open_log
 from deadtime.reports.latencies._budget import Stage, stages_of
 from deadtime.reports.latencies._controller import between_rows
 from deadtime.reports.latencies._filters import FilterDelay, filters_of
 from deadtime.reports.latencies._relation import LoopLatency, relation_of
 from deadtime.reports.latencies._windows import Command, Window, best_windows, window_of
+from deadtime.reports.latencies._words import cost_in_words, numbers_of, why_inadequate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -124,7 +123,7 @@ class Latency(ReadOnlyArrays):
         """Draw delay and lag of each loop with their intervals. Needs matplotlib."""
         from deadtime.reports.latencies._plots import plot_latency
 
-        return plot_latency(self)
+        return plot_latency(self.source, self.estimated)
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write one HTML file with all of it: the budget, each fit and the gains.
@@ -134,28 +133,14 @@ class Latency(ReadOnlyArrays):
         from deadtime._base.page import write_page
         from deadtime.reports.latencies._page import render
 
-        return write_page(render(self), Path(path))
+        text = render(
+            self.source, self.vehicle, self.headline(), self.loops, self.stages, self.filters,
+            self.remarks,
+        )  # fmt: skip
+        return write_page(text, Path(path))
 
     def __repr__(self) -> str:
         return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops told>"
-
-
-def numbers_of(fit: DelayEstimate) -> list[str]:
-    """Every number of the fitted plant, with its standard error."""
-    single = sum(name.startswith("lag") for name in fit.free) == 1
-    found = []
-    for name in fit.free:
-        low, high = fit.ci(0.95, name)
-        shown = "lag" if single and name == "lag_1" else name.replace("_", " ")
-        unit = "" if name == "gain" else "s"
-        found.append(f"{shown} {stated(fit._value(name), (high - low) / 3.92, unit)}")
-    return found
-
-
-def why_inadequate(fit: DelayEstimate) -> str:
-    """The reasons why the model of an estimate is not adequate."""
-    _, _, why = fit.message.partition("; not adequate: ")
-    return why.partition(" (try ")[0] or "the residuals are not white"
 
 
 def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
@@ -164,25 +149,6 @@ def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
     assert one.estimate is not None
     kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
     return (not one.estimate.adequate, kind, one.command == "setpoint", one.promise)
-
-
-def cost_in_words(one: LoopLatency) -> str:
-    """What delay and lag cost in gain, in a sentence."""
-    cost = one.cost
-    assert cost is not None
-    half = 0.25 * (cost.largest_ci[1] - cost.largest_ci[0])
-    damped = 0.25 * (cost.well_damped_ci[1] - cost.well_damped_ci[0])
-    text = (
-        f"a proportional gain is stable up to {stated(cost.largest, half)} and well damped "
-        f"(Ms 1.7) up to {stated(cost.well_damped, damped)}"
-    )
-    if cost.flown is not None:
-        text += f"; {cost.flown:.3g} is flown"
-        if cost.delay_margin is None or math.isnan(cost.delay_margin):
-            text += ", which this model says is not stable"
-        elif math.isfinite(cost.delay_margin):
-            text += f", which leaves a delay margin of {stated(cost.delay_margin, 0.0, 's')}"
-    return text
 
 
 def latency(

@@ -2,51 +2,68 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from deadtime._base.digits import between, stated
 from deadtime._base.page import escaped, page, picture, table, table_row
-from deadtime.reports.latencies._latency import Latency, cost_in_words, numbers_of, why_inadequate
+from deadtime.reports.latencies._budget import Stage
+from deadtime.reports.latencies._filters import FilterDelay
 from deadtime.reports.latencies._plots import plot_fit, plot_latency
 from deadtime.reports.latencies._relation import LoopLatency
+from deadtime.reports.latencies._words import cost_in_words, numbers_of, why_inadequate
 
 HEADS = ("loop", "from", "delay and lag", "95 % interval", "adequate")
 STYLE = ".refused { color: #555; } td { vertical-align: top; }"
 
 
-def render(found: Latency) -> str:
+def render(
+    source: str,
+    vehicle: str,
+    headline: str,
+    loops: Sequence[LoopLatency],
+    stages: Mapping[str, Sequence[Stage]],
+    filters: Sequence[FilterDelay],
+    remarks: Sequence[str],
+) -> str:
     """The page as text."""
+    estimated = [one for one in loops if one.estimate is not None]
     body = [
-        f"<p>{escaped(found.vehicle)}</p>",
-        f'<p class="verdict">{escaped(found.headline())}</p>',
+        f"<p>{escaped(vehicle)}</p>",
+        f'<p class="verdict">{escaped(headline)}</p>',
     ]
-    if found.estimated:
+    if estimated:
         body += [
             "<h2>How long each loop takes to respond</h2>",
-            table(HEADS, map(_row, found.estimated)),
-            picture("all", plot_latency(found), "Delay and lag of each loop; pale: not adequate."),
+            table(HEADS, map(_row, estimated)),
+            picture(
+                "all",
+                plot_latency(source, estimated),
+                "Delay and lag of each loop; pale: not adequate.",
+            ),
             "<p>From the setpoint the loop is closed: this is how well it follows. From what the "
             "controller commands (“actuator”) it is the vehicle alone, which decides the gains. "
             "Where a fit is not adequate, its interval need not hold the truth.</p>",
         ]
-    budget = _budget(found)
+    budget = _budget(stages)
     if budget:
         body += ["<h2>Where the time goes</h2>", budget]
-    if found.filters:
+    if filters:
         rows = [
             table_row((one.name, one.path, stated(one.delay, 0.0, "s"), one.source), "td", 4)
-            for one in found.filters
+            for one in filters
         ]
         body += [
             "<h2>Filters that the log names</h2>",
             table(("filter", "on", "delay at low frequencies", "parameters"), rows),
         ]
-    for number, one in enumerate(found.estimated):
+    for number, one in enumerate(estimated):
         body += _fit(number, one)
-    refused = [one for one in found.loops if one.estimate is None]
+    refused = [one for one in loops if one.estimate is None]
     if refused:
         points = "".join(f"<li>{escaped(one.name)}: {escaped(one.refusal)}</li>" for one in refused)
         body += ["<h2>What the log does not tell</h2>", f'<ul class="refused">{points}</ul>']
-    body += [f"<p>{escaped(remark)}</p>" for remark in found.remarks]
-    return page(f"Latencies in {found.source}", body, STYLE)
+    body += [f"<p>{escaped(remark)}</p>" for remark in remarks]
+    return page(f"Latencies in {source}", body, STYLE)
 
 
 def _row(one: LoopLatency) -> str:
@@ -57,13 +74,13 @@ def _row(one: LoopLatency) -> str:
     return table_row((*cells, adequate), "td", len(HEADS))
 
 
-def _budget(found: Latency) -> str:
+def _budget(stages: Mapping[str, Sequence[Stage]]) -> str:
     """A table of the stages of each loop that has more than one."""
     rows = []
-    for name, stages in found.stages.items():
-        if len(stages) < 2:
+    for name, some in stages.items():
+        if len(some) < 2:
             continue
-        for stage in stages:
+        for stage in some:
             shown = f"— {stage.name}" if stage.part else stage.name
             doubt = "" if stage.adequate else " (not adequate)"
             time = f"{stated(stage.time, stage.stderr, 's')}{doubt}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,17 +15,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from deadtime.reports.latencies._latency import Latency
-
 #: Height of a bar's row, and of what is around them, in inches.
 ROW, AROUND = 0.34, 1.3
 
 
-def plot_latency(found: Latency) -> Figure:
+def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     """Delay and lag of each loop as bars, with the 95 % interval of their sum."""
-    told = found.estimated
     if not told:
-        raise ValueError(f"{found.source}: no loop tells how long it takes, so nothing is drawn")
+        raise ValueError(f"{source}: no loop tells how long it takes, so nothing is drawn")
     figure, ax = new_figure(7.5, AROUND + ROW * len(told))
     sums = [one.sum_of() for one in told]
     unit, factor = time_unit(float(np.median([value for value, _, _ in sums])))
