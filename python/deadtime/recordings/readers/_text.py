@@ -54,9 +54,6 @@ class Text:
     encoding: str
     line: int
 
-    def __contains__(self, sign: bytes) -> bool:
-        return self.raw.find(sign, self.start) >= 0
-
     @property
     def body(self) -> bytes:
         """The lines below the header."""
@@ -65,8 +62,10 @@ class Text:
 
 def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | None) -> Text:
     """Find the header of a file, and the separator under which it holds the `wanted` names."""
-    if delimiter is not None and len(delimiter) != 1:
-        raise RecordingError(f"the delimiter {delimiter!r} is not one character")
+    if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n'):
+        raise RecordingError(
+            f"the delimiter {delimiter!r} is not one character, or it is a quote or a line end"
+        )
     text, encoding = _decodable(path, raw)
     comments = []
     start, number = 0, 0
