@@ -1,11 +1,13 @@
-//! Wire formats: one packet of each kind, read and written.
+//! Wire formats: one packet of each kind, read and written; tables in text.
 //!
-//! `cargo bench --bench wire`; a full packet of navdata has 2190 bytes, a short one 500.
+//! `cargo bench --bench wire`; a full packet of navdata has 2190 bytes, a short one 500. The limit of
+//! a table is one pass over its bytes, which counts its separators.
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime_wire::at::{self, Command};
+use deadtime_wire::csv::{self, Fault, Layout};
 use deadtime_wire::loop_packet::{self, LoopPacket};
 use deadtime_wire::navdata::{self, Demo, FULL, Head, KalmanPressure, Known, OptionView, Pwm};
 use deadtime_wire::{Unit, configuration};
@@ -107,5 +109,52 @@ fn wire(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, wire);
+/// A table of 100 000 rows without its header: a time, two numbers and a whole one.
+fn table(row: impl Fn(f64, f64) -> String) -> Vec<u8> {
+    let rows = (0..100_000).map(|k| {
+        let time = f64::from(k) * 1e-3;
+        row(time, (time * 1.7).sin() * 3.0)
+    });
+    rows.collect::<String>().into_bytes()
+}
+
+fn tables(c: &mut Criterion) {
+    let layout = Layout {
+        delimiter: b',',
+        width: 4,
+        columns: ["t", "r", "y", "u"]
+            .map(str::to_owned)
+            .into_iter()
+            .enumerate()
+            .collect(),
+        window: (f64::NEG_INFINITY, f64::INFINITY),
+        line: 2,
+    };
+    let mut group = c.benchmark_group("table");
+    for (name, bytes) in [
+        (
+            "six decimals",
+            table(|t, y| format!("{t:.3},1,{y:.6},{:.6}\n", y / 7.0)),
+        ),
+        (
+            "all digits",
+            table(|t, y| format!("{t:.3},1,{y},{}\n", y / 7.0)),
+        ),
+        (
+            "quoted",
+            table(|t, y| format!("\"{t:.3}\",\"1\",\"{y:.6}\",\"{:.6}\"\n", y / 7.0)),
+        ),
+    ] {
+        group.throughput(Throughput::Bytes(bytes.len() as u64));
+        group.bench_function(format!("{name}/read"), |b| {
+            b.iter(|| csv::read::<Fault>(black_box(&bytes), &layout, || Ok(())));
+        });
+        group.bench_function(format!("{name}/one pass"), |b| {
+            b.iter(|| memchr::memchr_iter(b',', black_box(&bytes)).count());
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, wire, tables);
 criterion_main!(benches);

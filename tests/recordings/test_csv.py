@@ -1,38 +1,16 @@
-"""Tables in text: encodings, separators, decimal commas, packing, and the passes over them."""
+"""Tables in text: encodings, separators, decimal commas, packing, quotes, and what is refused."""
 
+import csv
 import gzip
-import sys
+import tempfile
+from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.recordings.readers._csv import _at_once, read_csv
-from deadtime.recordings.readers._lines import read_lines
-from deadtime.recordings.readers._text import as_text, indices
-from hypothesis import given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from step_table import COLUMNS, NAMES, as_csv, assert_is_the_table
-
-EVER = (-np.inf, np.inf)
-
-
-@pytest.fixture(params=["with pyarrow", "without pyarrow"])
-def passes(request, monkeypatch):
-    """Both passes over all numbers at once."""
-    if request.param == "with pyarrow":
-        pytest.importorskip("pyarrow.csv", reason="pyarrow is not installed")
-    else:
-        monkeypatch.setitem(sys.modules, "pyarrow", None)
-
-
-@pytest.fixture
-def fast(monkeypatch):
-    """Refuse the pass line by line."""
-
-    def refused(*_):
-        raise AssertionError("the file was read line by line")
-
-    monkeypatch.setattr("deadtime.recordings.readers._csv.read_lines", refused)
 
 
 def read(folder, content, **options):
@@ -66,16 +44,11 @@ WRITINGS = {
 
 
 @pytest.mark.parametrize("writing", WRITINGS)
-def test_a_table_is_read_bit_for_bit(writing, passes, tmp_path):
+def test_a_table_is_read_bit_for_bit(writing, tmp_path):
     assert_is_the_table(read(tmp_path, WRITINGS[writing], command="speed"))
 
 
-@pytest.mark.parametrize("writing", sorted(WRITINGS.keys() - {"a column of text"}))
-def test_a_clean_table_is_read_at_once(writing, passes, fast, tmp_path):
-    assert_is_the_table(read(tmp_path, WRITINGS[writing], command="speed"))
-
-
-def test_a_column_may_be_read_twice(passes, fast, tmp_path):
+def test_a_column_may_be_read_twice(tmp_path):
     flight = read(tmp_path, as_csv(), command="height_m")
     np.testing.assert_array_equal(flight.command, flight.output)
 
@@ -91,7 +64,7 @@ def test_names_in_latin_1_and_utf_8_are_found(tmp_path):
         assert_is_the_table(read(tmp_path, table, output="höhe_m"))
 
 
-def test_the_separator_is_the_one_that_finds_the_names(passes, tmp_path):
+def test_the_separator_is_the_one_that_finds_the_names(tmp_path):
     renamed = {"t s": 0, "ref, m": 1, "height m": 2}
     table = as_csv(dict(zip(renamed, list(COLUMNS.values())[:3], strict=True)), delimiter=";")
     assert_is_the_table(read(tmp_path, table, time="t s", reference="ref, m", output="height m"))
@@ -118,7 +91,7 @@ def test_the_separator_is_the_one_that_finds_the_names(passes, tmp_path):
         (("\n0.5,0.0,", '\n0.5,"1,000,000",'), "line 7: '1,000,000' .* no comma"),
     ],
 )  # fmt: skip
-def test_a_bad_line_is_named(change, words, passes, tmp_path):
+def test_a_bad_line_is_named(change, words, tmp_path):
     table = as_csv()
     assert change[0] in table
     with pytest.raises(dtm.RecordingError, match=words):
@@ -126,10 +99,7 @@ def test_a_bad_line_is_named(change, words, passes, tmp_path):
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", " "])
-def test_a_line_that_is_too_long_is_refused_beside_one_that_is_too_short(
-    delimiter, passes, tmp_path
-):
-    # loadtxt counts no cells behind those it reads.
+def test_a_line_that_is_too_long_is_refused_beside_one_that_is_too_short(delimiter, tmp_path):
     table = as_csv(delimiter=delimiter)
     last = table.splitlines()[-1]
     table = table.replace("\n0.5", f"\n0.45{delimiter}0", 1).replace(
@@ -139,7 +109,7 @@ def test_a_line_that_is_too_long_is_refused_beside_one_that_is_too_short(
         read(tmp_path, table)
 
 
-def test_rows_outside_the_window_may_hold_text(passes, tmp_path):
+def test_rows_outside_the_window_may_hold_text(tmp_path):
     table = as_csv().replace("\n0.2,0.0,", "\n0.2,none,")
     assert len(read(tmp_path, table, window=(0.5, None))) == 55
     with pytest.raises(dtm.RecordingError, match="line 4: 'none'"):
@@ -147,39 +117,149 @@ def test_rows_outside_the_window_may_hold_text(passes, tmp_path):
 
 
 @pytest.mark.parametrize("window", [(0.5, 4.0), (None, 4.0), (0.3, 4.4)])
-def test_values_outside_the_window_may_be_nan(window, passes, fast, tmp_path):
+def test_values_outside_the_window_may_be_nan(window, tmp_path):
     inside = read(tmp_path, as_csv().replace("\n4.8,1.0,", "\n4.8,nan,"), window=window)
     low, high = window[0] or 0.0, window[1] or 4.5
     rows = (COLUMNS["t_s"] >= low - 1e-9) & (COLUMNS["t_s"] <= high + 1e-9)
     np.testing.assert_array_equal(inside.output, COLUMNS["height_m"][rows])
 
 
+def values(texts):
+    """The output of a table with these cells in quotes, read by the package."""
+    rows = "".join(f'{k},{min(k, 1)},"{text}"\n' for k, text in enumerate([*texts, *"00000000"]))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "flight.csv")
+        file.write_text("time,reference,output\n" + rows)
+        return dtm.read_recording(file).output[: len(texts)]
+
+
+digits = st.text("0123456789", max_size=25)
+written = st.builds(
+    "{}{}.{}{}".format,
+    st.sampled_from(["", "-", "+"]),
+    st.text("0123456789", min_size=1, max_size=25),
+    digits,
+    st.one_of(st.just(""), st.integers(-330, 300).map("e{}".format)),
+)
+#: `Recording` takes no larger ones.
+doubles = st.floats(-1e100, 1e100)
+numbers = st.one_of(doubles.map(repr), doubles.map("{:.17g}".format), written)
+
+
+@given(st.lists(numbers, min_size=1, max_size=20))
+@example(["9007199254740993", "9007199254740992.0", "0.30000000000000004", "-0", "-.0", "5."])
+@example(["2.2250738585072011e-308", "4.9e-324", "2.47e-324", "1e-400"])
+@example(["0.0000000000000000000001", "12345678901234567890", "9" * 100, " 7 ", "1E5"])
+def test_numbers_are_those_of_python_bit_for_bit(texts):
+    known = [float(text) for text in texts]
+    assume(all(abs(value) <= 1e100 for value in known))
+    assert values(texts).tobytes() == np.array(known).tobytes()
+
+
+columns = st.lists(doubles, min_size=8, max_size=30)
+
+
+@given(columns, columns, st.sampled_from(",;\t"), st.sampled_from(["\n", "\r\n"]), st.booleans())
+def test_tables_are_those_of_pandas(references, outputs, delimiter, end, is_quoted):
+    pandas = pytest.importorskip("pandas", reason="pandas is not installed")
+    rows = min(len(references), len(outputs))
+    assume(len(set(references[:rows])) > 1)
+    table = pandas.DataFrame(
+        {"time": np.arange(rows) / 7.0, "reference": references[:rows], "output": outputs[:rows]}
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "flight.csv")
+        quoting = csv.QUOTE_ALL if is_quoted else csv.QUOTE_MINIMAL
+        table.to_csv(file, index=False, sep=delimiter, lineterminator=end, quoting=quoting)
+        known = pandas.read_csv(file, sep=delimiter)
+        found = dtm.read_recording(file)
+    for name in table:
+        assert getattr(found, name).tobytes() == known[name].to_numpy(float).tobytes()
+
+
 cells = st.sampled_from(
-    ["0", "1", "-0.0", "2.5", "3e2", " 4", "nan", "inf", "", "x", "1,5", "7.", ".5", "+1", "0x1",
-     "1_0", "1e999", "1d2", "#", '"1"', "1 2", "1\u00a0", "\u0661", "1e-400", "1e308"]
+    ["0", "1", "-0.0", "2.5", "3e2", " 4", "nan", "inf", "", "x", "7.", ".5", "+1", "0x1", "1_0",
+     "1e999", "1d2", "#", '"1"', '"1', '"2"3', '""', "1 2", "1\u00a0", "\u0661", "1e-400", "1e308"]
 )  # fmt: skip
 rows = st.lists(st.lists(cells, min_size=1, max_size=4), max_size=5)
 
+#: Rows before those that are drawn: a recording has eight samples at least.
+BEFORE = [[str(k), str(k // -4 + 2), "0.5"] for k in range(-8, 0)]
 
-@given(rows, st.sampled_from(",;\t "), st.sampled_from(["\n", "\r\n", "\n\n", "\r"]))
-def test_what_is_read_at_once_is_what_is_read_line_by_line(rows, delimiter, end):
-    table = end.join(delimiter.join(row) for row in [["t", "r", "y"], *rows]).encode()
+
+def by_python(table, delimiter):
+    """The columns of a table by the csv module and float(), None where they make no recording."""
+    lines = [line for line in table.splitlines() if line.strip() and line.strip()[0] != "#"]
+    try:
+        found = [*csv.reader(lines, delimiter=delimiter, strict=True)][1:]
+        assert not any(
+            "_" in cell or not cell.strip("\xa0").isascii() for row in found for cell in row
+        )
+        assert not any("".join(row[3:]).strip() for row in found)
+        columns = np.array([[float(cell) for cell in row[:3]] for row in found])
+        assert columns.shape[1] == 3
+        assert np.isfinite(columns).all()
+        dtm.Recording(*columns.T)
+        assert len({*columns[:, 1]}) > 1
+    except (AssertionError, csv.Error, IndexError, ValueError):
+        return None
+    return columns.T
+
+
+@given(rows, st.sampled_from(",;\t"), st.sampled_from(["\n", "\r\n", "\n\n", "\r"]))
+@example([["0", "0", "1"], ["1", '"1"', ".5"], ["2.5", "7.", "nan"]], ";", "\n")
+@example([["0", "0", "1"], ["1", '"1"', ".5"], ["2.5", "7.", "1\u00a0"]], ";", "\n")
+@example([["0", "0", "1"], ["1", '"1"', ".5"], ["2.5", "7.", "3e2", " "]], ",", "\r\n")
+def test_what_is_read_is_what_python_reads(rows, delimiter, end):
+    table = end.join(
+        delimiter.join(row) for row in [["time", "reference", "output"], *BEFORE, *rows]
+    )
+    known = by_python(table, delimiter)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "flight.csv")
+        file.write_bytes(table.encode())
+        if known is None:
+            with pytest.raises(dtm.RecordingError):
+                dtm.read_recording(file, delimiter=delimiter)
+            return
+        found = dtm.read_recording(file, delimiter=delimiter)
+    for column, name in zip(known, ("time", "reference", "output"), strict=True):
+        assert getattr(found, name).tobytes() == column.tobytes()
+
+
+def test_a_quoted_cell_may_hold_line_ends(tmp_path):
+    header, *lines = as_csv().splitlines()
+    rows = [f'{line},"a ""gust""\n# and\r\nmore"\n' for line in lines]
+    assert_is_the_table(read(tmp_path, f"{header},note\n{''.join(rows)}"))
+    rows[7] = rows[7].replace(",", ",x", 1)
+    with pytest.raises(dtm.RecordingError, match=r"line 25: 'x0.0' in column 'ref_m' is not a num"):
+        read(tmp_path, f"{header},note\n{''.join(rows)}")
+
+
+def test_a_separator_may_be_any_character(tmp_path):
+    for encoding in ("latin-1", "utf-8"):
+        table = as_csv(delimiter="¦").encode(encoding)
+        assert_is_the_table(read(tmp_path, table, delimiter="¦"))
+    for wrong in ("", ", ", '"', "\n"):
+        with pytest.raises(dtm.RecordingError, match="is not one character, or it is a quote or"):
+            read(tmp_path, as_csv(), delimiter=wrong)
+
+
+THOUSANDS = "0,0,950\n" + "".join(f'{k},1,"1,{k}20"\n' for k in range(1, 9))
+
+
+def test_a_comma_that_may_stand_for_thousands_is_refused(tmp_path):
     names = {"time": "t", "reference": "r", "output": "y"}
-    text = as_text("flight.csv", table, names.values(), delimiter)
-    with pytest.MonkeyPatch.context() as patch:
-        for pyarrow in (True, False):
-            if not pyarrow:
-                patch.setitem(sys.modules, "pyarrow", None)
-            found = _at_once(text, [0, 1, 2])
-            if found is None or not all(np.isfinite(one).all() for one in found.values()):
-                continue
-            if (np.diff(found[0]) <= 0.0).any():
-                continue
-            slow = read_lines(text, names, indices(text, names), EVER)
-            fast = read_csv(text, names, EVER)
-            assert fast.keys() == slow.keys()
-            for signal, column in slow.items():
-                assert fast[signal].tobytes() == column.tobytes()
+    with pytest.raises(
+        dtm.RecordingError, match=r"line 3: '1,120' in column 'y' may be 1.12 or 1120"
+    ):
+        read(tmp_path, "t,r,y\n" + THOUSANDS, **names)
+    with pytest.raises(dtm.RecordingError, match=r"'1,120' .* a decimal comma, and line 2 has"):
+        read(tmp_path, "t,r,y\n" + THOUSANDS.replace("950", "950.5"), **names)
+    # Cells that can be nothing but decimals decide for all.
+    for decimal in ('"0,950"', '"1,02"', '"1234,567"', '"1,0201"', '"1,020e0"', '"01,950"'):
+        found = read(tmp_path, "t,r,y\n" + THOUSANDS.replace("950", decimal), **names)
+        assert found.output[1:].tolist() == [1.12, 1.22, 1.32, 1.42, 1.52, 1.62, 1.72, 1.82]
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-SURVEY = Path(__file__).parents[1] / "support" / "damaged_tables.py"
+SURVEY = Path(__file__).parents[1] / "support" / "damaged_files.py"
 
 #: The library that reads the format, and how many damaged files are read in the survey.
 FORMATS = {
     "text": (None, 2000),
-    "text-pyarrow": ("pyarrow", 2000),
     "mat": (None, 2000),
     "parquet": ("pyarrow", 500),
     "arrow": ("pyarrow", 500),

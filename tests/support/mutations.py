@@ -1,30 +1,42 @@
-"""Damaged copies of small files: bytes changed, lost, doubled and moved."""
+"""Damaged copies of small files: bytes changed, lost, doubled, moved and cut off."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+
+#: Largest size of a damaged file, bytes.
+LARGEST = 4096
 
 
-def mutated(data, rng):
-    """A copy with one to eight damages; half of them are cut off as well."""
+def mutated(data: bytes, draw: random.Random, words: Sequence[bytes] = (b"\0", b"\xff")) -> bytes:
+    """A copy with one to eight damages, of which one may be a word; the first bytes mostly stay."""
     found = bytearray(data)
-    for _ in range(rng.integers(1, 9)):
-        if not found:
-            break
-        at = int(rng.integers(len(found)))
-        size = int(rng.integers(1, 64))
-        match rng.integers(7):
-            case 0:
-                found[at] = int(rng.integers(256))
+    for _ in range(draw.choice((1, 1, 2, 3, 5, 8))):
+        start = 0 if draw.random() < 0.1 else min(8, len(found))
+        at = draw.randint(start, len(found))
+        length = draw.choice((1, 1, 2, 4, 8, 30, 60))
+        match draw.randrange(9):
+            case 0 if at < len(found):
+                found[at] ^= 1 << draw.randrange(8)
             case 1:
-                found[at] ^= 1 << int(rng.integers(8))
+                found[at : at + length] = draw.randbytes(length)
             case 2:
-                found[at] = int(rng.choice([0, 1, 127, 128, 255]))
+                found[at:at] = draw.randbytes(length)
             case 3:
-                del found[at : at + size]
+                del found[at : at + length]
             case 4:
-                found[at:at] = found[at : at + size]
+                found[at:at] = found[at : at + length]
             case 5:
-                found[at:at] = rng.bytes(size)
+                other = draw.randint(0, len(found))
+                found[at : at + length] = found[other : other + length]
             case 6:
-                other = int(rng.integers(len(found)))
-                found[at : at + size] = found[other : other + size]
-    if rng.random() < 0.5:
-        del found[int(rng.integers(len(found) + 1)) :]
-    return bytes(found)
+                found[at : at + draw.choice((0, 1, length))] = draw.choice(words)
+            case 7:
+                number = draw.choice((0, 1, 127, 128, 255, 2**15, 2**31 - 1, 2**31, 2**32 - 1))
+                width = draw.choice((1, 2, 4))
+                order = draw.choice(("little", "big"))
+                found[at : at + width] = (number % 256**width).to_bytes(width, order)
+            case 8:
+                del found[at:]
+    return bytes(found[:LARGEST])

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.extras import library
+from deadtime.recordings._first_bytes import HEAD, format_of, opened, whole
 from deadtime.recordings.readers._arrow import INSTALLS, arrow_file, parquet_metadata
 from deadtime.recordings.readers._columns import read_table
 from deadtime.recordings.readers._csv import read_csv
-from deadtime.recordings.readers._first_bytes import HEAD, opened, table_format, whole
 from deadtime.recordings.readers._text import as_text
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -71,7 +71,7 @@ def load_table(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Columns, units and source of a saved recording, as the arguments of `Recording`."""
     with opened(path) as stream:
         head = stream.read(HEAD)
-        if table_format(path, head) == "Parquet":
+        if format_of(path, head, "read_recording") == "Parquet":
             described = parquet_metadata(path).get(b"deadtime", b"")
             table = arrow_file(path, "Parquet", set(NAMES))
             return read_table(table, _signals(table.names), EVER) | _described(path, described)

@@ -3,6 +3,7 @@
 mod arrays;
 mod boxes;
 mod certificate;
+mod csv;
 mod dde;
 mod errors;
 mod estimation;
@@ -33,6 +34,8 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::certificate::{Certificate, Contour, Monotone, Segment};
+    #[pymodule_export]
+    use super::csv::{CsvColumns, csv_columns};
     #[pymodule_export]
     use super::dde::{LoopResponse, PyLinearLoop, on_samples, rate_limited};
     #[pymodule_export]

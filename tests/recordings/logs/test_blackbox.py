@@ -1,6 +1,7 @@
 """Blackbox logs: of a known truth, a real one with damaged frames, and hostile ones."""
 
 import os
+import random
 import tracemalloc
 from itertools import pairwise
 
@@ -25,6 +26,7 @@ from deadtime.recordings.logs._blackbox import read_blackbox
 from flights import flight_path
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mutations import mutated
 
 #: flightModeFlags (armed, ANGLE), stateFlags, failsafePhase, rxSignalReceived, channels valid.
 ANGLE = [0b11, 8, 0, 1, 1]
@@ -397,25 +399,6 @@ def test_a_real_log_with_damaged_frames():
     assert contents.parameters["P interval"] == 16
 
 
-def damaged(data, random):
-    """Bytes changed, taken out, repeated, or cut off."""
-    data = bytearray(data)
-    for _ in range(int(random.integers(1, 5))):
-        at, kind = int(random.integers(len(data) or 1)), int(random.integers(6))
-        length = int(random.integers(1, 30))
-        if kind == 0:
-            del data[at : at + length]
-        elif kind == 1:
-            data[at:at] = data[at : at + length]
-        elif kind == 2:
-            del data[at:]
-        elif kind == 3:
-            data[at : at + length] = random.bytes(length)
-        elif data:
-            data[at] = int(random.choice(list(b"IPSGHE\0\xff,:\n0129\x80")))
-    return bytes(data[:4096])
-
-
 def small_logs():
     log, rows = made(40)
     real = flight(rows, log, [(1, ANGLE), (20, ANGLE)])
@@ -437,12 +420,10 @@ def read_or_refuse(data):
 
 
 def mutate(count, seed):
-    random = np.random.default_rng(seed)
+    draw = random.Random(seed)
     corpus = small_logs()
-    taken = sum(
-        read_or_refuse(damaged(corpus[int(random.integers(len(corpus)))], random))
-        for _ in range(count)
-    )
+    words = [bytes([byte]) for byte in b"IPSGHE\0\xff,:\n0129\x80"]
+    taken = sum(read_or_refuse(mutated(draw.choice(corpus), draw, words)) for _ in range(count))
     # A survey that accepts nothing, or everything, tests little.
     assert count / 20 < taken < count
     return taken

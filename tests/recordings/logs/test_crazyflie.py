@@ -1,6 +1,7 @@
 """Logs of a Crazyflie: of a known truth, a real one, and damaged ones."""
 
 import os
+import random
 import tracemalloc
 
 import numpy as np
@@ -9,6 +10,7 @@ from crazyflie_logs import definitions, record, sealed
 from deadtime._base.errors import RecordingError
 from deadtime.recordings.logs._crazyflie import read_crazyflie
 from flights import flight_path
+from mutations import mutated
 
 FIXED = (0xFFFF, ("fixedFrequency", [("gyro.x", "f"), ("motor.m1", "H"), ("pm.state", "b")]))
 EVENTS = dict([FIXED, (3, ("estTDOA", [("idA", "B"), ("distance", "f")])), (9, ("empty", []))])
@@ -181,24 +183,6 @@ def test_a_real_log():
     assert topic.columns["motor.m3"].max() == 58_900
 
 
-def damaged(data, random):
-    data = bytearray(data)
-    for _ in range(int(random.integers(1, 5))):
-        at, kind = int(random.integers(len(data) or 1)), int(random.integers(5))
-        length = int(random.integers(1, 30))
-        if kind == 0:
-            del data[at : at + length]
-        elif kind == 1:
-            data[at:at] = data[at : at + length]
-        elif kind == 2:
-            del data[at:]
-        elif kind == 3:
-            data[at : at + length] = random.bytes(length)
-        elif data:
-            data[min(at, int(random.integers(120)))] = int(random.integers(256))
-    return bytes(data[:4096])
-
-
 def read_or_refuse(data):
     try:
         contents = read_crazyflie(data, "damaged")
@@ -210,11 +194,10 @@ def read_or_refuse(data):
 
 
 def mutate(count, seed):
-    random = np.random.default_rng(seed)
+    draw = random.Random(seed)
     mixed = definitions(EVENTS) + record(EVENTS, 3, 1, (2, 3.0)) + record(EVENTS, 9, 4, ())
     corpus = [sealed(fixed_log(200)), sealed(fixed_log(3)), sealed(mixed * 2)]
-    logs = (corpus[int(random.integers(3))] for _ in range(count))
-    taken = sum(read_or_refuse(damaged(log, random)) for log in logs)
+    taken = sum(read_or_refuse(mutated(draw.choice(corpus), draw)) for _ in range(count))
     # A survey that accepts nothing, or everything, tests little.
     assert count / 20 < taken < count
     return taken

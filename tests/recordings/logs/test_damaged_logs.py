@@ -1,5 +1,6 @@
 """Files that are damaged, cut off or something else: one clear message, or what can be read."""
 
+import random
 import signal
 import struct
 import subprocess
@@ -10,65 +11,17 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from flights import flight_path
-from made_logs import DataFlash, Tlog, ULogFile, as_text, copter
+from made_logs import DataFlash, ULogFile, copter
 from mutations import mutated
+from small_logs import SMALL, small_tlog
 
 MEGABYTE = 1 << 20
 
 #: After so many seconds a reader hangs.
 PATIENCE = 60
 
-
-def small_ulog():
-    log = ULogFile()
-    log.info("char[3]", "sys_name", b"PX4")
-    log.info("char[4]", "ver_hw", b"TEST")
-    log.parameter("MC_ROLLRATE_P", 0.15)
-    log.topics(
-        {
-            "vehicle_rates_setpoint": ("roll", "pitch"),
-            "vehicle_angular_velocity": ("xyz[0]", "xyz[1]"),
-            "vehicle_status": ("arming_state", "nav_state"),
-        }
-    )
-    log.add("vehicle_status", 1.0, 2.0, 2.0)
-    for k in range(50):
-        log.add("vehicle_rates_setpoint", 1.0 + 0.02 * k, k % 5, 0.0)
-        log.add("vehicle_angular_velocity", 1.0 + 0.02 * k, (k - 1) % 5, 0.1)
-    log.dropout(30)
-    return log.data
-
-
-def small_text():
-    lines = [
-        "FMT, 5, 19, ATT, Qcccc, TimeUS,DesRoll,Roll,DesPitch,Pitch",
-        "FMT, 3, 15, MODE, QMB, TimeUS,Mode,ModeNum",
-        "FMT, 2, 31, PARM, QNf, TimeUS,Name,Value",
-        "PARM, 0, ATC_RAT_RLL_P, 0.135",
-        "MODE, 1000, ALT_HOLD, 2",
-    ]
-    lines += [f"ATT, {20_000 * k}, {k % 5}, {(k - 1) % 5}, 1.0, 1.00" for k in range(80)]
-    return as_text(lines)
-
-
-def small_tlog():
-    log = Tlog()
-    m = log.dialect
-    for k in range(30):
-        ground, stamp = 1.7e9 + 0.02 * k, 1000 + 20 * k
-        if k % 10 == 0:
-            log.add(ground, m.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3))
-        log.add(ground, m.MAVLink_attitude_message(stamp, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0), k % 2)
-        log.add(ground, m.MAVLink_nav_controller_output_message(k % 5, 0, 0, 0, 0, 0, 0, 0))
-    return log.data
-
-
-SMALL = {
-    "ULog": ("pyulog", small_ulog),
-    "DataFlash": ("numpy", lambda: copter(60).data),
-    "DataFlash text": ("numpy", small_text),
-    "tlog": ("pymavlink", small_tlog),
-}
+#: What opens a table.
+TABLE = r"open it with dtm\.read_recording\(path\)"
 
 
 class HangsError(BaseException):
@@ -119,7 +72,7 @@ def test_the_small_logs_are_read_and_small(name, tmp_path):
 def test_damaged_logs_end_in_a_log_or_a_clear_message(name, count, tmp_path, capfd, impatient):
     library, made = SMALL[name]
     pytest.importorskip(library, reason=f"{library} reads {name}")
-    rng = np.random.default_rng(19)
+    draw = random.Random(19)
     whole = made()
     path = tmp_path / "flight"
     path.write_bytes(whole)
@@ -128,7 +81,7 @@ def test_damaged_logs_end_in_a_log_or_a_clear_message(name, count, tmp_path, cap
     tracemalloc.start()
     try:
         for _ in range(count):
-            data = mutated(whole, rng)
+            data = mutated(whole, draw)
             path.write_bytes(data)
             tracemalloc.reset_peak()
             log = opened_or_refused(path)
@@ -175,9 +128,15 @@ def test_a_log_that_is_cut_off_is_read_as_far_as_it_goes(name, share, tmp_path):
     ("data", "words"),
     [
         (b"", "is empty"),
-        (b"time,reference\n0,1\n", "is no log of a known format: it begins with 74 69 6d 65"),
-        (b"\x1f\x8b\x08" + bytes(20), r"is compressed \(gzip\): unpack it"),
-        (b"MATLAB 5.0 MAT-file" + bytes(200), "is a MAT file"),
+        (b"\x07\x03time", "is no log of a known format: it begins with 07 03 74 69"),
+        (b"time,reference\n0,1\n", rf"is a text, and no log .*: {TABLE}"),
+        ("höhe\n".encode("latin-1"), rf"is a text, and no log .*: {TABLE}"),
+        (b"\x1f\x8b\x08" + bytes(20), rf"is packed by gzip: {TABLE}"),
+        (b"PAR1" + bytes(20), rf"is a Parquet table: {TABLE}"),
+        (b"ARROW1\0\0" + bytes(20), rf"is an Arrow table: {TABLE}"),
+        (b"MATLAB 5.0 MAT-file" + bytes(200), rf"is a MAT file: {TABLE}"),
+        (b"MATLAB 7.3 MAT-file" + bytes(200), rf"is a MAT file: {TABLE}"),
+        (b"PK\x03\x04" + bytes(200), "is a zip archive, .*: unpack it"),
         (b"\xa3\x95\x80" + bytes(200), "holds no message whose format it tells"),
         (b"\xa3\x95\x07", "holds no message whose format it tells"),
         (b"FMT, 1, 2, ATT, Qc, TimeUS\nATT, 1, 2\n", "holds no message whose format it tells"),

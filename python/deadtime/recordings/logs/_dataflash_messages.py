@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -62,7 +63,7 @@ class Layout:
         return (name, 1e-3) if name in self.numbers else None
 
 
-class Messages(Mapping[str, Topic]):
+class Messages(Mapping[str, Topic], ABC):
     """The topics of a log: decoded when they are asked for.
 
     Parameters
@@ -84,13 +85,13 @@ class Messages(Mapping[str, Topic]):
         self._densest = max(timed, key=lambda name: places[name].size, default=None)
         self._rows = self._instances()
 
+    @abstractmethod
     def columns(self, layout: Layout, places: NDArray[np.int64]) -> Mapping[str, Array]:
         """The numbers in the messages at these places."""
-        raise NotImplementedError
 
+    @abstractmethod
     def texts(self, name: str, column: str) -> list[str]:
         """A column of a type as texts; empty if the log has none."""
-        raise NotImplementedError
 
     def __getitem__(self, name: str) -> Topic:
         if name not in self._decoded:

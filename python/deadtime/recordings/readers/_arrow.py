@@ -7,14 +7,13 @@ from typing import Any
 
 from deadtime._base.extras import library
 from deadtime.recordings.readers._columns import Table
-from deadtime.recordings.readers._first_bytes import Format
 from deadtime.recordings.readers._limits import check_numbers, errors_of
 from deadtime.recordings.readers._tables import frame
 
 INSTALLS = "'deadtime[logs]'"
 
 
-def arrow_file(path: str | os.PathLike[str], kind: Format, wanted: set[str]) -> Table:
+def arrow_file(path: str | os.PathLike[str], kind: str, wanted: set[str]) -> Table:
     """The table of a file, of which only the `wanted` columns are kept."""
     pyarrow = library("pyarrow", f"reading {kind} files", INSTALLS)
     with errors_of(path, kind), pyarrow.OSFile(os.fspath(path)) as stream:
@@ -24,7 +23,7 @@ def arrow_file(path: str | os.PathLike[str], kind: Format, wanted: set[str]) -> 
 
 
 def _parquet(
-    stream: Any, path: str | os.PathLike[str], kind: Format, wanted: set[str]
+    stream: Any, path: str | os.PathLike[str], kind: str, wanted: set[str]
 ) -> tuple[list[str], Any]:
     parquet = library("pyarrow.parquet", f"reading {kind} files", INSTALLS)
     with parquet.ParquetFile(stream) as file:
@@ -35,7 +34,7 @@ def _parquet(
 
 
 def _ipc(
-    stream: Any, path: str | os.PathLike[str], kind: Format, wanted: set[str]
+    stream: Any, path: str | os.PathLike[str], kind: str, wanted: set[str]
 ) -> tuple[list[str], Any]:
     ipc = library("pyarrow.ipc", f"reading {kind} files", INSTALLS)
     with (ipc.open_stream if kind == "Arrow stream" else ipc.open_file)(stream) as reader:

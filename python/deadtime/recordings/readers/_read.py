@@ -8,11 +8,11 @@ from typing import Any
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.validation import OpenRange, Range, open_interval
+from deadtime.recordings._first_bytes import HEAD, format_of, opened, whole
 from deadtime.recordings._recording import Recording
 from deadtime.recordings.readers._arrow import arrow_file
 from deadtime.recordings.readers._columns import Signals, read_table, widened
 from deadtime.recordings.readers._csv import read_csv
-from deadtime.recordings.readers._first_bytes import HEAD, opened, table_format, whole
 from deadtime.recordings.readers._mat import mat_file
 from deadtime.recordings.readers._mat73 import mat73_file
 from deadtime.recordings.readers._tables import LABEL, table_in_memory
@@ -128,8 +128,8 @@ def _from_file(path: Path, names: dict[str, str], ends: Range, delimiter: str | 
     wanted = set(names.values())
     with opened(path) as stream:
         head = stream.read(HEAD)
-        kind = table_format(path, head)
-        if kind in ("text", "gzip"):
+        kind = format_of(path, head, "read_recording")
+        if kind in (None, "text", "gzip"):
             return read_csv(as_text(path, whole(stream, head), wanted, delimiter), names, ends)
     if delimiter is not None:
         raise ValueError(f"delimiter={delimiter!r}: {path} is a file of {kind}, which has none")

@@ -11,8 +11,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from deadtime._base.errors import RecordingError
+from deadtime.recordings._first_bytes import HEAD, format_of
 from deadtime.recordings.readers._columns import column_index
-from deadtime.recordings.readers._first_bytes import HEAD, table_format
 from deadtime.recordings.readers._limits import largest
 
 #: Separators, the likelier ones first.
@@ -54,9 +54,6 @@ class Text:
     encoding: str
     line: int
 
-    def __contains__(self, sign: bytes) -> bool:
-        return self.raw.find(sign, self.start) >= 0
-
     @property
     def body(self) -> bytes:
         """The lines below the header."""
@@ -65,8 +62,10 @@ class Text:
 
 def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | None) -> Text:
     """Find the header of a file, and the separator under which it holds the `wanted` names."""
-    if delimiter is not None and len(delimiter) != 1:
-        raise RecordingError(f"the delimiter {delimiter!r} is not one character")
+    if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n'):
+        raise RecordingError(
+            f"the delimiter {delimiter!r} is not one character, or it is a quote or a line end"
+        )
     text, encoding = _decodable(path, raw)
     comments = []
     start, number = 0, 0
@@ -96,7 +95,7 @@ def _decodable(path: object, raw: bytes) -> tuple[bytes, str]:
     """The text in UTF-8 or Latin-1 without a mark, with lines that end in a line feed."""
     if raw.startswith(b"\x1f\x8b"):
         raw = _unpacked(path, raw)
-        if table_format(path, raw[:HEAD]) != "text":
+        if format_of(path, raw[:HEAD], "read_recording") not in (None, "text"):
             raise RecordingError(f"{path} is packed by gzip and holds no text: unpack it")
     encoding = "utf-8"
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):

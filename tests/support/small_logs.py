@@ -1,0 +1,55 @@
+"""Small logs of autopilots, of at most 4 kB each: a corpus to damage."""
+
+from made_logs import Tlog, ULogFile, as_text, copter
+
+
+def small_ulog():
+    log = ULogFile()
+    log.info("char[3]", "sys_name", b"PX4")
+    log.info("char[4]", "ver_hw", b"TEST")
+    log.parameter("MC_ROLLRATE_P", 0.15)
+    log.topics(
+        {
+            "vehicle_rates_setpoint": ("roll", "pitch"),
+            "vehicle_angular_velocity": ("xyz[0]", "xyz[1]"),
+            "vehicle_status": ("arming_state", "nav_state"),
+        }
+    )
+    log.add("vehicle_status", 1.0, 2.0, 2.0)
+    for k in range(50):
+        log.add("vehicle_rates_setpoint", 1.0 + 0.02 * k, k % 5, 0.0)
+        log.add("vehicle_angular_velocity", 1.0 + 0.02 * k, (k - 1) % 5, 0.1)
+    log.dropout(30)
+    return log.data
+
+
+def small_text():
+    lines = [
+        "FMT, 5, 19, ATT, Qcccc, TimeUS,DesRoll,Roll,DesPitch,Pitch",
+        "FMT, 3, 15, MODE, QMB, TimeUS,Mode,ModeNum",
+        "FMT, 2, 31, PARM, QNf, TimeUS,Name,Value",
+        "PARM, 0, ATC_RAT_RLL_P, 0.135",
+        "MODE, 1000, ALT_HOLD, 2",
+    ]
+    lines += [f"ATT, {20_000 * k}, {k % 5}, {(k - 1) % 5}, 1.0, 1.00" for k in range(80)]
+    return as_text(lines)
+
+
+def small_tlog():
+    log = Tlog()
+    m = log.dialect
+    for k in range(30):
+        ground, stamp = 1.7e9 + 0.02 * k, 1000 + 20 * k
+        if k % 10 == 0:
+            log.add(ground, m.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3))
+        log.add(ground, m.MAVLink_attitude_message(stamp, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0), k % 2)
+        log.add(ground, m.MAVLink_nav_controller_output_message(k % 5, 0, 0, 0, 0, 0, 0, 0))
+    return log.data
+
+
+SMALL = {
+    "ULog": ("pyulog", small_ulog),
+    "DataFlash": ("numpy", lambda: copter(60).data),
+    "DataFlash text": ("numpy", small_text),
+    "tlog": ("pymavlink", small_tlog),
+}
