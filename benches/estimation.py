@@ -31,6 +31,10 @@ Run ``python benches/estimation.py --firmware [--keep DIR | --read DIR] [--quick
 ArduPilot's Copter in its software-in-the-loop build, and to estimate on these flights
 (`reality.firmware`). The flights take 15 minutes at the speed of the clock; `--keep` keeps their
 recordings and `--read` estimates on them again.
+
+Run ``python benches/estimation.py --rates [--runs N] [--method TEXT] [--quick]`` to estimate on
+simulated rate loops of multirotors at 1 kHz, beside the deconvolved step response and the masked
+cross-correlation of the field's tools (`rate_loops`).
 """
 
 from __future__ import annotations
@@ -52,6 +56,7 @@ import deadtime as dtm
 import numpy as np
 from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Waveform
 from deadtime.estimation._estimate import METHODS
+from rate_loops.table import print_rates
 from reality import firmware
 from reality.designs import print_designs
 from reality.oracle_table import print_oracle
@@ -482,6 +487,8 @@ def main() -> None:
     reality.add_argument("--free", help="fit in every row: delay,gain or delay,gain,lag")
     reality.add_argument("--json", type=Path, help="write the numbers of the rows to this file")
     reality.add_argument("--designs", action="store_true", help="print gains designed from them")
+    rates = parser.add_argument_group("rate loops of multirotors")
+    rates.add_argument("--rates", action="store_true", help="print their table alone")
     flown = parser.add_argument_group("flights against ArduPilot's Copter")
     flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
     flown.add_argument("--keep", type=Path, metavar="DIR", help="keep the recordings in a folder")
@@ -494,6 +501,11 @@ def main() -> None:
         return
     if given.designs:
         print_designs(given.runs or (1 if given.quick else 200), given.processes)
+        return
+    if given.rates:
+        print_rates(
+            given.runs or (1 if given.quick else 100), given.processes, given.method, given.quick
+        )
         return
     if given.reality:
         runs = given.runs or (2 if given.quick else 300 if given.oracle else 1000)

@@ -1,0 +1,182 @@
+"""Estimate on logs of rate loops, and print bias, spread and coverage beside the bounds."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import chain
+from multiprocessing import get_context
+from typing import NamedTuple
+
+import deadtime as dtm
+import numpy as np
+
+from rate_loops.bound import covariance, deviation_of, deviation_of_sum
+from rate_loops.field_tools import (
+    Measured,
+    correlation_lag,
+    step_crossing,
+    true_crossing,
+    true_lag,
+)
+from rate_loops.generator import CORNER, DAMPING, Array, Log, Vehicle, record
+
+#: Normal quantile of the intervals of tools that have a standard error alone.
+NORMAL = 1.96
+
+#: What the loop is guessed to be before the estimate: motor lag, s, and gain.
+GUESS = 0.05, 50.0
+
+#: The low-passes of the gyro by their order.
+FILTERS = {1: "first-order low-pass", 2: "second-order low-pass"}
+
+
+class Outcome(NamedTuple):
+    """One answer: its error and the least standard deviation, s."""
+
+    error: float
+    bound: float
+    held: bool
+    adequate: bool
+    seconds: float
+
+
+class Estimator(NamedTuple):
+    """A method with the rows it reads: every one, or one in so many."""
+
+    name: str
+    every: int = 0
+
+
+ESTIMATORS = (
+    Estimator("output_error, every row: delay + lag", 1),
+    Estimator("output_error, one row in 4: delay + lag", 4),
+    Estimator("deconvolved step response: 50 % time"),
+    Estimator("masked cross-correlation: lag of peak"),
+)
+
+
+def known_loop(vehicle: Vehicle) -> dtm.ControlLoop:
+    """What the estimator is told: the gyro's low-pass, and that the airframe integrates."""
+    lag, gain = GUESS
+    if vehicle.order == 1:
+        plant = dtm.FactoredPlant([lag, 1.0 / CORNER], gain=gain, integrator=True)
+    else:
+        plant = dtm.FactoredPlant(
+            [lag], gain=gain, integrator=True, pole_frequency=CORNER, pole_damping=DAMPING
+        )
+    return dtm.ControlLoop(plant, dtm.P(1.0))
+
+
+def recording_of(log: Log, every: int) -> dtm.Recording:
+    """One row in so many of the log, with the mean of the commands that are sent until the next."""
+    command = log.actuator.reshape(-1, every).mean(axis=1)
+    return dtm.Recording(log.time[::every], log.setpoint[::every], log.response[::every], command)
+
+
+def ours(log: Log, every: int, bound: float) -> Outcome:
+    """The sum of delay and motor lag; that of the low-pass is known."""
+    begin = time.process_time()
+    recording = recording_of(log, every)
+    fit = dtm.estimate_delay(
+        recording, known_loop(log.vehicle), method="output_error", free=["delay", "gain", "lag_1"]
+    )
+    low, high = fit.ci(0.95, "delay+lag") if fit.calibrated else (math.nan, math.nan)
+    seconds = time.process_time() - begin
+    truth = log.vehicle.delay + log.vehicle.lag + log.vehicle.filter_lag
+    return Outcome(fit.delay_plus_lag - truth, bound, low <= truth <= high, fit.adequate, seconds)
+
+
+def theirs(
+    log: Log,
+    tool: Callable[[Array, Array], Measured],
+    truth: Callable[[Vehicle], float],
+    covered: Array,
+) -> Outcome:
+    """What a tool of the field measures, beside the true value of just that."""
+    begin = time.process_time()
+    found = tool(log.setpoint, log.response)
+    seconds = time.process_time() - begin
+    error = found.value - truth(log.vehicle)
+    held = abs(error) <= NORMAL * found.error
+    return Outcome(error, deviation_of(truth, log.vehicle, covered), held, True, seconds)
+
+
+def outcome(log: Log, estimator: Estimator, covered: Array) -> Outcome | None:
+    """None where there is no answer."""
+    try:
+        if estimator.every:
+            found = ours(log, estimator.every, deviation_of_sum(covered))
+        elif estimator.name.startswith("deconvolved"):
+            found = theirs(log, step_crossing, true_crossing, covered)
+        else:
+            of_setpoint = lambda vehicle: true_lag(vehicle, log.setpoint)  # noqa: E731
+            found = theirs(log, correlation_lag, of_setpoint, covered)
+    except (dtm.DeadtimeError, ValueError, ArithmeticError):
+        return None
+    return found if math.isfinite(found.error) else None
+
+
+def outcomes(
+    order: int, numbers: Sequence[int], estimators: Sequence[Estimator]
+) -> list[list[Outcome | None]]:
+    """Answers of all estimators on each of these runs; this runs in other processes."""
+    found = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about feedback, in every run
+        for number in numbers:
+            log = record(order, number)
+            covered = covariance(log)
+            found.append([outcome(log, each, covered) for each in estimators])
+    return found
+
+
+HEADER = (
+    f"{'':42}{'bias':>7}{'spread':>8}{'RMSE':>7}{'bound':>7}{'RMSE':>8}{'covered':>9}"
+    f"{'adequate':>10}{'none':>6}{'time':>7}\n"
+    f"{'':42}{'ms':>7}{'ms':>8}{'ms':>7}{'ms':>7}{'/bound':>8}{'%':>9}{'%':>10}{'%':>6}{'s':>7}"
+)
+
+
+def line(name: str, found: Sequence[Outcome | None]) -> str:
+    """A row of the table; errors and coverage are those of the adequate answers."""
+    answered = [one for one in found if one is not None]
+    adequate = [one for one in answered if one.adequate]
+    errors = 1e3 * np.array([one.error for one in adequate])
+    bounds = 1e3 * np.array([one.bound for one in adequate])
+    shares = [len(adequate) / len(found), 1.0 - len(answered) / len(found)]
+    seconds = float(np.median([one.seconds for one in answered])) if answered else math.nan
+    if not adequate:
+        numbers = [math.nan] * 6
+    else:
+        rmse, bound = (float(np.sqrt(np.mean(one**2))) for one in (errors, bounds))
+        spread = float(np.std(errors))
+        held = 100.0 * float(np.mean([one.held for one in adequate]))
+        numbers = [float(np.mean(errors)), spread, rmse, bound, rmse / bound, held]
+    values = [*numbers, *(100.0 * share for share in shares), seconds]
+    formats = ("7.2f", "8.2f", "7.2f", "7.2f", "8.2f", "9.1f", "10.0f", "6.0f", "7.2f")
+    cells = (
+        f"{'-':>{int(form.split('.')[0])}}" if math.isnan(value) else f"{value:{form}}"
+        for value, form in zip(values, formats, strict=True)
+    )
+    return f"  {name:40}{''.join(cells)}"
+
+
+def print_rates(runs: int, processes: int, text: str = "", quick: bool = False) -> None:
+    """Measure and print the methods whose name contains `text`; if `quick`, none on every row."""
+    estimators = [
+        each for each in ESTIMATORS if text in each.name and not (quick and each.every == 1)
+    ]
+    print(HEADER)
+    begin = time.perf_counter()
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        for order, title in FILTERS.items():
+            parts = [pool.submit(outcomes, order, [number], estimators) for number in range(runs)]
+            rows = list(chain.from_iterable(part.result() for part in parts))
+            print(title)
+            for each, column in zip(estimators, zip(*rows, strict=True), strict=True):
+                print(line(each.name, column), flush=True)
+    print(f"{runs} runs each, {time.perf_counter() - begin:.0f} s")
