@@ -14,15 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.stats import t as student
 
 from rate_loops.generator import BEFORE, SAMPLE, Array, Vehicle, fly
 
 #: Windows of the deconvolution: their rows, the rows from one to the next, and how much of the
 #: response is computed. Windows whose setpoint stays below the least are left out.
-WINDOW, HOP, RESPONSE, LEAST = 1500, 125, 300, 0.5
+WINDOW, HOP, RESPONSE, LEAST = 1000, 125, 300, 0.5
 
-#: Power that is added to that of the setpoint, as a share of its largest.
-WIENER = 1e-4
+#: Power that is added to that of the setpoint, as a share of its largest. This and the windows have
+#: the least error on these logs: shorter windows make the crossing early, more power makes it late.
+WIENER = 1e-2
 
 #: Largest lag of the correlation, rows; setpoint below which a row is masked, rad/s; blocks of rows
 #: whose lags scatter.
@@ -30,10 +32,18 @@ LONGEST, QUIET, BLOCKS = 200, 0.1, 4
 
 
 class Measured(NamedTuple):
-    """A time and its standard error, s; NaN where there is none."""
+    """A time and half the width of its 95 % interval, s; NaN where there is none."""
 
     value: float
-    error: float
+    half: float
+
+
+def half_width(parts: Array, independent: float) -> float:
+    """Half a 95 % interval of a mean from the scatter of its parts, by Student's distribution."""
+    if independent <= 1.0:
+        return math.nan
+    quantile = float(student.ppf(0.975, independent - 1.0))
+    return quantile * float(np.std(parts, ddof=1)) / math.sqrt(independent)
 
 
 def crossing(step: Array) -> float:
@@ -51,7 +61,7 @@ def true_crossing(vehicle: Vehicle) -> float:
 
 
 def step_crossing(setpoint: Array, response: Array) -> Measured:
-    """Crossing of one half of the deconvolved step response; the error from the windows."""
+    """Crossing of one half of the deconvolved step response; the interval from the windows."""
     hann = np.hanning(WINDOW)
     steps = []
     for begin in range(0, setpoint.size - WINDOW + 1, HOP):
@@ -64,9 +74,10 @@ def step_crossing(setpoint: Array, response: Array) -> Measured:
         steps.append(np.cumsum(impulse[:RESPONSE]))
     if not steps:
         return Measured(math.nan, math.nan)
-    single = np.array([crossing(step) for step in steps])
-    apart = max(1.0, len(steps) * HOP / WINDOW)
-    return Measured(crossing(np.mean(steps, axis=0)), float(np.nanstd(single)) / math.sqrt(apart))
+    times = np.array([crossing(step) for step in steps])
+    times = times[np.isfinite(times)]
+    half = half_width(times, times.size * HOP / WINDOW)
+    return Measured(crossing(np.mean(steps, axis=0)), half)
 
 
 def correlation(setpoint: Array, response: Array, mask: Array) -> Array:
@@ -92,13 +103,13 @@ def parabolic_peak(values: Array) -> float:
 
 
 def correlation_lag(setpoint: Array, response: Array) -> Measured:
-    """Lag of the largest correlation; the error from that of blocks of the log."""
+    """Lag of the largest correlation; the interval from blocks of the log."""
     mask = np.abs(setpoint) >= QUIET
     parts = np.array_split(np.arange(mask.size), BLOCKS)
     lags = np.array([parabolic_peak(correlation(setpoint[p], response[p], mask[p])) for p in parts])
     lags = lags[np.isfinite(lags)]
-    error = float(np.std(lags, ddof=1)) / math.sqrt(lags.size) if lags.size > 1 else math.nan
-    return Measured(parabolic_peak(correlation(setpoint, response, mask)), error)
+    value = parabolic_peak(correlation(setpoint, response, mask))
+    return Measured(value, half_width(lags, lags.size))
 
 
 def true_lag(vehicle: Vehicle, setpoint: Array) -> float:

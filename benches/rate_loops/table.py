@@ -24,9 +24,6 @@ from rate_loops.field_tools import (
 )
 from rate_loops.generator import CORNER, DAMPING, Array, Log, Vehicle, record
 
-#: Normal quantile of the intervals of tools that have a standard error alone.
-NORMAL = 1.96
-
 #: What the loop is guessed to be before the estimate: motor lag, s, and gain.
 GUESS = 0.05, 50.0
 
@@ -101,7 +98,7 @@ def theirs(
     found = tool(log.setpoint, log.response)
     seconds = time.process_time() - begin
     error = found.value - truth(log.vehicle)
-    held = abs(error) <= NORMAL * found.error
+    held = abs(error) <= found.half
     return Outcome(error, deviation_of(truth, log.vehicle, covered), held, True, seconds)
 
 

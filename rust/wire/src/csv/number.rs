@@ -35,17 +35,27 @@ pub fn number(cell: &[u8]) -> Result<Number, NoNumber> {
     if let Some(found) = short(cell) {
         return Ok(found);
     }
+    if let Some(value) = std::str::from_utf8(cell)
+        .ok()
+        .and_then(|cell| cell.parse().ok())
+    {
+        return Ok(marked(value, cell.contains(&b'.')));
+    }
     let text = text(cell);
     let trimmed = text.trim_matches(is_blank);
     if trimmed.contains(',') {
         return comma(trimmed);
     }
     let value = trimmed.parse().map_err(|_| NoNumber::Other)?;
-    Ok(if trimmed.contains('.') {
+    Ok(marked(value, trimmed.contains('.')))
+}
+
+const fn marked(value: f64, has_point: bool) -> Number {
+    if has_point {
         Number::Point(value)
     } else {
         Number::Whole(value)
-    })
+    }
 }
 
 /// A number without an exponent whose digits are a double, as are the powers of ten by which they
@@ -77,10 +87,7 @@ fn short(cell: &[u8]) -> Option<Number> {
     #[allow(clippy::cast_precision_loss)] // exact
     let value = whole as f64 / POWERS.get(decimals)?;
     let value = if is_negative { -value } else { value };
-    Some(match point {
-        Some(_) => Number::Point(value),
-        None => Number::Whole(value),
-    })
+    Some(marked(value, point.is_some()))
 }
 
 /// A number with a decimal comma.
