@@ -870,6 +870,7 @@ class _BlackboxLayout(Protocol):
 
 def blackbox_frames(log: bytes, layout: _BlackboxLayout, limit: int) -> BlackboxFrames: ...
 
+@final
 class CsvColumns:
     values: Final[list[NDArray[np.float64]]]
     backward: Final[tuple[int, float, float] | None]
