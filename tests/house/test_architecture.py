@@ -52,6 +52,7 @@ WIRE = {
     "links.ardrone2.navdata",
     "links.udp.packets",
     "recordings.logs._blackbox_frames",
+    "recordings.readers._csv",
 }
 
 #: Imports for types from a later room, with the reason.
