@@ -2,8 +2,8 @@
 
 Four columns, 300 000 rows: a log as controllers print it (six decimals) and one with all digits of
 its doubles. Ours finds the columns, checks times and values and makes a `Recording`; the peers make
-a table. Ours is measured with pyarrow loaded, as it is where pandas or polars are used, and without
-it. The limits beside them are reading the bytes, and one pass over them that counts separators.
+a table. The limits beside them are reading the bytes, and one pass over them that counts
+separators.
 Run ``python benches/peers/read_csv.py [--quick]``.
 """
 
@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -51,24 +50,7 @@ def write(path: Path, rows: int, digits: int | None) -> None:
 
 def calls(path: Path) -> dict[str, Call]:
     """What is measured, by its name."""
-
-    def ours() -> dtm.Recording:
-        return dtm.read_recording(path, command="command")
-
-    def without_pyarrow() -> dtm.Recording:
-        loaded = sys.modules.get("pyarrow")
-        sys.modules["pyarrow"] = None  # type: ignore[assignment]
-        try:
-            return ours()
-        finally:
-            if loaded is None:
-                del sys.modules["pyarrow"]
-            else:
-                sys.modules["pyarrow"] = loaded
-
-    found: dict[str, Call] = {"ours, without pyarrow": without_pyarrow}
-    if optional("pyarrow"):
-        found["ours, with pyarrow"] = ours
+    found: dict[str, Call] = {"ours": lambda: dtm.read_recording(path, command="command")}
     if pandas := optional("pandas"):
         found["pandas.read_csv"] = lambda: pandas.read_csv(path)
     if polars := optional("polars"):
@@ -98,7 +80,7 @@ def main() -> None:
                     times[one].append(time.perf_counter() - start)
             size = path.stat().st_size
             print(f"{rows} rows, {name}, {size / 1e6:.1f} MB")
-            base = statistics.median(times.get("ours, with pyarrow", next(iter(times.values()))))
+            base = statistics.median(times["ours"])
             print(f"{'':26s}{'ms':>9s}{'MB/s':>9s}{'ratio to ours':>16s}")
             for one, values in times.items():
                 middle = statistics.median(values)

@@ -68,8 +68,8 @@ def read_recording(
     -----
     A text has one line of column names, then one line a sample. Lines that begin with ``#`` and
     empty lines are skipped. A comma is read as a decimal point where columns are separated by
-    another character, or the cell is quoted, if no cell has a point. The text is in UTF-8, UTF-16
-    with a mark, or Latin-1.
+    another character, or the cell is quoted, if no cell has a point; ``1,234`` only if another
+    cell cannot be a thousand. The text is in UTF-8, UTF-16 with a mark, or Latin-1.
 
     In a MAT file, ``"t"`` is a vector, ``"rates[1]"`` the second signal of a matrix, whose longer
     axis is time, ``"log.signals.values[2]"`` one of a structure, as Simulink writes it, and
