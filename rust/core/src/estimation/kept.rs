@@ -61,8 +61,8 @@ mod tests {
         let mut made = 0;
         let mut kept = Kept::new();
         for _ in 0..5 {
-            for k in 0..KEPT {
-                let length = 0.01 * (k + 1) as f64;
+            for k in 1..=16_u32 {
+                let length = 0.01 * f64::from(k);
                 let value = *kept.at(length * (1.0 + 1e-13), 1.0, || {
                     made += 1;
                     length
@@ -76,10 +76,10 @@ mod tests {
     #[test]
     fn one_length_more_takes_the_place_of_an_old_one() {
         let mut kept = Kept::new();
-        for k in 0..4 * KEPT {
-            let length = 1.0 + k as f64;
+        for k in 0..64_u32 {
+            let length = 1.0 + f64::from(k);
             assert_eq!(*kept.at(length, 0.0, || k), k);
-            assert_eq!(*kept.at(length, 0.0, || usize::MAX), k);
+            assert_eq!(*kept.at(length, 0.0, || u32::MAX), k);
         }
     }
 }
