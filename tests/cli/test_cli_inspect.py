@@ -49,4 +49,4 @@ def test_what_is_wrong_is_one_line(log, tmp_path):
     assert "there is no file" in one_clear_line(run("inspect", tmp_path / "no.ulg"))
     text = tmp_path / "flight.csv"
     text.write_text("time,reference\n")
-    assert "is no log of a known format" in one_clear_line(run("inspect", text))
+    assert "open it with dtm.read_recording" in one_clear_line(run("inspect", text))

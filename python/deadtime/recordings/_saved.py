@@ -74,11 +74,13 @@ def load_table(path: str | os.PathLike[str]) -> dict[str, Any]:
         if format_of(path, head, "read_recording") == "Parquet":
             described = parquet_metadata(path).get(b"deadtime", b"")
             table = arrow_file(path, "Parquet", set(NAMES))
-            return read_table(table, _signals(table.names), EVER) | _described(path, described)
+            told = _described(path, described)
+            return read_table(table, _signals(table.names), EVER) | told
         text = as_text(path, whole(stream, head), NAMES, ",")
     title, comment, *_ = (*text.comments, "", "")
     described = comment[1:].encode() if title == TITLE else b""
-    return read_csv(text, _signals(text.header), EVER) | _described(path, described)
+    told = _described(path, described)
+    return read_csv(text, _signals(text.header), EVER) | told
 
 
 def _signals(names: Iterable[str]) -> dict[str, str]:
