@@ -27,10 +27,9 @@ def test_text_and_page(log, monkeypatch, tmp_path):
 def test_json_and_two_logs(log):
     told = found("latency", log, "--loop", "roll rate")
     assert [one["command"] for one in told["loops"]] == ["setpoint", "actuator"]
-    told = found("latency", log, log)
+    told = found("latency", log, log, "--loop", "roll rate")
     assert len(told["logs"]) == 2
     assert all(one["change"] == 0.0 for one in told["changes"])
-    assert "flight.bin" in run("latency", log, log).stdout
 
 
 def test_what_is_wrong_is_one_line(log, tmp_path):

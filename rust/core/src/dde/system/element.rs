@@ -7,7 +7,8 @@
 //! ones; this is followed a few times, by several kinds of sizes that each piece stores, the first
 //! being that of x itself. Followed without end, the bound would grow where x does not. The element
 //! is resolved once the last coefficients of x′ are below [`RESOLVED`] F_i; those of x are smaller
-//! by another h/(4k).
+//! by another h/(4k). Rounding errors of longer descent are told by halving: it leaves them as they
+//! are, and at least halves what is a signal.
 
 use super::legendre::{DEGREE, TERMS};
 use super::solver::Solver;
@@ -17,6 +18,13 @@ use super::track::{KINDS, NEGLIGIBLE, Sizes, Track};
 /// Coefficients of x′ below this share of F count as rounding errors: ten units, because each sums
 /// 25 values.
 const RESOLVED: f64 = 10.0 * f64::EPSILON;
+
+/// Above this multiple of [`RESOLVED`] F the last coefficients are a signal.
+const MOST_NOISE: f64 = 64.0;
+
+/// Halving an element leaves less than this of the last coefficients of a signal: one half where its
+/// derivative jumps, and far less where it is smooth.
+const LEFT: f64 = 0.7;
 
 /// Coefficients of x′ below this share of F are dropped.
 const NOTHING: f64 = 0.25 * f64::EPSILON;
@@ -177,6 +185,22 @@ impl Element {
     /// Is the truncated series exact up to rounding errors?
     pub(super) fn is_resolved(&self) -> bool {
         self.needed < DEGREE - 1
+    }
+
+    /// The last coefficients as a multiple of [`RESOLVED`] F.
+    pub(super) fn tail(&self) -> f64 {
+        let parts = self.f.chunks_exact(TERMS).zip(&self.slope_size);
+        parts
+            .map(|(f, size)| {
+                f[DEGREE - 1].abs().max(f[DEGREE].abs()) / (RESOLVED * size).max(NEGLIGIBLE)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Do the last coefficients consist of rounding errors, given those of an element twice as long?
+    pub(super) fn is_noise(&self, before: f64) -> bool {
+        let tail = self.tail();
+        tail < MOST_NOISE && tail > LEFT * before
     }
 
     /// May the next element be longer?

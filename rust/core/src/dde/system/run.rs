@@ -131,18 +131,25 @@ pub(super) fn run(
         let stop = jumps.next(t + reach + tolerance, &scale).min(last);
         let mut whole = reach.min(stop - t);
         let tracks = [&states, &slopes, &inputs.track];
+        let mut tail = f64::INFINITY;
         let h = loop {
             // Equal parts: their delayed counterparts then lie on whole elements, and their factors
             // can be used again.
             let parts = (whole / suggested - 1e-9).ceil().max(1.0);
             let h = if parts > 1.0 { whole / parts } else { whole };
             if let Some(read) = element.solve(&x, t, h, tolerance, tracks) {
-                (whole, suggested) = (read, read.max(0.5 * h));
+                (whole, suggested, tail) = (read, read.max(0.5 * h), f64::INFINITY);
                 continue;
             }
             if element.is_resolved() || h <= 64.0 * tolerance {
                 break h;
             }
+            if element.is_noise(tail) {
+                // Shorter than rounding errors need: the next one may be twice as long.
+                suggested = 4.0 * h;
+                break h;
+            }
+            tail = element.tail();
             suggested = 0.5 * h;
         };
         if element.has_room() {
