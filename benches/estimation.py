@@ -503,9 +503,7 @@ def main() -> None:
         print_designs(given.runs or (1 if given.quick else 200), given.processes)
         return
     if given.rates:
-        print_rates(
-            given.runs or (1 if given.quick else 100), given.processes, given.method, given.quick
-        )
+        print_rates(given.runs or (2 if given.quick else 1000), given.processes, given.method)
         return
     if given.reality:
         runs = given.runs or (2 if given.quick else 300 if given.oracle else 1000)

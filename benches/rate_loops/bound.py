@@ -22,14 +22,14 @@ from rate_loops.generator import (
     GUSTS,
     MOTORS,
     RATE,
-    SAMPLE,
     Array,
     Log,
     Vehicle,
     arrivals,
-    drift,
     held,
-    intensities,
+    memory,
+    read,
+    reading_noise,
     stepped,
 )
 
@@ -73,13 +73,13 @@ def mean(log: Log, changed: dict[str, float]) -> Array:
     known = {one.name for one in fields(Vehicle)}
     own = {name: getattr(log.vehicle, name) + by for name, by in changed.items() if name in known}
     vehicle = replace(log.vehicle, **own)
-    F = drift(vehicle)
-    A = stepped(F, np.zeros(len(F)))[0]
+    A = stepped(vehicle)[0]
     whole, before, after = arrivals(vehicle)
     sent = np.concatenate([np.full(whole + 1, log.actuator[0]), log.actuator])
-    trim = vehicle.trim * held(F, RATE, SAMPLE)
-    state = np.zeros(len(F))
-    state[[RATE, FILTERED]] = changed.get("rate", 0.0)
+    trim = vehicle.trim * read(vehicle, held(vehicle, RATE))
+    state = np.zeros(len(A))
+    state[RATE] = changed.get("rate", 0.0)
+    state[FILTERED:] = state[RATE] * settled(vehicle.order)
     state[MOTORS] = vehicle.gain * log.actuator[0] + changed.get("motors", 0.0)
     inputs = np.outer(sent[:-1], before) + np.outer(sent[1:], after) + trim
     found = np.empty(log.time.size)
@@ -91,13 +91,13 @@ def mean(log: Log, changed: dict[str, float]) -> Array:
 
 def whitened(vehicle: Vehicle, columns: Array) -> Array:
     """Innovations of columns of the response, in their standard deviations."""
-    F, intensity = drift(vehicle), intensities(vehicle)
-    A, Q = stepped(F, intensity)
-    size = len(F)
+    A, Q = stepped(vehicle)
+    size = len(A)
     covered = np.zeros((size, size))
     covered[GUSTS, GUSTS] = GUST**2
     inner = slice(FILTERED, size)
-    covered[inner, inner] = stationary(A[inner, inner], gyro_alone(vehicle))
+    kept, b = memory(vehicle.order)
+    covered[inner, inner] = stationary(kept, reading_noise(vehicle.order) ** 2 * np.outer(b, b))
     state, found = np.zeros((size, columns.shape[1])), np.empty_like(columns)
     for k, row in enumerate(columns):
         variance = covered[FILTERED, FILTERED] + DIGITS**2
@@ -109,11 +109,10 @@ def whitened(vehicle: Vehicle, columns: Array) -> Array:
     return found
 
 
-def gyro_alone(vehicle: Vehicle) -> Array:
-    """What a sample adds to the covariance of the filter's states by the gyro's noise."""
-    intensity = intensities(vehicle)
-    intensity[GUSTS] = 0.0
-    return stepped(drift(vehicle), intensity)[1][FILTERED:, FILTERED:]
+def settled(order: int) -> Array:
+    """States of the low-pass that has long read one."""
+    A, b = memory(order)
+    return np.linalg.solve(np.eye(b.size) - A, b)
 
 
 def stationary(A: Array, Q: Array) -> Array:

@@ -2,9 +2,9 @@
 
 A discrete PI controller reads the filtered gyro and sends a torque. It arrives after the transport
 delay, is held until the next arrives, and passes the motors (one lag). Gusts and trim are torques
-that are added to that of the motors before the airframe integrates it. The noise of the gyro passes
-the same low-pass as the rate. All of this is one linear stochastic differential equation, which is
-stepped exactly from row to row.
+that are added to that of the motors before the airframe integrates it. The gyro is read once a row,
+with white noise, and passes a digital low-pass as flight controllers have it. Torques and rate are
+one linear stochastic differential equation, which is stepped exactly from row to row.
 """
 
 from __future__ import annotations
@@ -16,15 +16,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, lfilter, sosfilt
 
 Array = NDArray[np.float64]
 
 #: Sample time of controller and log, s; rows of a log, and rows that are flown before it.
 SAMPLE, ROWS, BEFORE = 1e-3, 4000, 1000
 
-#: Corner of the gyro's low-pass, rad/s, and the damping of one of second order (Butterworth).
-CORNER, DAMPING = 2.0 * math.pi * 100.0, math.sqrt(0.5)
+#: Corner of the gyro's low-pass, Hz.
+CORNER = 100.0
+
+#: Rows after which nothing is left of an impulse into it.
+FADED = 200
 
 #: Deviation of the torque of gusts, rad/s², and its correlation time, s.
 GUST, GUST_TIME = 4.0, 0.3
@@ -35,8 +38,18 @@ TRIM = 3.0
 #: Deviation of the gyro's noise behind the filter, rad/s, and of that of the log's digits.
 GYRO, DIGITS = 0.03, 0.003
 
-#: Places in the state.
+#: Places in the state: those of the vehicle, and the output of the low-pass before its memory.
 GUSTS, MOTORS, RATE, FILTERED = range(4)
+
+
+def low_pass(order: int) -> tuple[Array, Array]:
+    """Coefficients b and a of a first-order lag, or of a Butterworth filter of second order."""
+    if order == 1:
+        part = 2.0 * math.pi * CORNER * SAMPLE
+        k = part / (part + 1.0)
+        return np.array([k]), np.array([1.0, k - 1.0])
+    b, a = butter(order, CORNER, fs=1.0 / SAMPLE)
+    return b, a
 
 
 @dataclass(frozen=True)
@@ -54,7 +67,9 @@ class Vehicle:
     @property
     def filter_lag(self) -> float:
         """Delay of the gyro's low-pass at low frequencies, s."""
-        return (1.0 if self.order == 1 else 2.0 * DAMPING) / CORNER
+        b, a = low_pass(self.order)
+        late = [np.average(np.arange(part.size), weights=part) for part in (b, a)]
+        return SAMPLE * float(late[0] - late[1])
 
 
 @dataclass(frozen=True)
@@ -69,45 +84,63 @@ class Log:
 
 
 def drift(vehicle: Vehicle) -> Array:
-    """F of dx = F x dt + torque: gust, motors, rate, filtered gyro and its slope."""
-    F = np.zeros((3 + vehicle.order,) * 2)
+    """F of dx = F x dt + torque: gust, motors, rate."""
+    F = np.zeros((FILTERED, FILTERED))
     F[GUSTS, GUSTS] = -1.0 / GUST_TIME
     F[MOTORS, MOTORS] = -1.0 / vehicle.lag
     F[RATE, [GUSTS, MOTORS]] = 1.0
-    if vehicle.order == 1:
-        F[FILTERED, [RATE, FILTERED]] = CORNER, -CORNER
-    else:
-        F[FILTERED, FILTERED + 1] = 1.0
-        F[FILTERED + 1, [RATE, FILTERED]] = CORNER**2, -(CORNER**2)
-        F[FILTERED + 1, FILTERED + 1] = -2.0 * DAMPING * CORNER
     return F
 
 
-def intensities(vehicle: Vehicle) -> Array:
-    """Diagonal of the intensity of white noise: gusts, and the gyro's at the filter."""
-    found = np.zeros(3 + vehicle.order)
-    found[GUSTS] = 2.0 * GUST**2 / GUST_TIME
-    # Noise of intensity q into the filter leaves it with the variance q w / 2, or q w / (4 d).
-    bandwidth = CORNER / 2.0 if vehicle.order == 1 else CORNER / (4.0 * DAMPING)
-    found[-1] = GYRO**2 / bandwidth * CORNER ** (2 * vehicle.order)
-    return found
+def memory(order: int) -> tuple[Array, Array]:
+    """A and b of the low-pass, w = A w + b x for each reading x; its output is the first of w.
+
+    The rest of w is what it keeps for the next readings (direct form II, transposed).
+    """
+    b, a = low_pass(order)
+    size = a.size
+    b = np.pad(b, (0, size - b.size))
+    A = np.eye(size, k=1)
+    A[1:, 1] -= a[1:]
+    return A, b - b[0] * np.concatenate([[0.0], a[1:]])
 
 
-def stepped(F: Array, intensity: Array) -> tuple[Array, Array]:
+def read(vehicle: Vehicle, change: Array) -> Array:
+    """What a change of gust, motors and rate in a sample is worth in the whole state after it."""
+    return np.concatenate([change, memory(vehicle.order)[1] * change[RATE]])
+
+
+def reading_noise(order: int) -> float:
+    """Deviation of the gyro's noise before the low-pass, which leaves `GYRO` of it."""
+    impulse = lfilter(*low_pass(order), np.eye(1, FADED)[0])
+    return GYRO / math.sqrt(impulse @ impulse)
+
+
+def stepped(vehicle: Vehicle) -> tuple[Array, Array]:
     """Transition over a sample and covariance of what is added in it (Van Loan 1978)."""
-    size = len(F)
-    block = np.block([[-F, np.diag(intensity)], [np.zeros_like(F), F.T]]) * SAMPLE
-    whole = expm(block)
-    A = whole[size:, size:].T
-    return A, A @ whole[:size, size:]
+    F = drift(vehicle)
+    intensity = np.zeros((FILTERED, FILTERED))
+    intensity[GUSTS, GUSTS] = 2.0 * GUST**2 / GUST_TIME
+    whole = expm(np.block([[-F, intensity], [np.zeros_like(F), F.T]]) * SAMPLE)
+    flown = whole[FILTERED:, FILTERED:].T
+    added = flown @ whole[:FILTERED, FILTERED:]
+    kept, b = memory(vehicle.order)
+    size = FILTERED + b.size
+    A = np.zeros((size, size))
+    A[:FILTERED, :FILTERED] = flown
+    A[FILTERED:, :FILTERED] = np.outer(b, flown[RATE])
+    A[FILTERED:, FILTERED:] = kept
+    into = np.vstack([np.eye(FILTERED), np.outer(b, np.eye(FILTERED)[RATE])])
+    Q = into @ added @ into.T
+    Q[FILTERED:, FILTERED:] += reading_noise(vehicle.order) ** 2 * np.outer(b, b)
+    return A, Q
 
 
-def held(F: Array, column: int, duration: float) -> Array:
-    """State after an input of one into `column` over this time."""
-    size = len(F)
-    block = np.zeros((size + 1, size + 1))
-    block[:size, :size], block[column, size] = F, 1.0
-    return np.asarray(expm(block * duration)[:size, size])
+def held(vehicle: Vehicle, column: int, duration: float = SAMPLE) -> Array:
+    """Gust, motors and rate after an input of one into `column` over this time."""
+    block = np.zeros((FILTERED + 1, FILTERED + 1))
+    block[:FILTERED, :FILTERED], block[column, FILTERED] = drift(vehicle), 1.0
+    return np.asarray(expm(block * duration)[:FILTERED, FILTERED])
 
 
 def arrivals(vehicle: Vehicle) -> tuple[int, Array, Array]:
@@ -116,10 +149,10 @@ def arrivals(vehicle: Vehicle) -> tuple[int, Array, Array]:
     A torque of u into the motors is `gain` u / lag of the slope of their state.
     """
     whole, part = divmod(vehicle.delay, SAMPLE)
-    F = drift(vehicle)
     scale = vehicle.gain / vehicle.lag
-    after = scale * held(F, MOTORS, SAMPLE - part)
-    return int(whole), scale * held(F, MOTORS, SAMPLE) - after, after
+    after = scale * held(vehicle, MOTORS, SAMPLE - part)
+    before = scale * held(vehicle, MOTORS) - after
+    return int(whole), read(vehicle, before), read(vehicle, after)
 
 
 def fly(vehicle: Vehicle, setpoint: Array, random: np.random.Generator | None) -> tuple[Array, ...]:
@@ -127,8 +160,8 @@ def fly(vehicle: Vehicle, setpoint: Array, random: np.random.Generator | None) -
 
     The noise begins stationary. Without it there is no trim either.
     """
-    F, size = drift(vehicle), 3 + vehicle.order
-    A, Q = stepped(F, intensities(vehicle))
+    A, Q = stepped(vehicle)
+    size = len(A)
     whole, before, after = arrivals(vehicle)
     rows = setpoint.size
     added, digits, state = np.zeros((rows, size)), np.zeros(rows), np.zeros(size)
@@ -136,7 +169,7 @@ def fly(vehicle: Vehicle, setpoint: Array, random: np.random.Generator | None) -
         values, vectors = np.linalg.eigh(Q)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         added = random.standard_normal((rows, size)) @ root.T
-        added += vehicle.trim * held(F, RATE, SAMPLE)
+        added += vehicle.trim * read(vehicle, held(vehicle, RATE))
         digits = DIGITS * random.standard_normal(rows)
         state[GUSTS] = GUST * random.standard_normal()
     measured, command = np.zeros((2, rows))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import deadtime as dtm
 import numpy as np
+from deadtime.estimation import OutputError
 
 from rate_loops.bound import covariance, deviation_of, deviation_of_sum
 from rate_loops.field_tools import (
@@ -22,7 +23,7 @@ from rate_loops.field_tools import (
     true_crossing,
     true_lag,
 )
-from rate_loops.generator import CORNER, DAMPING, Array, Log, Vehicle, record
+from rate_loops.generator import SAMPLE, Array, Log, Vehicle, low_pass, record
 
 #: What the loop is guessed to be before the estimate: motor lag, s, and gain.
 GUESS = 0.05, 50.0
@@ -41,49 +42,25 @@ class Outcome(NamedTuple):
     seconds: float
 
 
-class Estimator(NamedTuple):
-    """A method with the rows it reads: every one, or one in so many."""
-
-    name: str
-    every: int = 0
-
-
-ESTIMATORS = (
-    Estimator("output_error, every row: delay + lag", 1),
-    Estimator("output_error, one row in 4: delay + lag", 4),
-    Estimator("deconvolved step response: 50 % time"),
-    Estimator("masked cross-correlation: lag of peak"),
+#: Ours, and two of the field.
+OURS, STEP, CORRELATION = (
+    "output_error: delay + lag",
+    "deconvolved step response: 50 % time",
+    "masked cross-correlation: lag of peak",
 )
 
 
-def known_loop(vehicle: Vehicle) -> dtm.ControlLoop:
-    """What the estimator is told: the gyro's low-pass, and that the airframe integrates."""
-    lag, gain = GUESS
-    if vehicle.order == 1:
-        plant = dtm.FactoredPlant([lag, 1.0 / CORNER], gain=gain, integrator=True)
-    else:
-        plant = dtm.FactoredPlant(
-            [lag], gain=gain, integrator=True, pole_frequency=CORNER, pole_damping=DAMPING
-        )
-    return dtm.ControlLoop(plant, dtm.P(1.0))
-
-
-def recording_of(log: Log, every: int) -> dtm.Recording:
-    """One row in so many of the log, with the mean of the commands that are sent until the next."""
-    command = log.actuator.reshape(-1, every).mean(axis=1)
-    return dtm.Recording(log.time[::every], log.setpoint[::every], log.response[::every], command)
-
-
-def ours(log: Log, every: int, bound: float) -> Outcome:
-    """The sum of delay and motor lag; that of the low-pass is known."""
+def ours(log: Log, bound: float) -> Outcome:
+    """The sum of delay and motor lag; the low-pass of the gyro is told, and that torques drift."""
     begin = time.process_time()
-    recording = recording_of(log, every)
-    fit = dtm.estimate_delay(
-        recording, known_loop(log.vehicle), method="output_error", free=["delay", "gain", "lag_1"]
-    )
+    lag, gain = GUESS
+    loop = dtm.ControlLoop(dtm.Integrator(gain, lag), dtm.P(1.0), sample_time=SAMPLE)
+    recording = dtm.Recording(log.time, log.setpoint, log.response, log.actuator)
+    method = OutputError(output_filter=low_pass(log.vehicle.order), air="vehicle")
+    fit = dtm.estimate_delay(recording, loop, method=method, free=["delay", "gain", "lag"])
     low, high = fit.ci(0.95, "delay+lag") if fit.calibrated else (math.nan, math.nan)
     seconds = time.process_time() - begin
-    truth = log.vehicle.delay + log.vehicle.lag + log.vehicle.filter_lag
+    truth = log.vehicle.delay + log.vehicle.lag
     return Outcome(fit.delay_plus_lag - truth, bound, low <= truth <= high, fit.adequate, seconds)
 
 
@@ -102,12 +79,12 @@ def theirs(
     return Outcome(error, deviation_of(truth, log.vehicle, covered), held, True, seconds)
 
 
-def outcome(log: Log, estimator: Estimator, covered: Array) -> Outcome | None:
+def outcome(log: Log, name: str, covered: Array) -> Outcome | None:
     """None where there is no answer."""
     try:
-        if estimator.every:
-            found = ours(log, estimator.every, deviation_of_sum(covered))
-        elif estimator.name.startswith("deconvolved"):
+        if name == OURS:
+            found = ours(log, deviation_of_sum(covered))
+        elif name == STEP:
             found = theirs(log, step_crossing, true_crossing, covered)
         else:
             of_setpoint = lambda vehicle: true_lag(vehicle, log.setpoint)  # noqa: E731
@@ -118,16 +95,16 @@ def outcome(log: Log, estimator: Estimator, covered: Array) -> Outcome | None:
 
 
 def outcomes(
-    order: int, numbers: Sequence[int], estimators: Sequence[Estimator]
+    order: int, numbers: Sequence[int], names: Sequence[str]
 ) -> list[list[Outcome | None]]:
-    """Answers of all estimators on each of these runs; this runs in other processes."""
+    """Answers of all methods on each of these runs; this runs in other processes."""
     found = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about feedback, in every run
         for number in numbers:
             log = record(order, number)
             covered = covariance(log)
-            found.append([outcome(log, each, covered) for each in estimators])
+            found.append([outcome(log, name, covered) for name in names])
     return found
 
 
@@ -162,18 +139,16 @@ def line(name: str, found: Sequence[Outcome | None]) -> str:
     return f"  {name:40}{''.join(cells)}"
 
 
-def print_rates(runs: int, processes: int, text: str = "", quick: bool = False) -> None:
-    """Measure and print the methods whose name contains `text`; if `quick`, none on every row."""
-    estimators = [
-        each for each in ESTIMATORS if text in each.name and not (quick and each.every == 1)
-    ]
+def print_rates(runs: int, processes: int, text: str = "") -> None:
+    """Measure and print the methods whose name contains `text`."""
+    names = [name for name in (OURS, STEP, CORRELATION) if text in name]
     print(HEADER)
     begin = time.perf_counter()
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         for order, title in FILTERS.items():
-            parts = [pool.submit(outcomes, order, [number], estimators) for number in range(runs)]
+            parts = [pool.submit(outcomes, order, [number], names) for number in range(runs)]
             rows = list(chain.from_iterable(part.result() for part in parts))
             print(title)
-            for each, column in zip(estimators, zip(*rows, strict=True), strict=True):
-                print(line(each.name, column), flush=True)
+            for name, column in zip(names, zip(*rows, strict=True), strict=True):
+                print(line(name, column), flush=True)
     print(f"{runs} runs each, {time.perf_counter() - begin:.0f} s")

@@ -2,17 +2,17 @@
 
 import ast
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 BENCHES = Path(__file__).resolve().parents[2] / "benches"
 sys.path.append(str(BENCHES))
 
 from rate_loops import bound, field_tools, table  # noqa: E402
-from rate_loops.generator import ROWS, SAMPLE, fly, record  # noqa: E402
+from rate_loops.generator import ROWS, SAMPLE, fly, low_pass, record  # noqa: E402
 
 
 def test_only_the_table_uses_the_package():
@@ -24,21 +24,25 @@ def test_only_the_table_uses_the_package():
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_without_noise_the_run_is_that_of_the_exact_simulation(order):
-    log = record(order, 0)
-    vehicle = log.vehicle
+def test_without_noise_the_run_is_the_exact_response_behind_the_filter(order):
+    vehicle = record(order, 0).vehicle
     setpoint = np.where(SAMPLE * np.arange(400) < 0.02, 0.0, 1.0)
-    measured, _ = fly(replace(vehicle, Ki=0.0), setpoint, None)
-    loop = table.known_loop(vehicle).replace(
-        gain=vehicle.gain,
-        lag_1=vehicle.lag,
-        Kp=vehicle.Kp,
-        delay=vehicle.delay,
-        sample_time=SAMPLE,
-    )
+    measured, command = fly(vehicle, setpoint, None)
     time = SAMPLE * np.arange(400)
-    exact = loop.simulate(time, setpoint, reference_time=time)
-    np.testing.assert_allclose(measured, exact.outputs, rtol=0, atol=1e-9)
+    # Each change of the command moves the rate as a step into an integrator with a lag does.
+    since = np.maximum(time[:, None] - vehicle.delay - time, 0.0)
+    step = since + vehicle.lag * np.expm1(-since / vehicle.lag)
+    rate = vehicle.gain * step @ np.diff(command, prepend=0.0)
+    exact = lfilter(*low_pass(order), rate)
+    np.testing.assert_allclose(measured, exact, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_filter_follows_a_slow_signal_by_its_lag(order):
+    b, a = low_pass(order)
+    ramp = lfilter(b, a, SAMPLE * np.arange(2000.0))
+    vehicle = record(order, 0).vehicle
+    assert SAMPLE * 1999 - ramp[-1] == pytest.approx(vehicle.filter_lag, rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -62,3 +66,13 @@ def test_the_tools_find_a_delay_alone():
     crossed = field_tools.step_crossing(log.setpoint, late)
     # The deconvolved step rises over some rows, and windows of 1 s make it early.
     assert crossed.value == pytest.approx(0.037, abs=0.01)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_package_answers_within_its_interval(order):
+    log = record(order, 0)
+    least = bound.deviation_of_sum(bound.covariance(log))
+    found = table.ours(log, least)
+    assert found.adequate
+    assert found.held
+    assert abs(found.error) < 3.0 * least

@@ -226,7 +226,7 @@ pub(crate) struct FlightLikelihood {
 #[pymethods]
 impl FlightLikelihood {
     #[new]
-    #[pyo3(signature = (num, den, runs, *, delay, gain, lags, zero, longest))]
+    #[pyo3(signature = (num, den, runs, *, delay, gain, lags, zero, longest, air_behind_lags=false))]
     #[expect(clippy::too_many_arguments, reason = "given by name")]
     fn new(
         num: Vec<f64>,
@@ -237,8 +237,9 @@ impl FlightLikelihood {
         lags: Vec<bool>,
         zero: bool,
         longest: f64,
+        air_behind_lags: bool,
     ) -> PyResult<Self> {
-        let plant = converted(Plant::new(&num, &den))?;
+        let plant = converted(Plant::new(&num, &den))?.with_air_behind_lags(air_behind_lags);
         let runs = runs
             .iter()
             .map(RecordedRows::rows)

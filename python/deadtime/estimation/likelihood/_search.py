@@ -106,6 +106,8 @@ class PlantModel:
         Time constant of the zero behind the lags, s.
     own_lag : float
         The lag of num/den, s, where it counts among those of the plant.
+    air_behind_lags : bool
+        Whether air acts behind the lags, not through them.
     """
 
     num: tuple[float, ...]
@@ -116,6 +118,7 @@ class PlantModel:
     extra: int = 0
     zero: float = 0.0
     own_lag: float = 0.0
+    air_behind_lags: bool = False
 
     @classmethod
     def of(cls, plant: Plant, names: tuple[str, ...]) -> PlantModel:
@@ -168,6 +171,7 @@ class PlantModel:
             lags=self.free_lags,
             zero="zero" in self.names,
             longest=longest,
+            air_behind_lags=self.air_behind_lags,
         )
 
 

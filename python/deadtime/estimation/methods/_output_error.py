@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from itertools import product
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,9 @@ from numpy.typing import NDArray
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, check_moves, checked_names
-from deadtime.estimation.data._simulated import (
-    commands_over_samples,
-    known_commands,
-    limited,
-    moves_between_rows,
-)
+from deadtime.estimation.data._commands import commands_of
+from deadtime.estimation.data._known_filter import KnownFilter, before_filter
+from deadtime.estimation.data._simulated import limited
 from deadtime.estimation.data._stamps import on_regular_times
 from deadtime.estimation.fit._least_squares import (
     Ends,
@@ -81,10 +78,15 @@ from deadtime.estimation.methods._flight_conclusion import (
     values_of,
     without_the_plant,
 )
-from deadtime.estimation.methods._method import Method, Run, check_initial_output
+from deadtime.estimation.methods._method import (
+    Method,
+    Run,
+    check_choice,
+    check_initial_output,
+)
 from deadtime.estimation.models._held import RATE_LIMITS, Path, path_of
-from deadtime.loops import ControlLoop, Plant, RateLimited
-from deadtime.recordings import Recording, RecordingCheck
+from deadtime.loops import Plant, RateLimited
+from deadtime.recordings import RecordingCheck
 
 Array = NDArray[np.float64]
 
@@ -96,10 +98,6 @@ REFILLS, MOST_STEPS, CLEARLY = 2, 8, 6.0
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
 NEARLY_EXACT = 1e-4
 
-#: Largest relative difference between the time of a row and the sample time at which a command can
-#: be computed from the rows.
-ON_SAMPLES = 1e-3
-
 
 @dataclass(frozen=True)
 class OutputError(Method):
@@ -109,37 +107,89 @@ class OutputError(Method):
     ----------
     initial_output : float, optional
         True output at the start of the window; fitted if not given.
+    output_filter : (b, a), optional
+        Coefficients, in powers of 1/z as `scipy.signal` has them, of a digital low-pass that ran on
+        the output before it was logged, once a row, such as the gyro filter of a flight controller.
+        The estimate is of what the sensor read before it: the noise is white there, and the lag of
+        the filter is no part of the delay.
+    air : {"command", "vehicle"}
+        Where air acts: like a command, through the lags of the plant, as it does on a vehicle that
+        drifts with it, or on the vehicle behind the lags, as the torques of gusts do beside those
+        of motors that lag.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the filter is no pair of coefficients, is not stable, or cannot be undone; if there is no
+        such place for the air.
+
+    Examples
+    --------
+    >>> from scipy import signal
+    >>> from deadtime.estimation import OutputError
+    >>> gyro = OutputError(output_filter=signal.butter(2, 100.0, fs=1000.0))
     """
 
     initial_output: float | None = None
+    output_filter: tuple[Sequence[float], Sequence[float]] | None = None
+    air: Literal["command", "vehicle"] = "command"
 
     name: ClassVar[str] = "output_error"
     joint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_initial_output(self.initial_output)
+        check_choice("air", self.air, ("command", "vehicle"))
+        if self.output_filter is not None:
+            KnownFilter.of(self.output_filter)
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the response of the plant to the logged commands."""
-        return estimate_from_commands(self.name, runs, free, self.initial_output)
+        known = None if self.output_filter is None else KnownFilter.of(self.output_filter)
+        if self.air == "vehicle" and not all(
+            PlantModel.of(r.loop.plant, ()).integrates for r in runs
+        ):
+            raise ValueError(
+                "air='vehicle' is for a plant that integrates what its motors do, such as "
+                "Integrator: use air='command'"
+            )
+        assumed = Assumed(self.initial_output, output_filter=known, air=self.air)
+        return estimate_from_commands(self.name, runs, free, assumed)
+
+
+class Assumed(NamedTuple):
+    """What is assumed of the rows.
+
+    Attributes
+    ----------
+    initial_output : float, optional
+    computed : bool
+        Whether the commands are computed from the recorded output.
+    output_filter : KnownFilter, optional
+    air : {"command", "vehicle"}
+    """
+
+    initial_output: float | None = None
+    computed: bool = False
+    output_filter: KnownFilter | None = None
+    air: Literal["command", "vehicle"] = "command"
 
 
 def estimate_from_commands(
     method: str,
     runs: Sequence[Run],
     free: Sequence[str],
-    initial_output: float | None = None,
-    computed: bool = False,
+    assumed: Assumed,
 ) -> DelayEstimate:
-    """Fit the response to the command: logged, or `computed` from the recorded output.
+    """Fit the response to the command: logged, or computed from the recorded output.
 
     Rows whose stamps scatter around regular times are fitted at both, and the likelier ones kept.
     """
-    stamped = _estimated(method, runs, free, initial_output, computed)
+    stamped = _estimated(method, runs, free, assumed)
     regular = [on_regular_times(run) or run for run in runs]
     if all(one is run for one, run in zip(regular, runs, strict=True)):
         return stamped
-    even = _estimated(method, regular, free, initial_output, computed)
+    even = _estimated(method, regular, free, assumed)
     better = _criterion(stamped) - _criterion(even)
     if not better > CLEARLY:
         return stamped
@@ -159,20 +209,21 @@ def _estimated(
     method: str,
     runs: Sequence[Run],
     free: Sequence[str],
-    initial_output: float | None,
-    computed: bool,
+    assumed: Assumed,
 ) -> DelayEstimate:
+    initial_output, computed, known_filter, _ = assumed
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *runs[0].loop.plant.parameters]))
     names = checked_names(free, runs[0].loop, known)
     # What least squares with all derivatives knows; the likelihood knows other plants too.
     common = tuple(name for name in names if name in VEHICLE_PARAMETERS)
-    models = [_model(run, common, initial_output, computed) for run in runs]
+    models = [_model(run, common, assumed) for run in runs]
     fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
     in_kernel = names_in_kernel(fitted[0].loop.plant)
     linear = tuple(name for name in names if name in in_kernel)
     others = [name for name in names if name not in in_kernel]
     _check_others(others, models[0].known)
-    rows = [one.rows(initial_output, run.check) for one, run in zip(models, runs, strict=True)]
+    checks = [run.check if known_filter is None else None for run in runs]
+    rows = [one.rows(initial_output, check) for one, check in zip(models, checks, strict=True)]
     white, numbers = _first(linear, models, rows, others)
     sources = {one.source for one in models}
     message = f"over {', '.join(names)} on the response to the command"
@@ -180,6 +231,8 @@ def _estimated(
         message += " computed from the recorded output, on whose noise the controller acts"
     elif sources != {"logged"}:
         message += ", which was not logged but computed from reference and output"
+    if known_filter is not None:
+        message += f", before the filter, in means of {known_filter.together} rows"
     details: dict[str, Any] = {
         "command": " or ".join(sorted(sources)),
         **({"noise": "loop"} if computed else {}),
@@ -244,7 +297,12 @@ def _estimated(
     adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
     astray = adequacy.reasons and explains_less(profile.fit, whole)
     if common == names and (adequacy.lacks_lag or astray):
-        return without_the_plant(concluded_plain(), adequacy)
+        try:
+            return without_the_plant(concluded_plain(), adequacy)
+        except NotIdentifiableError:
+            # Where air moves the output far more than the command does, least squares sees nothing.
+            if not gain_is_certain(profile):
+                raise
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
@@ -305,7 +363,8 @@ def _given(
     if values:
         plant = plant._replace({**plant.parameters, **values})
     within = [one.limited(part, values) for one, part in zip(models, rows, strict=True)]
-    return PlantModel.of(plant, names), within
+    model = replace(PlantModel.of(plant, names), air_behind_lags=models[0].air == "vehicle")
+    return model, within
 
 
 def _with_predicted_commands(
@@ -380,6 +439,7 @@ class _Model(ModelOfOne):
     logged: Array
     commands: HeldCommands
     start: Array
+    air: Literal["command", "vehicle"]
 
     def refilled(self, rows: FlightRows, commands: HeldCommands, error: float) -> FlightRows:
         """The rows with these commands, computed from outputs with errors.
@@ -493,14 +553,13 @@ def _is_nearly_exact(fit: NoiseFit) -> bool:
     )
 
 
-def _model(
-    run: Run, names: tuple[str, ...], initial_output: float | None, computed: bool
-) -> _Model:
+def _model(run: Run, names: tuple[str, ...], assumed: Assumed) -> _Model:
     """Commands up to the end of the window, including those before its start where known."""
     recording, loop, window, _ = run
+    initial_output, computed, known, air = assumed
     rows = recording.rows(*window)
-    data = recording.window(*window)
-    command, source = _commands(recording, loop, computed)
+    data = recording.window(*window) if known is None else before_filter(recording, rows, known)
+    command, source = commands_of(recording, loop, computed)
     command = command[: rows.stop]
     if len(data) < 2 * (len(names) + 2):
         raise NotIdentifiableError(
@@ -530,26 +589,5 @@ def _model(
         known={"delay": 0.0, "gain": 1.0, **loop.parameters},
         offset=initial_output,
         source=source,
+        air=air,
     )
-
-
-def _commands(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
-    """The command of every row: logged, or computed from reference and output."""
-    if recording.command is not None and not computed:
-        if moves_between_rows(recording, loop):
-            return commands_over_samples(recording, loop)
-        return known_commands(recording, loop)
-    found = known_commands(replace(recording, command=None, sent=None), loop)
-    if loop.sample_time is None:
-        raise NotIdentifiableError(
-            "the recording holds no command, and that of a continuous controller cannot be "
-            "computed between its rows: log the command, or use method='waveform'"
-        )
-    between = recording.sample_time
-    if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
-        raise NotIdentifiableError(
-            f"rows are {between:g} s apart and the controller samples every {loop.sample_time:g} "
-            "s: its command cannot be computed from rows that are not its samples; log it, or use "
-            "method='waveform'"
-        )
-    return found

@@ -43,7 +43,7 @@ from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_joint
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
-from deadtime.estimation.methods._output_error import estimate_from_commands
+from deadtime.estimation.methods._output_error import Assumed, estimate_from_commands
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,9 @@ class Waveform(Method):
         return simulated if likelier > LIKELIHOOD_RATIO else innovations
 
     def _by_innovations(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        return estimate_from_commands(self.name, runs, free, self.initial_output, computed=True)
+        return estimate_from_commands(
+            self.name, runs, free, Assumed(self.initial_output, computed=True)
+        )
 
     def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)

@@ -9,7 +9,7 @@ use crate::Error;
 /// Where a disturbance enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Entry {
-    /// At the input of the plant, as moving air does.
+    /// At the input of the plant or behind its lags, as moving air does.
     Input,
     /// At the measurement.
     Output,
@@ -74,7 +74,7 @@ impl Joint {
             let rate = 1.0 / one.time_constant;
             let variance = one.deviation * one.deviation;
             let (drive, direct) = match one.entry {
-                Entry::Input => (Some(&plant.b), plant.d),
+                Entry::Input => (Some(&plant.air), plant.air_direct),
                 Entry::Output => (None, 1.0),
             };
             for (row, b) in a

@@ -19,6 +19,10 @@ pub(super) struct PlantSpace {
     pub(super) c: Vec<f64>,
     /// Direct part.
     pub(super) d: f64,
+    /// What moving air drives in the place of b, shape (n,).
+    pub(super) air: Vec<f64>,
+    /// The direct part of air.
+    pub(super) air_direct: f64,
 }
 
 /// The given part of a plant, of unit gain: num(s)/den(s), proper.
@@ -28,6 +32,8 @@ pub struct Plant {
     num: Vec<f64>,
     /// Denominator, monic, ascending.
     den: Vec<f64>,
+    /// Does air act behind the lags, as forces and torques do, and not through them?
+    air_behind_lags: bool,
 }
 
 impl Plant {
@@ -63,7 +69,15 @@ impl Plant {
         Ok(Self {
             num: numerator,
             den: monic(den),
+            air_behind_lags: false,
         })
+    }
+
+    /// The same with air that acts behind the lags, or through them.
+    #[must_use]
+    pub fn with_air_behind_lags(mut self, behind: bool) -> Self {
+        self.air_behind_lags = behind;
+        self
     }
 
     /// Number of states behind so many lags.
@@ -125,11 +139,21 @@ impl Plant {
             }
             c[count + i] += num[i] - last * self.den[i];
         }
+        let (mut air, mut air_direct) = (b.clone(), last * direct);
+        if self.air_behind_lags && count > 0 {
+            air = vec![0.0; n];
+            if let Some(end) = air.last_mut().filter(|_| order > 0) {
+                *end = 1.0;
+            }
+            air_direct = last;
+        }
         PlantSpace {
             a,
             b,
             c,
             d: last * direct,
+            air,
+            air_direct,
         }
     }
 }
@@ -199,6 +223,27 @@ mod tests {
                 let found = space.map(|space| transfer(&space, s));
                 assert!(found.is_ok_and(|found| (found - expected).norm() < 1e-13));
             }
+        }
+    }
+
+    #[test]
+    fn air_behind_the_lags_goes_through_the_rest_alone() {
+        let s = Complex64::new(0.3, 1.7);
+        let plants: [(&[f64], &[f64]); 3] = [
+            (&[1.0], &[1.0, 0.0]),
+            (&[1.0], &[1.0]),
+            (&[2.0, 1.0, 3.0], &[2.0, 0.4, 4.0]),
+        ];
+        for (num, den) in plants {
+            let behind = |lags: &[f64]| {
+                let plant = Plant::new(num, den).unwrap().with_air_behind_lags(true);
+                let mut space = plant.space(lags, 0.0);
+                (space.b, space.d) = (space.air.clone(), space.air_direct);
+                transfer(&space, s)
+            };
+            let alone = behind(&[]);
+            assert!((behind(&[0.2]) - alone).norm() < 1e-13);
+            assert!((behind(&[0.3, 0.1]) - alone).norm() < 1e-13);
         }
     }
 

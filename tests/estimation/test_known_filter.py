@@ -1,0 +1,108 @@
+"""Estimates from rows that passed a known digital filter, and air that acts behind the lags."""
+
+import math
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation import OutputError
+from deadtime.estimation.data._known_filter import KnownFilter
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import signal
+
+RATE = 1000.0
+PT1 = ([0.4], [1.0, -0.6])
+BIQUAD = signal.butter(2, 100.0, fs=RATE)
+DELAY, LAG, GAIN = 0.0047, 0.028, 90.0
+
+
+def rows(known, noise=0.0, torque=0.0, seed=3, count=3000):
+    """Rates of a vehicle whose motors lag, read with noise and filtered; torques wander behind."""
+    random = np.random.default_rng(seed)
+    time = np.arange(count) / RATE
+    command = np.repeat(random.choice([-0.1, 0.0, 0.1], count // 100 + 1), 100)[:count]
+    since = np.maximum(time[:, None] - DELAY - time, 0.0)
+    step = since + LAG * np.expm1(-since / LAG)
+    rate = GAIN * step @ np.diff(command, prepend=0.0)
+    wander = signal.lfilter([1.0], [1.0, -0.998], random.standard_normal(count))
+    rate += torque * np.cumsum(wander) / RATE
+    output = signal.lfilter(*known, rate + noise * random.standard_normal(count))
+    return dtm.Recording(time, np.zeros(count), output, command)
+
+
+def estimate(recording, known, **options):
+    loop = dtm.ControlLoop(dtm.Integrator(50.0, 0.05), dtm.P(1.0), sample_time=1.0 / RATE)
+    return dtm.estimate_delay(
+        recording,
+        loop,
+        method=OutputError(output_filter=known, **options),
+        free=("delay", "gain", "lag"),
+    )
+
+
+@pytest.mark.parametrize("known", [PT1, BIQUAD])
+def test_without_noise_the_filter_takes_no_part(known):
+    found = estimate(rows(known), known)
+    assert found.delay == pytest.approx(DELAY, abs=1e-4)
+    assert found.lag == pytest.approx(LAG, abs=1e-4)
+    assert found.gain == pytest.approx(GAIN, rel=1e-3)
+    # The filter is a part of the delay where it is not told.
+    whole = estimate(rows(known), ([1.0], [1.0]))
+    late = KnownFilter.of(known).late / RATE
+    assert whole.delay_plus_lag - found.delay_plus_lag == pytest.approx(late, abs=3e-4)
+
+
+@pytest.mark.parametrize("known", [PT1, BIQUAD])
+def test_filtered_noise_and_torques_are_told_from_the_vehicle(known):
+    recording = rows(known, noise=0.02, torque=0.1)
+    found = estimate(recording, known, air="vehicle")
+    low, high = found.ci(0.95, "delay+lag")
+    assert low < DELAY + LAG < high
+    assert high - low < 0.01
+    assert found.adequate
+
+
+@given(st.floats(0.05, 0.95))
+def test_a_first_order_filter_is_undone_exactly(k):
+    x = np.random.default_rng(1).standard_normal(300)
+    known = KnownFilter.of(([k], [1.0, k - 1.0]))
+    undone = known.undone(signal.lfilter([k], [1.0, k - 1.0], x))
+    np.testing.assert_allclose(undone[1:], x[1:], rtol=0, atol=1e-9)
+    assert known.late == pytest.approx((1.0 - k) / k)
+    assert known.remaining == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (([1.0], [1.0, -1.2]), "not stable"),
+        (([1.0, -1.0], [1.0]), "cannot be undone"),
+        (([1.0, 2.0], [1.0]), "cannot be undone"),
+        (([math.nan], [1.0]), "finite"),
+        (([], [1.0]), "finite coefficients"),
+        ((["b"], [1.0]), "give \\(b, a\\)"),
+        (([1.0],), "give \\(b, a\\)"),
+    ],
+)
+def test_filters_that_tell_nothing_are_refused(given, words):
+    with pytest.raises((TypeError, ValueError), match=words):
+        OutputError(output_filter=given)
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(ValueError, match="air"):
+        OutputError(air="sideways")
+    recording = rows(PT1)
+    loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.1), dtm.P(1.0), sample_time=1.0 / RATE)
+    with pytest.raises(ValueError, match="air='vehicle' is for a plant that integrates"):
+        dtm.estimate_delay(recording, loop, method=OutputError(air="vehicle"))
+    gone = np.delete(np.arange(3000), slice(1000, 1200))
+    holed = dtm.Recording(
+        recording.time[gone],
+        recording.reference[gone],
+        recording.output[gone],
+        recording.command[gone],
+    )
+    with pytest.raises(dtm.NotIdentifiableError, match="evenly spaced"):
+        estimate(holed, PT1)
