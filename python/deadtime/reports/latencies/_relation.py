@@ -211,14 +211,19 @@ def _fitted(
     if why := doubt or _contradiction(alone):
         return _doubted(alone[0], why)
     used = [fit.recording for fit in alone]
-    fit = alone[0] if len(alone) == 1 else tried(used, (first,))
-    if fit.adequate or LACKING not in fit.message:
+
+    def one_lag() -> DelayEstimate:
+        return alone[0] if len(alone) == 1 else tried(used, (first,))
+
+    # Where every window lacks a lag, so do all together.
+    fit = None if all(LACKING in each.message for each in alone) else one_lag()
+    if fit is not None and (fit.adequate or LACKING not in fit.message):
         return fit
     try:
         more = tried(used, (first, SECOND * first))
     except NotIdentifiableError:
-        return fit
-    return more if more.adequate or bic(more) < bic(fit) else fit
+        return fit or one_lag()
+    return more if fit is None or more.adequate or bic(more) < bic(fit) else fit
 
 
 def _doubted(fit: DelayEstimate, why: str) -> DelayEstimate:

@@ -34,6 +34,9 @@ FEWEST, MOST = 24, 6000
 #: Shares of that length that are tried, and of its own by which one window comes after another.
 SIZES, SHIFT = (1.0, 0.5), 0.5
 
+#: Parts that are looked at, those whose command moves the most.
+LOOKED_AT = 64
+
 #: Delays and lags that are tried, in rows.
 TRIED = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 
@@ -98,7 +101,8 @@ def best_windows(
     loop: LogLoop, command: Command, integrates: bool, between: Between | None
 ) -> list[Window]:
     """The windows to fit, the one that promises most first; none where no row is left."""
-    found = [_seen(part, integrates) for part in _parts(loop, command, between)]
+    parts = sorted(_parts(loop, command, between), key=_movement, reverse=True)
+    found = [_seen(part, integrates) for part in parts[:LOOKED_AT]]
     found.sort(key=lambda one: one.promise if one.tells else np.inf)
     chosen: list[Window] = found[:1]
     for one in found[1:]:
@@ -134,6 +138,16 @@ def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Rec
     return parts
 
 
+def _movement(part: Recording) -> float:
+    """Deviation of the command of a part from a straight line."""
+    told = part.reference if part.command is None else part.command
+    at = part.time - part.time.mean()
+    moved = told - told.mean()
+    along = float(at @ at)
+    left = moved - at * (float(at @ moved) / along) if along > 0.0 else moved
+    return float(np.std(left))
+
+
 def _seen(part: Recording, integrates: bool) -> Window:
     """What a part says about the time from command to response."""
     time, output = part.time, part.output
@@ -152,7 +166,7 @@ def _seen(part: Recording, integrates: bool) -> Window:
     moved = without(trend, output)
     power = float(moved @ moved)
     best = _Shape(np.inf, 0.0, 0.0, moved, moved)
-    for delay, lag in product(TRIED, TRIED):
+    for lag, delay in product(TRIED, TRIED):  # the path of a lag serves every delay
         if not 0.0 < (delay + lag) * row < LONGEST * (time[-1] - time[0]):
             continue
         path = response.at(time - delay * row, lag * row)
