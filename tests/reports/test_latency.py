@@ -144,6 +144,15 @@ def test_a_recorded_flight_is_right_or_says_that_it_is_not():
         assert not one.estimate.adequate or (low < correlated and high > fitted)
 
 
+def test_an_interval_lies_on_both_sides_of_its_estimate():
+    pytest.importorskip("pyulog", reason="pyulog reads ULog files")
+    # The likelihood of this turn has another minimum, at a delay three times as long.
+    fit = dtm.latency(flight_path("px4_sitl_takeoff.ulg"), loops=("pitch",)).loop("pitch").estimate
+    for name, value in (("lag_1", fit.loop.plant.lags[0]), ("delay+lag", fit.delay_plus_lag)):
+        low, high = fit.ci(0.95, name)
+        assert low < value - fit.stderr[name] < value + fit.stderr[name] < high
+
+
 #: Centre of a notch of 120 Hz, rad/s.
 W0 = 2.0 * np.pi * 120.0
 

@@ -138,15 +138,16 @@ impl Model {
         let mut width = reach;
         while width.abs() <= FARTHEST * reach.abs() {
             outer = (centre + width).max(floor);
-            near = self.held(&near, quantity, outer, task)?;
-            if near.objective < lowest.objective {
-                lowest = near.clone();
+            let next = self.held(&near, quantity, outer, task)?;
+            if next.objective < lowest.objective {
+                lowest = next.clone();
             }
-            let found = near.objective - best.objective;
+            let found = next.objective - best.objective;
             if found >= rise {
                 bracket = Some(found);
                 break;
             }
+            near = next;
             if outer <= floor {
                 return Ok((floor, lowest));
             }
@@ -158,7 +159,9 @@ impl Model {
         let Some(mut outer_rise) = bracket else {
             return Ok((outer, lowest));
         };
-        // False position in the square root of the rise, which is nearly linear (Illinois).
+        // False position in the square root of the rise, which is nearly linear (Illinois). Each
+        // fit starts from one inside: one from outside may stay at another minimum, above the rise
+        // all the way to the centre.
         let goal = rise.sqrt();
         let (mut low, mut high) = (inner_rise.sqrt() - goal, outer_rise.sqrt() - goal);
         for _ in 0..REFINEMENTS {
@@ -171,11 +174,11 @@ impl Model {
                 0.5
             };
             let middle = inner + (outer - inner) * share;
-            near = self.held(&near, quantity, middle, task)?;
-            if near.objective < lowest.objective {
-                lowest = near.clone();
+            let next = self.held(&near, quantity, middle, task)?;
+            if next.objective < lowest.objective {
+                lowest = next.clone();
             }
-            outer_rise = (near.objective - best.objective).max(0.0);
+            outer_rise = (next.objective - best.objective).max(0.0);
             let found = outer_rise.sqrt() - goal;
             if found.abs() < 2e-3 * goal {
                 return Ok((middle, lowest));
@@ -184,7 +187,7 @@ impl Model {
                 (outer, high) = (middle, found);
                 low *= 0.5;
             } else {
-                (inner, low) = (middle, found);
+                (inner, low, near) = (middle, found, next);
                 high *= 0.5;
             }
         }
