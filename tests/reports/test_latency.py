@@ -128,8 +128,8 @@ def test_a_recorded_rate_sweep():
         output="roll_rate_rad_s",
         command="roll_torque_setpoint",
     )
-    # Five seconds of the sweep tell it.
-    (one,) = dtm.latency(flight.window(6.0, 11.0)).loops
+    # Three seconds of the sweep tell it.
+    (one,) = dtm.latency(flight.window(8.0, 11.0)).loops
     value, _, _ = one.sum_of()
     assert 0.016 <= value <= 0.0205  # with half of a hold of 4 ms
 
