@@ -144,6 +144,12 @@ def test_a_recorded_flight_is_right_or_says_that_it_is_not():
         assert not one.estimate.adequate or (low < correlated and high > fitted)
 
 
+def test_a_response_of_a_few_steps_of_its_rounding_is_refused():
+    found = dtm.latency(flight_path("ardupilot_sitl_guided_heights.bin"), loops=("yaw",))
+    for one in found.loops:
+        assert "steps of 0.000174533, to which it is rounded" in one.refusal
+
+
 def test_an_interval_lies_on_both_sides_of_its_estimate():
     pytest.importorskip("pyulog", reason="pyulog reads ULog files")
     # The likelihood of this turn has another minimum, at a delay three times as long.

@@ -41,9 +41,10 @@ from deadtime.estimation.data._checks import (
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
+from deadtime.estimation.methods._commanded_model import Assumed
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
-from deadtime.estimation.methods._output_error import Assumed, estimate_from_commands
+from deadtime.estimation.methods._output_error import estimate_from_commands
 
 Array = NDArray[np.float64]
 

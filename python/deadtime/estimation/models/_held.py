@@ -30,7 +30,7 @@ from typing import NamedTuple, TypeAlias, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops import Integrator, Plant, RateLimited
+from deadtime.loops import FactoredPlant, Integrator, Plant, RateLimited
 from deadtime.loops._open_run import open_response
 
 Array = NDArray[np.float64]
@@ -159,6 +159,26 @@ class PathSlopes(NamedTuple):
     by: dict[str, Array]
 
 
+class FactoredPath:
+    """The output of a factored plant with one lag behind an integrator, in closed form."""
+
+    def __init__(self, plant: FactoredPlant, time: Array, command: Array) -> None:
+        self._held, self._stepped = HeldResponse(time, command), SteppedPath(plant, time, command)
+
+    def value(self, times: Array, values: Mapping[str, float]) -> Array:
+        """F at `times`, of any shape, for these parameters of the plant."""
+        if values.get("zero"):
+            return self._stepped.value(times, values)
+        return self._held.at(times, values["lag_1"]).value
+
+    def slopes(self, times: Array, values: Mapping[str, float], names: Sequence[str]) -> PathSlopes:
+        """Derivatives of F at `times`, by those of `names` that the plant has."""
+        if values.get("zero") or "zero" in names:
+            return self._stepped.slopes(times, values, names)
+        found = self._held.at(times, values["lag_1"])
+        return PathSlopes(found.rate, {"lag_1": found.by_lag} if "lag_1" in names else {})
+
+
 class SteppedPath:
     """The simulated output of any other plant."""
 
@@ -225,7 +245,7 @@ class LimitedPath:
 
 
 #: Output of a plant of unit gain under one record of commands.
-Path: TypeAlias = HeldResponse | SteppedPath | LimitedPath
+Path: TypeAlias = HeldResponse | FactoredPath | SteppedPath | LimitedPath
 
 
 def path_of(plant: Plant, time: Array, command: Array) -> Path:
@@ -234,4 +254,12 @@ def path_of(plant: Plant, time: Array, command: Array) -> Path:
         return LimitedPath(plant, time, command)
     if isinstance(plant, Integrator):
         return HeldResponse(time, command)
+    if isinstance(plant, FactoredPlant) and _is_one_lag(plant):
+        return FactoredPath(plant, time, command)
     return SteppedPath(plant, time, command)
+
+
+def _is_one_lag(plant: FactoredPlant) -> bool:
+    """Whether the plant is an integrator with one lag that decays."""
+    alone = plant.integrator and plant.zero == 0.0 and plant.pole_frequency is None
+    return alone and len(plant.lags) == 1 and plant.lags[0] > 0.0

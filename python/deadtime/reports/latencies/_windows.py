@@ -140,12 +140,9 @@ def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Rec
 
 def _movement(part: Recording) -> float:
     """Deviation of the command of a part from a straight line."""
-    told = part.reference if part.command is None else part.command
-    at = part.time - part.time.mean()
-    moved = told - told.mean()
-    along = float(at @ at)
-    left = moved - at * (float(at @ moved) / along) if along > 0.0 else moved
-    return float(np.std(left))
+    from scipy.signal import detrend
+
+    return float(np.std(detrend(part.reference if part.command is None else part.command)))
 
 
 def _seen(part: Recording, integrates: bool) -> Window:
