@@ -197,12 +197,6 @@ impl Element {
             .fold(0.0, f64::max)
     }
 
-    /// Do the last coefficients consist of rounding errors, given those of an element twice as long?
-    pub(super) fn is_noise(&self, before: f64) -> bool {
-        let tail = self.tail();
-        tail < MOST_NOISE && tail > LEFT * before
-    }
-
     /// May the next element be longer?
     pub(super) fn has_room(&self) -> bool {
         self.needed <= ROOMY
@@ -273,9 +267,29 @@ fn rates(a: &[f64], n: usize) -> Vec<f64> {
     (0..n).map(|i| row(&units, i, true)).collect()
 }
 
+/// Do last coefficients of this [`Element::tail`] consist of rounding errors, given the tail of an
+/// element twice as long?
+pub(super) fn is_noise(tail: f64, before: f64) -> bool {
+    tail < MOST_NOISE && tail > LEFT * before
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn halving_tells_rounding_errors_from_signals() {
+        assert!(is_noise(17.0, 20.0) && is_noise(29.0, 17.0));
+        // A jump of the derivative, a smooth signal, what is too large, and a first attempt.
+        for (tail, before) in [
+            (10.0, 20.0),
+            (1.5, 1e6),
+            (100.0, 100.0),
+            (17.0, f64::INFINITY),
+        ] {
+            assert!(!is_noise(tail, before));
+        }
+    }
 
     #[test]
     fn rates_do_not_know_units() {

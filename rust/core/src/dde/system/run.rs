@@ -3,7 +3,7 @@
 use crate::dde::limits::DIVERGED;
 use crate::{Error, Task};
 
-use super::element::Element;
+use super::element::{Element, is_noise};
 use super::equations::{Past, Signal, SystemEquations, SystemResponse};
 use super::input_breaks::{first_break, passed_breaks};
 use super::jumps::{Jumps, Scale};
@@ -144,12 +144,12 @@ pub(super) fn run(
             if element.is_resolved() || h <= 64.0 * tolerance {
                 break h;
             }
-            if element.is_noise(tail) {
+            let before = std::mem::replace(&mut tail, element.tail());
+            if is_noise(tail, before) {
                 // Shorter than rounding errors need: the next one may be twice as long.
                 suggested = 4.0 * h;
                 break h;
             }
-            tail = element.tail();
             suggested = 0.5 * h;
         };
         if element.has_room() {
