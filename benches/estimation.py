@@ -57,7 +57,7 @@ import numpy as np
 from deadtime.estimation import ARXScan, Method, OutputError, Overshoot, Waveform
 from deadtime.estimation._estimate import METHODS
 from rate_loops.table import print_rates
-from reality import firmware
+from reality import drawn, firmware
 from reality.designs import print_designs
 from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
@@ -491,11 +491,21 @@ def main() -> None:
     rates.add_argument("--rates", action="store_true", help="print their table alone")
     flown = parser.add_argument_group("flights against ArduPilot's Copter")
     flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
+    flown.add_argument(
+        "--drawn",
+        type=int,
+        metavar="N",
+        help="N flights of each kind, whose commands wait for drawn times",
+    )
+    flown.add_argument("--seed", type=int, help="of the drawn times; by default of the clock")
     flown.add_argument("--keep", type=Path, metavar="DIR", help="keep the recordings in a folder")
     flown.add_argument("--read", type=Path, metavar="DIR", help="read the recordings, do not fly")
     given = parser.parse_args()
     # Each worker simulates its own runs; threads of NumPy's libraries would compete with them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if given.firmware and given.drawn:
+        drawn.run(given.read, given.keep, given.processes, given.drawn, given.seed)
+        return
     if given.firmware:
         firmware.run(given.read, given.keep, given.processes, given.quick)
         return

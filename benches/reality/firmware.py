@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 import deadtime as dtm
 import numpy as np
 
+from reality.dataflash import recording_of
 from reality.flights import GAINS, HOLD, LIMIT, SAMPLE, SHAPING, WINDS, Flight
 
 #: Times added to the commands, s; flights of each kind.
@@ -109,24 +110,32 @@ def fly(folder: Path, flights: Iterable[Flight]) -> None:
         raise SystemExit("a session of the firmware failed; its words are in firmware.log")
 
 
-def estimated(folder: Path, flight: Flight, limited: bool) -> Estimated:
-    """Estimate one flight, with the limits that the vehicle says or without; in other processes."""
+def estimated(folder: Path, flight: Flight, limited: bool, own_log: bool = False) -> Estimated:
+    """Estimate one flight, with the limits that the vehicle says or without; in other processes.
+
+    `own_log`: from the log of the vehicle, not from that of the controller.
+    """
     warnings.simplefilter("ignore")  # about feedback
-    recording = dtm.read_recording(
-        folder / f"{flight.name}.csv",
-        time="time",
-        reference="reference",
-        output="output",
-        command="command",
-    )
-    facts = json.loads((folder / f"{flight.name}.json").read_text(encoding="utf-8"))
+    facts = facts_of(folder, flight)
+    if own_log:
+        recording = recording_of(folder / facts["log"], facts["number"], flight.axis)
+    else:
+        recording = dtm.read_recording(
+            folder / f"{flight.name}.csv",
+            time="time",
+            reference="reference",
+            output="output",
+            command="command",
+        )
     acceleration, jerk = (facts["parameters"][name] for name in SHAPING[flight.axis])
     plant: Any = dtm.Integrator(1.0, lag=0.1)
     if limited:
         plant = dtm.RateLimited(plant, rate=0.01 * acceleration, rate_of_rate=jerk)
     loop = dtm.ControlLoop(plant, dtm.P(GAINS[flight.axis]), sample_time=SAMPLE, limit=LIMIT)
+    # What the controller computes from is not in the log of the vehicle.
+    method = "output_error" if own_log else "auto"
     try:
-        fit = dtm.estimate_delay(recording, loop, free=FREE)
+        fit = dtm.estimate_delay(recording, loop, free=FREE, method=method)
     except dtm.NotIdentifiableError as error:
         nothing = math.nan
         ends = (nothing, nothing)
@@ -152,6 +161,12 @@ def estimated(folder: Path, flight: Flight, limited: bool) -> Estimated:
         float(np.sqrt(np.mean([np.var(part) for part in quiet]))),
         fit.message,
     )
+
+
+def facts_of(folder: Path, flight: Flight) -> dict[str, Any]:
+    """What is known of a flight beside its recording."""
+    facts: dict[str, Any] = json.loads((folder / f"{flight.name}.json").read_text(encoding="utf-8"))
+    return facts
 
 
 def print_table(folder: Path, flights: Sequence[Flight], processes: int) -> None:
@@ -207,7 +222,7 @@ def print_rises(name: str, found: Sequence[Estimated]) -> None:
 
 def print_jitter(folder: Path, wind: str, flights: Sequence[Flight]) -> None:
     """How late the loop was."""
-    facts = [json.loads((folder / f"{f.name}.json").read_text(encoding="utf-8")) for f in flights]
+    facts = [facts_of(folder, flight) for flight in flights]
     late = np.array([one["late"] for one in facts])
     sent = np.array([one["sent_late"] for one in facts])
     print(

@@ -10,9 +10,13 @@ the offset between the two clocks. A line through the least differences of every
 allows for clocks of different rates, converts the times of commands; positions are interpolated
 between the reports, by their velocities, at these times.
 
+When a command is computed, it is also sent at once as a mark, in a message that the vehicle writes
+to its own log and does not obey. That log is kept: it tells without another clock when commands
+were computed, when they were sent, and how the vehicle moved (`reality.dataflash`).
+
 Run ``python benches/reality/flights.py ARDUCOPTER FOLDER FLIGHT ...`` where nothing else is on the
 network: the firmware opens ports on all interfaces, so `firmware.fly` starts it in a network
-namespace of its own. A flight is named as ``height-calm-0.10-1``: axis, calm or wind, time in s
+namespace of its own. A flight is named as ``height-calm-0.100-1``: axis, calm or wind, time in s
 added to the commands, and repeat. Requires pymavlink.
 """
 
@@ -22,6 +26,7 @@ import json
 import math
 import os
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -68,6 +73,9 @@ READY, CLIMB, ANSWER = 180.0, 60.0, 10.0
 #: Wall time in s after which the firmware ends, whatever has become of this process.
 LONGEST = 3600.0
 
+#: Bits of what the vehicle logs that are added: attitude and position at 25 Hz and faster.
+LOGGED = 1
+
 #: What shapes a velocity command by axis: acceleration in cm/s², jerk in m/s³.
 SHAPING = {"height": ("WPNAV_ACCEL_Z", "PSC_JERK_Z"), "north": ("WPNAV_ACCEL", "PSC_JERK_XY")}
 
@@ -83,14 +91,14 @@ class Flight(NamedTuple):
     @property
     def name(self) -> str:
         """As in file names."""
-        return f"{self.axis}-{self.wind}-{self.added:.2f}-{self.repeat}"
+        return f"{self.axis}-{self.wind}-{self.added:.3f}-{self.repeat}"
 
     @classmethod
     def of(cls, name: str) -> Flight:
         """The flight of this name."""
         axis, wind, added, repeat = name.split("-")
         if axis not in GAINS or wind not in WINDS:
-            raise ValueError(f"no flight {name!r}: name one as height-calm-0.10-1")
+            raise ValueError(f"no flight {name!r}: name one as height-calm-0.100-1")
         return cls(axis, wind, float(added), int(repeat))
 
 
@@ -201,6 +209,11 @@ class Vehicle:
             0, 1, 1, 1, 0b0000110111000111, 0, 0, 0, north, 0, -up, 0, 0, 0, 0, 0
         )
 
+    def mark(self, command: float, reference: float, number: int) -> None:
+        """Let the vehicle write a command to its log as one that it does not know."""
+        unknown = self.messages.MAV_CMD_USER_1
+        self.link.mav.command_long_send(1, 1, unknown, 0, command, reference, number, 0, 0, 0, 0)
+
     def take_off(self) -> None:
         """Wait until it can fly, arm, and climb."""
         self.wait(lambda m: m.get_type() == "HEARTBEAT", READY, "say anything")
@@ -246,8 +259,8 @@ class Log:
     positions: list[Position]
 
 
-def fly(vehicle: Vehicle, flight: Flight) -> Log:
-    """Fly the steps of one flight."""
+def fly(vehicle: Vehicle, flight: Flight, number: int) -> Log:
+    """Fly the steps of one flight, the given one of its session."""
     position = vehicle.position
     assert position is not None
     base = round(position.north) if flight.axis == "north" else HEIGHT
@@ -275,6 +288,7 @@ def fly(vehicle: Vehicle, flight: Flight) -> Log:
         now = time.monotonic()
         if now - position.received > 1.0:
             raise TimeoutError("the firmware has reported no position for 1 s")
+        vehicle.mark(command, reference, number)
         if flight.added:
             queue.append((now + flight.added, command))
         else:
@@ -315,8 +329,13 @@ def rms_and_max(late: Array) -> list[float]:
     return [float(np.sqrt(np.mean(late**2))), float(np.max(late))]
 
 
-def write(folder: Path, flight: Flight, log: Log, parameters: dict[str, float]) -> None:
-    """Write the recording, in the vehicle's time, and what is to be known of it."""
+def write(
+    folder: Path, flight: Flight, log: Log, parameters: dict[str, float], place: dict[str, Any]
+) -> None:
+    """Write the recording, in the vehicle's time, and what is to be known of it.
+
+    `place` says which log of the vehicle holds the flight, and under which number.
+    """
     from scipy.interpolate import CubicHermiteSpline
 
     rate, offset, misfit = clock_of(log.positions)
@@ -345,6 +364,7 @@ def write(folder: Path, flight: Flight, log: Log, parameters: dict[str, float]) 
         "sent_late": rms_and_max(np.diff(np.array(log.sent), axis=1)[:, 0]),
         "positions_each_second": float(1.0 / np.median(np.diff(table[:, 1]))),
         "parameters": parameters,
+        **place,
     }
     (folder / f"{flight.name}.json").write_text(json.dumps(facts, indent=1) + "\n")
 
@@ -366,15 +386,17 @@ def session(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
         )
         try:
             vehicle = Vehicle()
+            vehicle.set_parameter("LOG_BITMASK", int(vehicle.parameter("LOG_BITMASK")) | LOGGED)
             vehicle.take_off()
             names = [name for pair in SHAPING.values() for name in pair]
             parameters = {name: vehicle.parameter(name) for name in names}
             wind = None
-            for flight in flights:
+            for number, flight in enumerate(flights):
                 if flight.wind != wind:
                     vehicle.set_wind(wind := flight.wind)
-                log = fly(vehicle, flight)
-                write(folder, flight, log, parameters)
+                log = fly(vehicle, flight, number)
+                place = {"log": f"{flights[0].name}.bin", "number": number}
+                write(folder, flight, log, parameters, place)
                 print(flight.name, flush=True)
         finally:
             firmware.send_signal(signal.SIGTERM)
@@ -383,6 +405,8 @@ def session(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
             except subprocess.TimeoutExpired:
                 firmware.kill()
                 firmware.wait()
+            for kept in Path(own, "logs").glob("*.BIN"):
+                shutil.copy(kept, folder / f"{flights[0].name}.bin")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The flights of `benches/estimation.py --firmware`."""
 
+import random
 import sys
 from pathlib import Path
 
@@ -9,15 +10,16 @@ import pytest
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
 from reality import firmware
+from reality.drawn import LONGEST, drawn, rises
 from reality.flights import Flight, Position, clock_of
 
 
 def test_a_flight_has_a_name():
     flight = Flight("north", "wind", 0.1, 3)
-    assert flight.name == "north-wind-0.10-3"
+    assert flight.name == "north-wind-0.100-3"
     assert Flight.of(flight.name) == flight
     with pytest.raises(ValueError, match="name one as"):
-        Flight.of("east-calm-0.10-1")
+        Flight.of("east-calm-0.100-1")
 
 
 def test_two_clocks_of_different_rates_are_matched():
@@ -32,15 +34,33 @@ def test_two_clocks_of_different_rates_are_matched():
     assert misfit < 5e-4
 
 
+def test_waits_are_drawn_between_flights_without():
+    flights = drawn(3, 5, ("height",), ("calm",))
+    waits = [one.added for one in flights]
+    assert [one.repeat for one in flights] == [1, 2, 3, 4, 5]
+    assert waits[0] == waits[-1] == 0.0
+    assert len(set(waits[1:-1])) == 3
+    assert all(0.0 <= wait <= LONGEST for wait in waits)
+    assert drawn(3, 6, ("height",), ("calm",)) != flights
+
+
 @pytest.mark.survey
-def test_a_flight_of_the_firmware(tmp_path):
+def test_what_commands_wait_comes_out_of_a_flight(tmp_path):
+    # Drawn anew in each run; a failure shows it.
+    wait = round(random.SystemRandom().uniform(0.05, LONGEST), 3)
     if (reason := firmware.why_not()) is not None:
         pytest.skip(reason)
-    flights = [Flight("height", "calm", added, 1) for added in (0.0, 0.25)]
+    flights = [Flight("height", "calm", added, 1) for added in (0.0, wait)]
     firmware.fly(tmp_path, flights)
+    # From the log of the controller, which knows its own commands and the position it was told.
     without, late = (firmware.estimated(tmp_path, one, limited=True) for one in flights)
-    assert late.total - without.total == pytest.approx(0.25, abs=0.015)
+    assert late.total - without.total == pytest.approx(wait, abs=firmware.WITHIN)
     # What the plant lacks is far above the noise, so neither may be called adequate.
     assert late.unexplained > 2.0 * late.noise
     assert not without.adequate
     assert not late.adequate
+    # From the DataFlash that the vehicle itself wrote.
+    found = [firmware.estimated(tmp_path, one, limited=True, own_log=True) for one in flights]
+    [(waited, rise)] = rises(tmp_path, found)
+    assert waited == pytest.approx(wait, abs=0.01)
+    assert rise == pytest.approx(waited, abs=firmware.WITHIN)

@@ -37,6 +37,7 @@ NUMERICS = {"special", "dde", "roots", "systems", "loops", "stability"}
 #: The files after the numerics that may import the kernel of the likelihood.
 LIKELIHOOD = {
     "estimation.likelihood._adequacy",
+    "estimation.likelihood._agreement",
     "estimation.likelihood._air_at_rest",
     "estimation.likelihood._lost_commands",
     "estimation.likelihood._power",

@@ -57,6 +57,20 @@ def test_what_is_wrong_is_said(sent, match):
         recording(sent)
 
 
+def test_the_sample_time_is_held_against_the_times_of_the_commands():
+    # Rows every 40 ms of commands every 65 ms: on the rows, changes are 40 or 80 ms apart.
+    time, sent = np.arange(0.0, 8.0, 0.04), np.arange(-0.5, 8.0, 0.065)
+    values = np.sin(sent)
+    found = dtm.Recording(time, np.zeros_like(time), np.cos(time), sent=(sent, values))
+
+    def refusals(sample_time):
+        loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=sample_time)
+        return [one.message for one in found.check(loop).findings if one.severity == "refused"]
+
+    assert refusals(0.065) == []
+    assert any("100 % of the changes of the command come sooner" in one for one in refusals(0.1))
+
+
 def test_a_command_and_sent_ones_exclude_each_other():
     with pytest.raises(TypeError, match="not both"):
         recording(command=np.zeros(20))

@@ -10,7 +10,7 @@ import typer
 from deadtime._base.digits import between, stated
 from deadtime._base.drawing import check_matplotlib
 from deadtime._cli import options as opt
-from deadtime._cli.show import print_json, print_table, print_text, results_table, stages
+from deadtime._cli.show import print_json, print_table, print_text, results, results_table
 from deadtime.recordings import Log, open_log
 from deadtime.reports import Latency, compare_latencies, latency
 from deadtime.reports.latencies._latency import loops_asked_for
@@ -68,8 +68,8 @@ def command(
 
 def _told(log: Log, axes: list[str] | None, loops: list[str] | None, quiet: bool) -> Latency:
     count = loops_asked_for(log, axes, loops)
-    with stages(count, quiet=quiet) as begin:
-        return latency(log, axes=axes, loops=loops, progress=begin)
+    with results(f"{log.source}, {count} times", count, quiet=quiet) as tell:
+        return latency(log, axes=axes, loops=loops, progress=tell)
 
 
 def _print(found: Latency) -> None:

@@ -106,6 +106,22 @@ def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int
 
 
 @contextmanager
+def results(what: str, count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Lines on standard error as results come, above a progress bar over so many."""
+    if quiet or not ERRORS.is_terminal:
+        yield lambda line: None
+        return
+    with _bar() as progress:
+        task = progress.add_task(what, total=count)
+
+        def tell(line: str) -> None:
+            print_text(line, wrapped=False, on=ERRORS)
+            progress.advance(task)
+
+        yield tell
+
+
+@contextmanager
 def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """A progress bar over named stages, on standard error; call it as each stage begins."""
     if quiet or not ERRORS.is_terminal:

@@ -10,7 +10,7 @@ import numpy as np
 from deadtime.loops import ControlLoop, Integrator, P
 from deadtime.recordings._check_command import Command
 from deadtime.recordings._check_rows import Rows
-from deadtime.recordings._findings import Columns, Finding, Severity, seconds
+from deadtime.recordings._findings import Array, Columns, Finding, Severity, seconds
 
 #: Units of time that are mistaken for seconds, by their number in a second.
 UNITS = {1e3: "milliseconds", 1e6: "microseconds"}
@@ -46,6 +46,8 @@ def read_clock(columns: Columns, rows: Rows, command: Command, loop: ControlLoop
     if loop.sample_time is None:
         on_rows = command.law in ("exact", "late", "early") and rows.stamps != "jittered"
         return Clock(sample_time_seen=rows.mean_time if on_rows else None)
+    if columns.sent is not None:
+        return Clock()  # commands have their own times
     ratio = rows.mean_time / loop.sample_time
     whole = max(1, round(ratio))
     error = 3.0 * rows.jitter / rows.row_time / np.sqrt(columns.time.size)
@@ -146,6 +148,12 @@ def _other_spacing(
     columns: Columns, rows: Rows, command: Command, sample_time: float
 ) -> Iterator[Finding]:
     """Rows that are neither at the samples nor at every so many of them."""
+    if columns.sent is not None:
+        soon = _hasty(columns.sent, sample_time)
+        if soon > HASTE:
+            told = f"commands have times of their own, and sample_time is {seconds(sample_time)}"
+            yield _no_such_hold(told, soon, sample_time)
+        return
     apart = (
         f"the rows are {seconds(rows.mean_time)} apart and sample_time is {seconds(sample_time)}"
     )
@@ -176,16 +184,9 @@ def _other_spacing(
             shift,
         )
     else:
-        changes = columns.time[1:][np.diff(columns.command) != 0.0]
-        soon = np.mean(np.diff(changes) < 0.75 * sample_time) if changes.size > 1 else 0.0
+        soon = _hasty(columns.time[1:][np.diff(columns.command) != 0.0], sample_time)
         if soon > HASTE:
-            yield Finding(
-                "sample_time",
-                "refused",
-                f"{apart}, but {100.0 * soon:.0f} % of the changes of the command come sooner than "
-                "that after the last one: check sample_time, or leave it out",
-                f"a hold that is not there counts as {seconds(0.5 * sample_time)} of delay",
-            )
+            yield _no_such_hold(apart, soon, sample_time)
         else:
             yield Finding(
                 "other_rate",
@@ -194,6 +195,21 @@ def _other_spacing(
                 "it changes",
                 "none, if a fit takes the commands from where they change",
             )
+
+
+def _hasty(changes: Array, sample_time: float) -> float:
+    """Share of changes of the command that come sooner than a sample time after the last one."""
+    return float(np.mean(np.diff(changes) < 0.75 * sample_time)) if changes.size > 1 else 0.0
+
+
+def _no_such_hold(told: str, soon: float, sample_time: float) -> Finding:
+    return Finding(
+        "sample_time",
+        "refused",
+        f"{told}, but {100.0 * soon:.0f} % of the changes of the command come sooner than that "
+        "after the last one: check sample_time, or leave it out",
+        f"a hold that is not there counts as {seconds(0.5 * sample_time)} of delay",
+    )
 
 
 def _without_sample_time(

@@ -43,12 +43,16 @@ class Finding:
 
 
 class Columns(NamedTuple):
-    """The columns of a recording, each of shape (n,); the command may be missing."""
+    """The columns of a recording, each of shape (n,); the command may be missing.
+
+    `sent` has the times, shape (m,), at which commands changed that have their own.
+    """
 
     time: Array
     reference: Array
     output: Array
     command: Array | None
+    sent: Array | None = None
 
     def commands(self, loop: ControlLoop) -> Array | None:
         """The command of each row: logged, or that of a P controller; None if unknown."""

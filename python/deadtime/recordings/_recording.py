@@ -254,7 +254,11 @@ class Recording(ReadOnlyArrays):
         low, high = (None, None) if window is None else window
         rows = self.rows(low, high)
         command = None if self.command is None else self.command[rows]
-        columns = Columns(self.time[rows], self.reference[rows], self.output[rows], command)
+        sent = None
+        if self.sent is not None:
+            changes = self.sent.time[1:][np.diff(self.sent.values) != 0.0]
+            sent = changes[(changes >= self.time[rows][0]) & (changes <= self.time[rows][-1])]
+        columns = Columns(self.time[rows], self.reference[rows], self.output[rows], command, sent)
         return check_columns(columns, loop, in_motion=rows.start > 0)
 
     def steps(self) -> list[Step]:

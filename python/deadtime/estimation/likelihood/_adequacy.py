@@ -8,6 +8,7 @@ whitened residuals stay white. Beside their whiteness, these are tested:
 * a delay that is constant over the window: the cumulated score of the delay is a Brownian bridge
   over its information (Nyblom 1989);
 * air that is slower than the rows: faster air stands for something else;
+* recordings that agree about gain, and delay and lag together (`contradictions`);
 * air that moves the output as much while the vehicle rests (`air_at_rest`);
 * noise that does not grow with the speed of the output, as it does where time stamps are not the
   times of the samples (Breusch & Pagan 1979).
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
+from deadtime.estimation.likelihood._agreement import contradictions
 from deadtime.estimation.likelihood._air_at_rest import air_at_rest
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
@@ -66,14 +68,14 @@ class Adequacy:
         The further lag that makes the recordings likeliest, s.
     reasons : tuple of str
         Why the model is not adequate; empty where it is.
-    lacks_lag : bool
-        Whether the further lag is one of them.
+    plant_lacks : bool
+        Whether one of them is that the plant lacks something: a lag, or what the air stands for.
     """
 
     whiteness: Whiteness
     further_lag: float
     reasons: tuple[str, ...]
-    lacks_lag: bool = False
+    plant_lacks: bool = False
 
 
 def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -> Adequacy:
@@ -104,7 +106,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
             f"a further lag of {further:.3g} s would move delay and lag together to {total:.3g} s, "
             "out of their interval"
         )
-    lacks_lag = len(reasons) > plain
+    lacks = len(reasons) > plain
     for index, part in enumerate(fit.parts):
         where = f" in recording {index + 1}" if len(fit.parts) > 1 else ""
         if part.score.size and bridge(part.score, part.whitened) > BRIDGE:
@@ -120,12 +122,15 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
                 f"the air found{where} changes within a row and moves the output {share:.2g} times "
                 "the noise of the sensor, as no air does: it stands for something else"
             )
+            lacks = True
         if air_at_rest(fit, index) < SIGNIFICANCE:
             reasons.append(
                 f"what is taken for air{where} moves the output more while the vehicle moves than "
                 "while it rests: the plant lacks something"
             )
-    return Adequacy(whiteness, further, tuple(reasons), lacks_lag)
+            lacks = True
+    reasons += contradictions(profile)
+    return Adequacy(whiteness, further, tuple(reasons), lacks)
 
 
 def rounding_explains(residuals: Array, rows: FlightRows) -> bool:

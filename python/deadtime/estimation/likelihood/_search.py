@@ -60,6 +60,8 @@ SENSOR, SENSOR_TIME = 1.0, 2.0
 #: the lower bound of its deviation.
 PRICE_OF_SENSOR, PRICE_OF_TRIM, PRICE_OF_SCATTER = 4.0, 9.0, 4.0
 
+#: Rise of −2 ln L without air up to which it is none.
+IDLE = 1e-3
 
 #: Times that scatter by more rows than this are no scatter.
 MOST_SCATTER = 1.0
@@ -260,8 +262,24 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
     best = min([best, *_with_sensor(best)], key=_criterion)
-    best = min([best, *_with_scatter(best)], key=_criterion)
-    return best.moved(best.likelihood.fit(best.numbers))
+    best = without_idle_air(min([best, *_with_scatter(best)], key=_criterion))
+    return without_idle_air(best.moved(best.likelihood.fit(best.numbers)))
+
+
+def without_idle_air(fit: NoiseFit) -> NoiseFit:
+    """The fit without air that makes its recording no likelier."""
+    for run, one in enumerate(fit.numbers.noise):
+        if one.air == 0.0:
+            continue
+        noise = list(fit.numbers.noise)
+        noise[run] = changed(one, air=0.0)
+        objective = fit.likelihood.objective(with_noise(fit.with_gain, noise))
+        if objective < fit.numbers.objective + IDLE:
+            p = fit.numbers
+            fit = fit.moved(
+                PlantNumbers(p.delay, p.lags, noise, p.gain, p.zero, objective=objective)
+            )
+    return fit
 
 
 def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
@@ -289,10 +307,12 @@ def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
     for part in ("stamps", "arrivals"):
         runs, noise = [], []
         for rows, like, one in zip(best.runs, best.parts, best.numbers.noise, strict=True):
-            speed = like.rate / like.gain
+            with np.errstate(all="ignore"):
+                speed = like.rate / like.gain
             moves = speed if part == "stamps" else np.diff(rows.command)
             size = float(np.max(np.abs(moves), initial=0.0))
-            if size == 0.0 or rows.command.size > STEADY * rows.time.size:
+            # A gain of zero leaves no finite speed.
+            if not 0.0 < size < np.inf or rows.command.size > STEADY * rows.time.size:
                 return found
             runs.append(rows._replace(speed=speed))
             noise.append(changed(one, **{part: getattr(one, part) or 1.0 / size}))

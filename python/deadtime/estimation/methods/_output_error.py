@@ -266,7 +266,7 @@ def _estimated(
     adequacy = adequacy_of(profile, len(names))
     adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
     astray = adequacy.reasons and explains_less(profile.fit, whole)
-    if common == names and (adequacy.lacks_lag or astray):
+    if common == names and (adequacy.plant_lacks or astray):
         try:
             return without_the_plant(concluded_plain(), adequacy)
         except NotIdentifiableError:

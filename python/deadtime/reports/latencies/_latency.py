@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,13 @@ from deadtime.reports.latencies._budget import Stage, stages_of
 from deadtime.reports.latencies._controller import between_rows
 from deadtime.reports.latencies._filters import FilterDelay, filters_of
 from deadtime.reports.latencies._relation import LoopLatency, relation_of
-from deadtime.reports.latencies._windows import Command, Window, best_windows, window_of
+from deadtime.reports.latencies._windows import (
+    Command,
+    Window,
+    best_windows,
+    rows_of_a_window,
+    window_of,
+)
 from deadtime.reports.latencies._words import cost_in_words, numbers_of, why_inadequate
 
 if TYPE_CHECKING:
@@ -170,7 +176,7 @@ def latency(
     loops : iterable of str, optional
         Only loops of these names, such as ``("roll rate",)``.
     progress : bool or callable, optional
-        Print each loop as it begins, or call a function with its name.
+        Print the time of each loop as soon as it is found, or call a function with that line.
 
     Returns
     -------
@@ -252,15 +258,16 @@ def loops_asked_for(
 def _all_told(
     log: Log, wanted: list[tuple[LogLoop, Command]], report: Callable[[str], object]
 ) -> list[LoopLatency]:
-    """Each in a thread: the kernel computes beside the interpreter."""
+    """Each in a thread, those of few rows first: the kernel computes beside the interpreter."""
     pool = ThreadPoolExecutor(min(len(wanted), os.cpu_count() or 1) or 1)
+    order = sorted(range(len(wanted)), key=lambda k: rows_of_a_window(wanted[k][0]))
     try:
-        begun = [pool.submit(_told, log, loop, command) for loop, command in wanted]
-        found = []
-        for (loop, command), one in zip(wanted, begun, strict=True):
-            report(f"{loop.name} from its {command}")
-            found.append(one.result())
-        return found
+        begun = {pool.submit(_told, log, *wanted[k]): k for k in order}
+        found = {}
+        for one in as_completed(begun):
+            found[begun[one]] = one.result()
+            report(one.result().headline())
+        return [found[k] for k in range(len(wanted))]
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

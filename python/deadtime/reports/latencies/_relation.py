@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,12 +30,11 @@ CLEARLY, WORTH = 6.0, 0.25
 #: What is before the reasons in the message of an estimate.
 NOT_ADEQUATE = "; not adequate: "
 
-#: What an estimate says whose plant has too few lags.
-LACKING = "a further lag of"
+#: What an estimate says whose plant has too few lags, and one whose windows differ.
+LACKING, CONTRADICT = "a further lag of", "the recordings contradict one another"
 
-#: Probability of such differences between windows, were they alike, at which they count as real,
-#: and half of a 95 % interval in standard errors.
-DIFFERENT, TWO_SIDED = 0.01, 1.96
+#: Half of a 95 % interval in standard errors.
+TWO_SIDED = 1.96
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +158,9 @@ def relation_of(
 
 def _no_answer(fit: DelayEstimate, window: Window) -> str:
     """Why the fit is no answer of a vehicle to this command; empty if it may be one."""
-    value, error = fit.delay_plus_lag, fit.stderr["delay+lag"]
+    # The interval: two lags that come out equal have no finite standard error.
+    low, high = fit.ci(0.95, "delay+lag")
+    value, error = fit.delay_plus_lag, (high - low) / (2.0 * TWO_SIDED)
     if fit.gain is not None and fit.gain <= 0.0:
         return f"the response moves against its command (gain {fit.gain:.3g})"
     longest = LONGEST * (window.stop - window.start)
@@ -195,35 +195,34 @@ def _fitted(
         loop = ControlLoop(plant, P(1.0))
         return estimate_delay(parts, loop, method="output_error", free=names)
 
-    alone = [tried([windows[0].recording], (first,))]
-    parts, doubt = [one.recording for one in windows], ""
+    def with_lags(parts: list[Recording], alone: DelayEstimate | None) -> DelayEstimate:
+        """One lag, or two where one is not enough; `alone` is known to be that with one."""
+        if alone is not None and (alone.adequate or LACKING not in alone.message):
+            return alone
+        try:
+            more = tried(parts, (first, SECOND * first))
+        except NotIdentifiableError:
+            return alone or tried(parts, (first,))
+        return more if alone is None or more.adequate or bic(more) < bic(alone) else alone
+
+    parts = [one.recording for one in windows]
+    fit, doubt = tried(parts[:1], (first,)), ""
     if held is not None:
         still = tried([held(windows[0])], (first,))
-        better = bic(alone[0]) - bic(still)
+        better = bic(fit) - bic(still)
         if abs(better) < CLEARLY:
-            doubt = _either(alone[0], still)
+            doubt = _either(fit, still)
         if better > 0.0:
-            alone, parts = [still], [held(one) for one in windows]
-    for part in parts[1:]:
-        # A further part that tells nothing by itself is left out.
-        with suppress(NotIdentifiableError):
-            alone.append(tried([part], (first,)))
-    if why := doubt or _contradiction(alone):
-        return _doubted(alone[0], why)
-    used = [fit.recording for fit in alone]
-
-    def one_lag() -> DelayEstimate:
-        return alone[0] if len(alone) == 1 else tried(used, (first,))
-
-    # Where every window lacks a lag, so do all together.
-    fit = None if all(LACKING in each.message for each in alone) else one_lag()
-    if fit is not None and (fit.adequate or LACKING not in fit.message):
-        return fit
-    try:
-        more = tried(used, (first, SECOND * first))
-    except NotIdentifiableError:
-        return fit or one_lag()
-    return more if fit is None or more.adequate or bic(more) < bic(fit) else fit
+            fit, parts = still, [held(one) for one in windows]
+    if doubt:
+        return _doubted(fit, doubt)
+    if len(parts) == 1:
+        return with_lags(parts, fit)
+    # A window that lacks a lag alone lacks it with the others.
+    together = with_lags(parts, None if LACKING in fit.message else tried(parts, (first,)))
+    reasons = together.message.partition(" (try ")[0].split("; ")
+    apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
+    return _doubted(with_lags(parts[:1], fit), "; ".join(apart)) if apart else together
 
 
 def _doubted(fit: DelayEstimate, why: str) -> DelayEstimate:
@@ -243,24 +242,3 @@ def _either(moving: DelayEstimate, still: DelayEstimate) -> str:
         "the log does not tell whether commands hold or move between its rows, which is worth "
         f"{stated(apart, 0.0, 's')}"
     )
-
-
-def _contradiction(fits: list[DelayEstimate]) -> str:
-    """In which way the sums of delay and lag from several windows differ; empty if they agree.
-
-    The homogeneity test of Cochran (1954): Q = sum of ((s_i - mean)/stderr_i)^2 is chi-squared.
-    """
-    from scipy import special
-
-    ends = np.array([fit.ci(0.95, "delay+lag") for fit in fits])
-    sums = np.array([fit.delay_plus_lag for fit in fits])
-    errors = np.maximum((ends[:, 1] - ends[:, 0]) / (2.0 * TWO_SIDED), 1e-12)
-    weights = errors**-2.0
-    mean = float(weights @ sums / weights.sum())
-    square = float(np.sum(((sums - mean) / errors) ** 2))
-    if len(fits) < 2 or special.chdtrc(len(fits) - 1, square) > DIFFERENT:
-        return ""
-    shown = ", ".join(
-        stated(s, e, "s") for s, e in zip(sums.tolist(), errors.tolist(), strict=True)
-    )
-    return f"the windows contradict one another: {shown}"

@@ -119,6 +119,11 @@ def window_of(recording: Recording, integrates: bool) -> Window:
     return _seen(recording, integrates)
 
 
+def rows_of_a_window(loop: LogLoop) -> float:
+    """About how many rows a window of this loop has."""
+    return min(LENGTHS[loop.kind] / loop.response.period, MOST)
+
+
 def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Recording]:
     """Parts of the segments of a loop, as long as its kind asks for, half over one another."""
     longest = min(LENGTHS[loop.kind], MOST * loop.response.period)

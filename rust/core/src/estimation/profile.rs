@@ -129,6 +129,12 @@ impl Model {
              and a rise above it"
         );
         refuse_if!(floor.is_nan(), "the least end is {floor}: give a number");
+        // A time that is hardly known would be searched far beyond any recording.
+        let reach = if quantity == Quantity::Gain {
+            reach
+        } else {
+            reach.clamp(-self.longest, self.longest)
+        };
         let centre = quantity.value(&best.point);
         let mut lowest = best.clone();
         let mut near = best.clone();

@@ -1,0 +1,50 @@
+"""Recordings that are fitted jointly and contradict one another."""
+
+import warnings
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation.likelihood._agreement import differ
+
+SAMPLE, RUNS = 0.065, 40
+
+
+def flight(delay, gain, seed):
+    loop = dtm.ControlLoop(dtm.Integrator(gain), dtm.P(1.6), delay=delay, sample_time=SAMPLE)
+    return dtm.Experiment.step(8.0).run(loop, noise=0.005, seed=seed)
+
+
+def fitted(*flights):
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=SAMPLE)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return dtm.estimate_delay(
+            flights, loop, method=dtm.estimation.OutputError(), free=("delay", "gain")
+        )
+
+
+def test_flights_of_one_vehicle_agree():
+    # The test is at the 1 % level, twice: more than 4 of 40 have a probability below 1e-3.
+    apart = 0
+    for seed in range(RUNS):
+        found = fitted(flight(0.3, 0.85, 2 * seed), flight(0.3, 0.85, 2 * seed + 1))
+        apart += "contradict" in found.message
+    assert apart <= 4
+
+
+@pytest.mark.parametrize(
+    ("other", "name"), [((0.36, 0.85), "delay"), ((0.3, 1.1), "gain")], ids=["delay", "gain"]
+)
+def test_flights_of_two_vehicles_do_not(other, name):
+    found = fitted(flight(0.3, 0.85, 1), flight(*other, 2), flight(0.3, 0.85, 3))
+    assert not found.adequate
+    assert "the recordings contradict one another: " in found.message
+    assert f"{name}" in found.message.partition("contradict one another: ")[2]
+
+
+def test_the_probability_is_that_of_chi_squared():
+    # Two values 2.5758 standard errors of their difference apart: 1 %, two-sided.
+    errors = np.array([3.0, 4.0])
+    assert differ(np.array([0.0, 2.5758293 * 5.0]), errors) == pytest.approx(0.01, rel=1e-6)
+    assert differ(np.array([1.0]), np.array([1.0])) == 1.0
