@@ -295,3 +295,23 @@ def test_a_real_flight_with_its_command_computed():
     assert fit.gain == pytest.approx(0.705, abs=1e-3)
     assert not fit.adequate
     assert fit.details["command"] == "computed from reference and output"
+
+
+def test_other_intervals_wait_until_they_are_asked_for():
+    loop = dtm.ControlLoop(dtm.Integrator(0.85, lag=0.1), dtm.P(1.6), delay=0.3, sample_time=0.065)
+    flight = dtm.Experiment.step(8.0).run(loop, noise=0.005, seed=4)
+    found = [
+        dtm.estimate_delay(
+            flight,
+            loop.replace(delay=None),
+            method=dtm.estimation.OutputError(intervals=which),
+            free=("delay", "gain", "lag"),
+        )
+        for which in ("all", "sum")
+    ]
+    whole, total = found
+    assert list(dict(total._profile._ends)) == [("delay+lag", 0.95)]
+    for name in whole.stderr:
+        assert total.ci(0.95, name) == pytest.approx(whole.ci(0.95, name), abs=1e-4)
+    with pytest.raises(ValueError, match="intervals"):
+        dtm.estimation.OutputError(intervals="none")

@@ -12,7 +12,7 @@ evaluations takes long: intervals are t standard errors wide, from its curvature
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -187,14 +187,16 @@ class LikelihoodProfile:
         return (found[0], found[1]), lowest
 
 
-def profile_of(fit: NoiseFit, names: Mapping[str, str], level: float = 0.95) -> LikelihoodProfile:
-    """The profile of the best minimum: intervals may find a better one than the search."""
+def profile_of(
+    fit: NoiseFit, names: Mapping[str, str], first: Iterable[str], level: float = 0.95
+) -> LikelihoodProfile:
+    """The profile of the best minimum: the intervals of `first` may find a better one."""
     profile = LikelihoodProfile(fit, names)
     if is_long(fit.runs):
         return profile
     for _ in range(RESTARTS):
         better = None
-        for name in names:
+        for name in first:
             profile._ends[name, level], lowest = profile.ends(name, level)
             if lowest.objective < profile.centre.objective - BETTER:
                 better = lowest

@@ -56,12 +56,14 @@ class Assumed(NamedTuple):
         Whether the commands are computed from the recorded output.
     output_filter : KnownFilter, optional
     air : {"command", "vehicle"}
+    intervals : {"all", "sum"}
     """
 
     initial_output: float | None = None
     computed: bool = False
     output_filter: KnownFilter | None = None
     air: Literal["command", "vehicle"] = "command"
+    intervals: Literal["all", "sum"] = "all"
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +192,7 @@ class CommandedModel(ModelOfOne):
 def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> CommandedModel:
     """Commands up to the end of the window, including those before its start where known."""
     recording, loop, window, _ = run
-    initial_output, computed, known, air = assumed
+    initial_output, computed, known, air, _ = assumed
     rows = recording.rows(*window)
     data = recording.window(*window) if known is None else before_filter(recording, rows, known)
     command, source = commands_of(recording, loop, computed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,9 +72,13 @@ def _in_order(fit: NoiseFit) -> NoiseFit:
     )
 
 
-def profile_for(fit: NoiseFit, names: tuple[str, ...]) -> LikelihoodProfile:
+def profile_for(
+    fit: NoiseFit, names: tuple[str, ...], intervals: Literal["all", "sum"] = "all"
+) -> LikelihoodProfile:
     """The profile over the names, and over the sum of delay and lag."""
-    return profile_of(fit, profiled(fit.model, names))
+    found = profiled(fit.model, names)
+    total = [name for name, kernel in found.items() if kernel == "total"]
+    return profile_of(fit, found, total if intervals == "sum" and total else found)
 
 
 def profiled(model: PlantModel, names: tuple[str, ...]) -> dict[str, str]:

@@ -104,12 +104,17 @@ class OutputError(Method):
         Where air acts: like a command, through the lags of the plant, as it does on a vehicle that
         drifts with it, or on the vehicle behind the lags, as the torques of gusts do beside those
         of motors that lag.
+    intervals : {"all", "sum"}
+        Which intervals are computed with the fit, in a recording that is not long: those of all
+        numbers, or that of delay and lag together alone. The search for the ends of an interval may
+        find a likelier fit than the first, from which all begins anew; most of the time goes there.
+        The others are computed when they are asked for.
 
     Raises
     ------
     TypeError, ValueError
         If the filter is no pair of coefficients, is not stable, or cannot be undone; if there is no
-        such place for the air.
+        such place for the air, or no such intervals.
 
     Examples
     --------
@@ -121,6 +126,7 @@ class OutputError(Method):
     initial_output: float | None = None
     output_filter: tuple[Sequence[float], Sequence[float]] | None = None
     air: Literal["command", "vehicle"] = "command"
+    intervals: Literal["all", "sum"] = "all"
 
     name: ClassVar[str] = "output_error"
     joint: ClassVar[bool] = True
@@ -128,6 +134,7 @@ class OutputError(Method):
     def __post_init__(self) -> None:
         check_initial_output(self.initial_output)
         check_choice("air", self.air, ("command", "vehicle"))
+        check_choice("intervals", self.intervals, ("all", "sum"))
         if self.output_filter is not None:
             KnownFilter.of(self.output_filter)
 
@@ -141,7 +148,9 @@ class OutputError(Method):
                 "air='vehicle' is for a plant that integrates what its motors do, such as "
                 "Integrator: use air='command'"
             )
-        assumed = Assumed(self.initial_output, output_filter=known, air=self.air)
+        assumed = Assumed(
+            self.initial_output, output_filter=known, air=self.air, intervals=self.intervals
+        )
         return estimate_from_commands(self.name, runs, free, assumed)
 
 
@@ -181,7 +190,7 @@ def _estimated(
     free: Sequence[str],
     assumed: Assumed,
 ) -> DelayEstimate:
-    initial_output, computed, known_filter, _ = assumed
+    initial_output, computed, known_filter, *_ = assumed
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *runs[0].loop.plant.parameters]))
     names = checked_names(free, runs[0].loop, known)
     # What least squares with all derivatives knows; the likelihood knows other plants too.
@@ -250,7 +259,7 @@ def _estimated(
         fit, cov = joint
         profile: LikelihoodProfile = LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
     else:
-        profile = profile_for(fit, linear)
+        profile = profile_for(fit, linear, assumed.intervals)
     if free_numbers is not None:
         profile = NumbersProfile(
             profile.fit, profile.names, profile.preferred, profile._ends, free_numbers

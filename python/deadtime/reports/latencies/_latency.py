@@ -192,9 +192,9 @@ def latency(
     Notes
     -----
     Of each loop the windows are ranked by the Cramér-Rao bound of delay and lag together that they
-    promise; the best, and up to two others, are fitted together: gain, delay and one lag, or two
-    lags where one is not adequate. From the setpoint the plant follows its command; from what the
-    controller commands it integrates.
+    promise. The best is fitted by gain, delay and one lag, or two lags where one is not adequate;
+    where that is, together with up to two others. From the setpoint the plant follows its command;
+    from what the controller commands it integrates.
 
     Examples
     --------

@@ -12,7 +12,7 @@ from deadtime._base.digits import between, stated
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain
-from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.estimation import DelayEstimate, OutputError, estimate_delay
 from deadtime.estimation._choose import bic
 from deadtime.loops import ControlLoop, FactoredPlant, P
 from deadtime.recordings import Recording
@@ -32,6 +32,9 @@ NOT_ADEQUATE = "; not adequate: "
 
 #: What an estimate says whose plant has too few lags, and one whose windows differ.
 LACKING, CONTRADICT = "a further lag of", "the recordings contradict one another"
+
+#: Intervals of the other numbers are computed when they are asked for.
+METHOD = OutputError(intervals="sum")
 
 #: Half of a 95 % interval in standard errors.
 TWO_SIDED = 1.96
@@ -193,17 +196,17 @@ def _fitted(
         plant = FactoredPlant(lags, integrator=integrates)
         names = ["delay", *(name for name in plant.parameters if name != "zero")]
         loop = ControlLoop(plant, P(1.0))
-        return estimate_delay(parts, loop, method="output_error", free=names)
+        return estimate_delay(parts, loop, method=METHOD, free=names)
 
-    def with_lags(parts: list[Recording], alone: DelayEstimate | None) -> DelayEstimate:
-        """One lag, or two where one is not enough; `alone` is known to be that with one."""
-        if alone is not None and (alone.adequate or LACKING not in alone.message):
-            return alone
+    def richer(parts: list[Recording], fit: DelayEstimate) -> DelayEstimate:
+        """The fit, or that with two lags where one is not enough."""
+        if fit.adequate or LACKING not in fit.message:
+            return fit
         try:
             more = tried(parts, (first, SECOND * first))
         except NotIdentifiableError:
-            return alone or tried(parts, (first,))
-        return more if alone is None or more.adequate or bic(more) < bic(alone) else alone
+            return fit
+        return more if more.adequate or bic(more) < bic(fit) else fit
 
     parts = [one.recording for one in windows]
     fit, doubt = tried(parts[:1], (first,)), ""
@@ -216,13 +219,18 @@ def _fitted(
             fit, parts = still, [held(one) for one in windows]
     if doubt:
         return _doubted(fit, doubt)
-    if len(parts) == 1:
-        return with_lags(parts, fit)
-    # A window that lacks a lag alone lacks it with the others.
-    together = with_lags(parts, None if LACKING in fit.message else tried(parts, (first,)))
+    fit = richer(parts[:1], fit)
+    # What the plant lacks in one window it lacks in all together.
+    if len(parts) == 1 or not fit.adequate:
+        return fit
+    try:
+        lags = tuple(v for n, v in fit.loop.parameters.items() if n.startswith("lag"))
+        together = tried(parts, lags)
+    except NotIdentifiableError:
+        return fit
     reasons = together.message.partition(" (try ")[0].split("; ")
     apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
-    return _doubted(with_lags(parts[:1], fit), "; ".join(apart)) if apart else together
+    return _doubted(fit, "; ".join(apart)) if apart else richer(parts, together)
 
 
 def _doubted(fit: DelayEstimate, why: str) -> DelayEstimate:

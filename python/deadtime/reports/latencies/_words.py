@@ -14,10 +14,14 @@ def numbers_of(fit: DelayEstimate) -> list[str]:
     single = sum(name.startswith("lag") for name in fit.free) == 1
     found = []
     for name in fit.free:
-        low, high = fit.ci(0.95, name)
+        value, error = fit._value(name), fit.stderr[name]
+        if not 0.0 < error < abs(value):
+            # Two equal lags, and a number at its bound, have no such error but an interval.
+            low, high = fit.ci(0.95, name)
+            error = (high - low) / 3.92
         shown = "lag" if single and name == "lag_1" else name.replace("_", " ")
         unit = "" if name == "gain" else "s"
-        found.append(f"{shown} {stated(fit._value(name), (high - low) / 3.92, unit)}")
+        found.append(f"{shown} {stated(value, error, unit)}")
     return found
 
 

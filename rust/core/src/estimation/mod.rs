@@ -23,6 +23,7 @@ mod profile;
 mod propagation;
 mod rows;
 mod search;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod variables;

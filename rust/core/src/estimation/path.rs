@@ -3,9 +3,8 @@
 //! Exact: the state is propagated from event to event, an event being a row or the arrival of an
 //! input. Step lengths repeat on even rows, so that few propagators are made.
 
-use super::kept::Kept;
 use super::plant::PlantSpace;
-use crate::dde::propagator::Propagator;
+use super::steps::Steps;
 use crate::{Error, Task};
 
 /// Events between two checks for a stop.
@@ -53,30 +52,6 @@ pub(super) fn respond(
     run(plant, inputs, delay, times, out, rate, task)
 }
 
-/// Φ − I and Γ of one step length.
-struct Step<const N: usize> {
-    growth: [[f64; N]; N],
-    gamma: [f64; N],
-}
-
-impl<const N: usize> Step<N> {
-    fn new(plant: &PlantSpace, length: f64) -> Self {
-        let made = Propagator::new(&plant.a, &[&plant.b], length);
-        let (growth, gamma) = (made.growth(), made.gamma(0));
-        Self {
-            growth: std::array::from_fn(|i| std::array::from_fn(|j| growth[i * N + j])),
-            gamma: std::array::from_fn(|i| gamma[i]),
-        }
-    }
-
-    fn apply(&self, state: &[f64; N], input: f64) -> [f64; N] {
-        std::array::from_fn(|i| {
-            let change = self.growth[i].iter().zip(state).map(|(f, x)| f * x);
-            state[i] + (self.gamma[i] * input + change.sum::<f64>())
-        })
-    }
-}
-
 fn run<const N: usize>(
     plant: &PlantSpace,
     inputs: Held<'_>,
@@ -91,7 +66,7 @@ fn run<const N: usize>(
     let by_state: [f64; N] =
         std::array::from_fn(|j| (0..N).map(|i| plant.c[i] * plant.a[i * N + j]).sum());
     let by_input: f64 = plant.c.iter().zip(&plant.b).map(|(c, b)| c * b).sum();
-    let mut steps = Kept::new();
+    let mut steps = Steps::<N>::new(plant);
     let mut state = [0.0; N];
     let mut arrivals = inputs.time.iter().zip(inputs.value);
     let mut coming = arrivals.next();
@@ -111,8 +86,7 @@ fn run<const N: usize>(
             let until = time.min(arrival);
             let length = until - now;
             if N > 0 && length > 0.0 {
-                let step = steps.at(length, until, || Step::new(plant, length));
-                state = step.apply(&state, input);
+                state = steps.at(length, until).apply(&state, input);
                 now = until;
             }
             if let Some((_, value)) = coming.filter(|_| arrival <= time) {

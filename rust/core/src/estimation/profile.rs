@@ -11,6 +11,9 @@ const FARTHEST: f64 = 64.0;
 /// Accuracy of an end, as a share of the half width.
 const TOLERANCE: f64 = 2e-3;
 
+/// Widest first step to the end of an interval of a time, as a share of delay and lag together.
+const WIDEST: f64 = 0.25;
+
 /// Accuracy of −2 ln L where a quantity is held.
 const RISE_TOLERANCE: f64 = 1e-3;
 
@@ -129,11 +132,12 @@ impl Model {
              and a rise above it"
         );
         refuse_if!(floor.is_nan(), "the least end is {floor}: give a number");
-        // A time that is hardly known would be searched far beyond any recording.
-        let reach = if quantity == Quantity::Gain {
+        // Two lags that come out equal have standard errors without bound, and intervals with them.
+        let widest = (WIDEST * best.point.total()).max(self.row_time);
+        let reach = if matches!(quantity, Quantity::Gain | Quantity::Zero) {
             reach
         } else {
-            reach.clamp(-self.longest, self.longest)
+            reach.clamp(-widest, widest)
         };
         let centre = quantity.value(&best.point);
         let mut lowest = best.clone();

@@ -76,7 +76,7 @@ impl<const N: usize> Propagation<N> {
 }
 
 /// Add a matrix; has any entry changed?
-fn add<const N: usize>(to: &mut Square<N>, what: &Square<N>) -> bool {
+pub(super) fn add<const N: usize>(to: &mut Square<N>, what: &Square<N>) -> bool {
     let mut changed = false;
     for (to, what) in to.iter_mut().flatten().zip(what.iter().flatten()) {
         let sum = *to + what;
@@ -86,11 +86,11 @@ fn add<const N: usize>(to: &mut Square<N>, what: &Square<N>) -> bool {
     changed
 }
 
-fn scaled<const N: usize>(a: &Square<N>, factor: f64) -> Square<N> {
+pub(super) fn scaled<const N: usize>(a: &Square<N>, factor: f64) -> Square<N> {
     a.map(|row| row.map(|entry| entry * factor))
 }
 
-fn product<const N: usize>(a: &Square<N>, b: &Square<N>) -> Square<N> {
+pub(super) fn product<const N: usize>(a: &Square<N>, b: &Square<N>) -> Square<N> {
     let mut out = [[0.0; N]; N];
     for (out, row) in out.iter_mut().zip(a) {
         for (factor, b) in row.iter().zip(b) {
