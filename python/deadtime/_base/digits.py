@@ -41,15 +41,20 @@ def stated(value: float, error: float, unit: str = "") -> str:
     --------
     >>> stated(0.003421, 0.00005, "s"), stated(0.4302, 0.0151, "s"), stated(0.8512, 0.034)
     ('3.42 ± 0.05 ms', '430 ± 15 ms', '0.85 ± 0.03')
-    >>> stated(12.3, float("nan"), "m")
-    '12.3 m'
+    >>> stated(12.3, float("nan"), "m"), stated(12.3, float("inf"), "m")
+    ('12.3 m', '12.3 m, not determined')
+    >>> stated(0.0121, 0.48, "s")
+    '12 ± 500 ms'
     """
     unit, factor = time_unit(value, error) if unit == "s" else (unit, 1.0)
     behind = f" {unit}" if unit else ""
     value, error = value / factor, error / factor
+    if error == math.inf:
+        return f"{rounded(value, error)}{behind}, not determined"
     if not (math.isfinite(error) and error > 0.0):
         return f"{rounded(value, error)}{behind}"
-    return f"{rounded(value, error)} ± {rounded(error, error)}{behind}"
+    # A value below its error keeps its first digits: zero would say that it is known to be that.
+    return f"{rounded(value, min(error, abs(value) or error))} ± {rounded(error, error)}{behind}"
 
 
 def between(low: float, high: float, error: float, unit: str = "") -> str:
@@ -57,6 +62,7 @@ def between(low: float, high: float, error: float, unit: str = "") -> str:
     unit, factor = time_unit(max(abs(low), abs(high)), error) if unit == "s" else (unit, 1.0)
     if not (math.isfinite(error) and error > 0.0):
         error = 0.1 * (high - low)
+    error = min(error, 0.5 * (high - low) or error)
     ends = " to ".join(rounded(end / factor, error / factor) for end in (low, high))
     return f"{ends} {unit}".rstrip()
 

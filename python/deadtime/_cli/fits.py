@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 
+from deadtime._base.digits import between, stated
 from deadtime._cli.show import print_text
 from deadtime.estimation import DelayEstimate
 from deadtime.estimation.likelihood._power import unseen_in_words
@@ -20,11 +22,13 @@ _ADVICE = re.compile(r" \(try [^)]*\)")
 
 def print_headline(fit: DelayEstimate) -> None:
     """Print the delay with its interval, and whether the model is adequate or why it is not."""
-    text = f"delay {fit.delay:.4f} s"
+    known = fit.calibrated and "delay" in fit.free
+    error = fit.stderr["delay"] if known else math.nan
+    text = f"delay {stated(fit.delay, error, 's')}"
     if "delay" not in fit.free:
         text += ", as it was given"
-    elif fit.calibrated:
-        text += ", 95 % interval {:.4f} to {:.4f} s".format(*fit.ci(0.95))
+    elif known:
+        text += f", 95 % interval {between(*fit.ci(0.95), error, 's')}"
     else:
         text += ", without an interval"
     print_text(f"{text} ({fit.method})", "bold")

@@ -19,6 +19,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from deadtime._base.digits import between
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.estimation._estimate import estimate_delay
@@ -133,8 +134,8 @@ class PlantChoice(ReadOnlyArrays):
         if not self.best.adequate:
             found.append("No plant of the family is adequate.")
         found.append(
-            "Delay and lag together, over all plants by their weight: {:.4f} to {:.4f} s "
-            "(95 %).".format(*self.ci())
+            "Delay and lag together, over all plants by their weight: "
+            f"{between(*self.ci(), math.nan, 's')} (95 %)."
         )
         return found
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.digits import between, stated
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array
 from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
@@ -307,17 +308,20 @@ class DelayEstimate(ReadOnlyArrays):
             lines.append(f"  {len(self.runs)} recordings together, {rows} samples")
         width = max((len(name) for name in self.stderr), default=0) + 1
         for name, stderr in self.stderr.items():
-            line = f"  {name:<{width}}{self._value(name):9.4f} {unit_of(name):<2}"
+            value, unit = self._value(name), unit_of(name)
             if self.calibrated:
-                low, high = self.ci(0.95, name)
-                line += f" ± {stderr:.4f}   95 % interval {low:.4f} to {high:.4f}"
-            lines.append(line.rstrip())
+                told = f"{stated(value, stderr, unit):<18}"
+                told += f" 95 %: {between(*self.ci(0.95, name), stderr, unit)}"
+            else:
+                told = stated(value, math.nan, unit)
+            lines.append(f"  {name:<{width}} {told}")
         if not self.calibrated:
             lines.append(f"  no interval: {self.uncalibrated}")
         if self.crb is not None and "delay" in self.crb.stderr:
+            bound = float(f"{self.crb.stderr['delay']:.2g}")
             noises = [str(run.noise) for run in self.runs if run.noise is not None]
             lines.append(
-                f"  Cramér-Rao bound {self.crb.stderr['delay']:.4f} s, for "
+                f"  Cramér-Rao bound {stated(bound, math.nan, 's')}, for "
                 f"{' | '.join(noises) or self.crb.noise} with {', '.join(self.crb.free)} free"
             )
         kind = "white" if self.whiteness.white else "coloured"
@@ -353,9 +357,9 @@ class DelayEstimate(ReadOnlyArrays):
         return plot_estimate(self, ax)
 
     def __repr__(self) -> str:
-        spread = f" ± {self.stderr['delay']:.3g}" if self.calibrated else ""
+        error = self.stderr["delay"] if self.calibrated and "delay" in self.stderr else math.nan
         return (
-            f"<DelayEstimate {self.method}: delay {self.delay:.4g}{spread} s, "
+            f"<DelayEstimate {self.method}: delay {stated(self.delay, error, 's')}, "
             f"adequate: {self.adequate}>"
         )
 
