@@ -343,7 +343,23 @@ def thrust() -> None:
     figure.savefig(IMAGES / "thrust.png", dpi=90)
 
 
+def latency() -> None:
+    """What a log of a take-off tells: each loop of two axes, and one of the fits.
+
+    The log is that of a simulated PX4, `px4_sitl_takeoff.ulg`, beside the project.
+    """
+    log = Path(__file__).resolve().parents[2] / "shared/data/flights/px4_sitl_takeoff.ulg"
+    if not log.exists():
+        print(f"latency: there is no {log.name} beside the project, the pictures stay as they are")
+        return
+    found = dtm.latency(log, axes=("roll", "pitch"))
+    found.plot().savefig(IMAGES / "latency-loops.png", dpi=90)
+    fit = found.loop("roll").estimate
+    fit.plot()[0].figure.savefig(IMAGES / "latency-roll.png", dpi=90)
+
+
 if __name__ == "__main__":
+    latency()
     flying()
     thrust()
     designing()

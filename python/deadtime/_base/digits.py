@@ -7,6 +7,9 @@ import math
 #: Units of time that are shown, and each in s, the largest first.
 TIMES = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6))
 
+#: Share of its error below which a value is shown as zero.
+NEXT_TO_NOTHING = 0.02
+
 #: Most digits behind the point, and digits of a number without an error.
 MOST, PLAIN = 12, 4
 
@@ -54,7 +57,8 @@ def stated(value: float, error: float, unit: str = "") -> str:
     if not (math.isfinite(error) and error > 0.0):
         return f"{rounded(value, error)}{behind}"
     # A value below its error keeps its first digits: zero would say that it is known to be that.
-    return f"{rounded(value, min(error, abs(value) or error))} ± {rounded(error, error)}{behind}"
+    least = min(error, max(abs(value), NEXT_TO_NOTHING * error))
+    return f"{rounded(value, least)} ± {rounded(error, error)}{behind}"
 
 
 def between(low: float, high: float, error: float, unit: str = "") -> str:

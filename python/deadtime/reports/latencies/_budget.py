@@ -98,5 +98,6 @@ def _measured(one: LoopLatency, name: str) -> Stage:
     start, stop = one.windows[0]
     where = f"estimated from {start:.1f} to {stop:.1f} s"
     if len(one.windows) > 1:
-        where += f" and {len(one.windows) - 1} more windows"
+        more = len(one.windows) - 1
+        where += f" and {more} more window{'s' if more > 1 else ''}"
     return Stage(name, value, error, where, one.estimate.adequate)

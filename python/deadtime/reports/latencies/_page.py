@@ -95,7 +95,7 @@ def _fit(number: int, one: LoopLatency) -> list[str]:
     start, stop = one.windows[0]
     further = len(one.windows) - 1
     caption = f"The window from {start:.1f} to {stop:.1f} s" + (
-        f", the best of {further + 1} that were compared." if further else "."
+        f", the best of {further + 1} that were fitted together." if further else "."
     )
     said = [f"{one.headline()}.", f"{', '.join(numbers_of(fit))}."]
     if not fit.adequate:

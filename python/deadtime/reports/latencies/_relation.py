@@ -135,7 +135,7 @@ def relation_of(
     Where it is not known whether commands hold or move between rows, `held` gives a window with
     commands that hold; the likelier of the two is taken.
     """
-    ends = tuple((one.start, one.stop) for one in windows)
+    ends = _ends_of(windows)
     told = [one for one in windows if one.tells]
     promise = windows[0].promise if windows else float("inf")
 
@@ -155,8 +155,13 @@ def relation_of(
     cost = None
     if command == "actuator":
         cost = cost_of(fit, told[0].recording)
-    ends = tuple((one.start, one.stop) for one in told)
+    ends = _ends_of(told[: len(fit.runs)])
     return LoopLatency(loop, axis, kind, command, ends, promise, fit, "", cost, between)
+
+
+def _ends_of(windows: list[Window]) -> tuple[tuple[float, float], ...]:
+    """Start and stop of each window, s."""
+    return tuple((one.start, one.stop) for one in windows)
 
 
 def _no_answer(fit: DelayEstimate, window: Window) -> str:
