@@ -50,3 +50,9 @@ def test_what_is_wrong_is_one_line(log, tmp_path):
     text = tmp_path / "flight.csv"
     text.write_text("time,reference\n")
     assert "open it with dtm.read_recording" in one_clear_line(run("inspect", text))
+
+
+def test_a_flight_of_a_log_with_one_is_refused(log):
+    result = run("inspect", log, "--flight", 2)
+    assert result.returncode != 0
+    assert "DataFlash log, which holds one flight" in one_clear_line(result)

@@ -26,10 +26,11 @@ def command(
             help="Tell about this loop only, for example 'roll rate'.", show_default=False
         ),
     ] = None,
+    flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
     """Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains."""
-    found = open_log(log)
+    found = open_log(log, flight=flight)
     if loop is not None:
         one = found.loop(loop)
         if as_json:

@@ -40,6 +40,7 @@ def command(
         Path | None,
         typer.Option(help="Write a page with all fits, for one log.", show_default=False),
     ] = None,
+    flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
     """Tell how long each loop of a vehicle takes to respond, by stage, and what that costs."""
@@ -49,7 +50,7 @@ def command(
         check_matplotlib()
         if len(logs) > 1:
             raise ValueError("--out writes the page of one log: give one, or leave it out")
-    found = [_told(open_log(one), axis, loop, as_json) for one in logs]
+    found = [_told(open_log(one, flight=flight), axis, loop, as_json) for one in logs]
     if as_json and len(found) == 1:
         print_json(found[0].to_dict())
     elif as_json:

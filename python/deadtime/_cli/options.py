@@ -72,6 +72,13 @@ Plot = Annotated[
     typer.Option(help="Write a picture to this .png, .svg or .pdf.", callback=_drawn_later),
 ]
 As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+Flight = Annotated[
+    int | None,
+    typer.Option(
+        help="Which flight of a Blackbox file, from 1; by default the longest.",
+        show_default=False,
+    ),
+]
 
 
 #: Upper limit on the ratio of the simulated time to the shortest time of the loop (bounds time).

@@ -5,6 +5,7 @@ import random
 import tracemalloc
 from itertools import pairwise
 
+import deadtime as dtm
 import numpy as np
 import pytest
 from blackbox_logs import (
@@ -232,6 +233,20 @@ def test_each_of_several_flights_can_be_read(number):
     logs, data = several()
     log, rows = logs[number - 1]
     assert_holds(read_blackbox(data, "made.bbl", flight=number), log, rows)
+
+
+def test_a_log_is_opened_at_one_of_its_flights(tmp_path):
+    path = tmp_path / "several.bbl"
+    path.write_bytes(several()[1])
+    durations = [dtm.open_log(path, flight=number).duration for number in (1, 2, 3)]
+    assert dtm.open_log(path).duration == max(durations) == durations[1]
+    assert durations[2] < durations[0] < durations[1]
+    with pytest.raises(RecordingError, match="flight 4 of 3: give a number from 1 to 3"):
+        dtm.open_log(path, flight=4)
+    other = tmp_path / "other.log"
+    other.write_text("FMT, 1, 23, ATT, Qcc, TimeUS,DesRoll,Roll\nATT, 1, 2, 3\n")
+    with pytest.raises(ValueError, match=r"flight=1: .*other\.log is a DataFlash text log"):
+        dtm.open_log(other, flight=1)
 
 
 def test_a_flight_that_cannot_be_read_is_named():

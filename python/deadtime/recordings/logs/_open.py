@@ -23,7 +23,7 @@ READERS = {
 }
 
 
-def open_log(path: str | os.PathLike[str]) -> Log:
+def open_log(path: str | os.PathLike[str], *, flight: int | None = None) -> Log:
     r"""Open the log of an autopilot and list the loops that are in it.
 
     Parameters
@@ -32,6 +32,9 @@ def open_log(path: str | os.PathLike[str]) -> Log:
         The file. Its format is told by its first bytes, whatever its name: ULog (PX4), DataFlash
         (ArduPilot, binary or text), tlog (MAVLink, of a ground station), Blackbox (Betaflight,
         INAV) or Crazyflie uSD.
+    flight : int, optional
+        Which flight of a Blackbox file that holds several, counted from 1; by default the longest,
+        with a remark that names the others.
 
     Returns
     -------
@@ -44,6 +47,8 @@ def open_log(path: str | os.PathLike[str]) -> Log:
     RecordingError
         When the file cannot be read, is no such log, or is too damaged to be read. A log that is
         cut off is read as far as it goes, with a remark.
+    ValueError
+        When `flight` is given for a log of another format.
     MissingExtraError
         When the library that reads the format is not installed; the message holds the line that
         installs it.
@@ -65,9 +70,11 @@ def open_log(path: str | os.PathLike[str]) -> Log:
     with opened(path) as stream:
         head = stream.read(HEAD)
         form = _format(path, head)
+        if flight is not None and form != "Blackbox":
+            raise ValueError(f"flight={flight}: {path} is a {form} log, which holds one flight")
         data = whole(stream, head)
     try:
-        contents = _read(form, data, path.name)
+        contents = _read(form, data, path.name, flight)
         return log_of(contents, names_of(contents), path.name)
     except DeadtimeError:
         raise
@@ -80,10 +87,11 @@ def open_log(path: str | os.PathLike[str]) -> Log:
         ) from error
 
 
-def _read(form: str, data: bytes, source: str) -> LogContents:
+def _read(form: str, data: bytes, source: str, flight: int | None) -> LogContents:
     file, function = READERS[form]
     reader = importlib.import_module(f"deadtime.recordings.logs.{file}")
-    contents: LogContents = getattr(reader, function)(data, source)
+    which = {} if flight is None else {"flight": flight}
+    contents: LogContents = getattr(reader, function)(data, source, **which)
     return contents
 
 
