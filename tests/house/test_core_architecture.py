@@ -65,6 +65,7 @@ ORDER = {
         "path",
         "orthogonal",
         "whiten",
+        "kicks",
         "mean",
         "likelihood",
         "search",

@@ -21,7 +21,7 @@ pub struct Model {
     runs: Vec<Rows>,
     pub(super) free: Free,
     /// Longest delay and lag, s.
-    longest: f64,
+    pub(super) longest: f64,
     /// Time between rows, s: the median of the first recording.
     pub(super) row_time: f64,
 }

@@ -13,6 +13,7 @@
 mod disturbance;
 mod fit;
 mod kept;
+mod kicks;
 mod likelihood;
 mod mean;
 mod orthogonal;

@@ -132,13 +132,17 @@ impl Model {
              and a rise above it"
         );
         refuse_if!(floor.is_nan(), "the least end is {floor}: give a number");
-        // Two lags that come out equal have standard errors without bound, and intervals with them.
+        // Two lags that come out equal have standard errors without bound: the search for an end
+        // begins nearer, and goes as far as any time that the recordings may tell.
         let widest = (WIDEST * best.point.total()).max(self.row_time);
-        let reach = if matches!(quantity, Quantity::Gain | Quantity::Zero) {
+        let first = if matches!(quantity, Quantity::Gain | Quantity::Zero) {
             reach
         } else {
             reach.clamp(-widest, widest)
         };
+        let farthest =
+            (FARTHEST * reach.abs()).min((FARTHEST * first.abs()).max(2.0 * self.longest));
+        let reach = first;
         let centre = quantity.value(&best.point);
         let mut lowest = best.clone();
         let mut near = best.clone();
@@ -146,7 +150,7 @@ impl Model {
         let mut outer = centre + reach;
         let mut bracket = None;
         let mut width = reach;
-        while width.abs() <= FARTHEST * reach.abs() {
+        while width.abs() <= farthest {
             outer = (centre + width).max(floor);
             let next = self.held(&near, quantity, outer, task)?;
             if next.objective < lowest.objective {
@@ -285,6 +289,25 @@ mod tests {
                     assert!((quantity.value(&there.point) - end).abs() < 1e-12);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn an_error_without_bound_leads_to_the_same_end() {
+        let (model, best) = fitted(&[0.17]);
+        for sign in [-1.0, 1.0] {
+            let [near, far] = [4e-3, 1.5e4].map(|reach| {
+                let end = model.end(
+                    &best,
+                    Quantity::Total,
+                    sign * reach,
+                    3.84,
+                    f64::NEG_INFINITY,
+                    &Task::new(),
+                );
+                end.unwrap().0
+            });
+            assert!((near - far).abs() < 1e-3 * 0.48, "{near} {far}");
         }
     }
 

@@ -1,0 +1,70 @@
+//! Random changes of the states of a plant at the arrivals of commands.
+
+use super::plant::PlantSpace;
+use super::rows::{Commands, Rows};
+use super::steps::Steps;
+use super::whiten::Kick;
+use crate::{Error, memory};
+
+/// What the errors of computed commands, and the scatter of the times at which commands arrive, do
+/// to the states of the plant by the next row, in the order of the rows.
+pub(super) fn kicks(
+    rows: &Rows,
+    space: &PlantSpace,
+    delay: f64,
+    arrivals: f64,
+) -> Result<Vec<Kick>, Error> {
+    match space.b.len() {
+        0 => Ok(Vec::new()),
+        1 => kicks_of::<1>(rows, space, delay, arrivals),
+        2 => kicks_of::<2>(rows, space, delay, arrivals),
+        3 => kicks_of::<3>(rows, space, delay, arrivals),
+        4 => kicks_of::<4>(rows, space, delay, arrivals),
+        5 => kicks_of::<5>(rows, space, delay, arrivals),
+        6 => kicks_of::<6>(rows, space, delay, arrivals),
+        7 => kicks_of::<7>(rows, space, delay, arrivals),
+        8 => kicks_of::<8>(rows, space, delay, arrivals),
+        n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
+    }
+}
+
+fn kicks_of<const N: usize>(
+    rows: &Rows,
+    space: &PlantSpace,
+    delay: f64,
+    arrivals: f64,
+) -> Result<Vec<Kick>, Error> {
+    let Commands {
+        time,
+        value,
+        uncertain,
+        ..
+    } = &rows.commands;
+    let jumps = if arrivals > 0.0 { time.len() - 1 } else { 0 };
+    let mut found = memory::reserved("the errors of commands", uncertain.len() + jumps)?;
+    let mut steps = Steps::<N>::new(space);
+    let mut add = |steps: &mut Steps<N>, end: f64, moved: &[f64; N]| {
+        let arrival = end + delay;
+        let row = rows.time.partition_point(|time| *time < arrival);
+        let Some(time) = rows.time.get(row).filter(|_| row > 0) else {
+            return;
+        };
+        let state = steps.at(time - arrival, *time).apply(moved, 0.0).to_vec();
+        found.push(Kick { row, state });
+    };
+    for (start, end, deviation) in uncertain {
+        let moved = steps.at(end - start, *end).apply(&[0.0; N], *deviation);
+        add(&mut steps, *end, &moved);
+    }
+    if arrivals > 0.0 {
+        let by_jump: [f64; N] = std::array::from_fn(|i| space.b[i]);
+        for (end, pair) in time.iter().skip(1).zip(value.windows(2)) {
+            let jump = arrivals * (pair[1] - pair[0]);
+            if jump != 0.0 {
+                add(&mut steps, *end, &by_jump.map(|b| b * jump));
+            }
+        }
+        found.sort_by_key(|kick| kick.row);
+    }
+    Ok(found)
+}
