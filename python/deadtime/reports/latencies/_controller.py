@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple, TypeAlias
 
+import numpy as np
+
 from deadtime.recordings import Log
 from deadtime.recordings.logs._names import Kind
 from deadtime.recordings.logs._recording import moves
@@ -41,6 +43,11 @@ def period_of(log: Log, kind: Kind) -> Period | None:
     return None
 
 
+#: Share of the variance of a command, off the line between its neighbours, from which it is rough;
+#: rows below which a rough one tells no time; fewest rows for that.
+ROUGH, ROWS, FEWEST = 0.05, 2.0, 8
+
+
 def between_rows(log: Log, kind: Kind, told: Series) -> Between | None:
     """Whether commands hold between the rows of a log; None where that is not known."""
     if not moves(told):
@@ -49,3 +56,20 @@ def between_rows(log: Log, kind: Kind, told: Series) -> Between | None:
     if period is None:
         return None
     return "held" if told.period < EACH * period.time else "lines"
+
+
+def hidden_between_rows(told: Series, between: Between | None, start: float, stop: float) -> float:
+    """A time that rows of a command are too far apart to tell, s; zero where they tell all.
+
+    A command that moves between the rows of a log is taken for straight lines. Where a row is often
+    far from the line between its neighbours, lines are not what the vehicle was told.
+    """
+    rows = (told.time >= start) & (told.time <= stop) & np.isfinite(told.values)
+    values = told.values[rows]
+    if between == "held" or values.size < FEWEST:
+        return 0.0
+    time = told.time[rows]
+    trend = np.polynomial.Polynomial.fit(time, values, 1)(time)
+    off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
+    rough = float(np.mean(off**2)) > ROUGH * float(np.mean((values - trend) ** 2))
+    return ROWS * told.period if rough else 0.0

@@ -15,7 +15,7 @@ from deadtime._base.plain import plain
 from deadtime._base.progress import Stages, stage_report
 from deadtime.recordings import Log, LogLoop, Recording, open_log
 from deadtime.reports.latencies._budget import Stage, stages_of
-from deadtime.reports.latencies._controller import between_rows
+from deadtime.reports.latencies._controller import between_rows, hidden_between_rows
 from deadtime.reports.latencies._filters import FilterDelay, filters_of
 from deadtime.reports.latencies._relation import LoopLatency, relation_of
 from deadtime.reports.latencies._windows import (
@@ -290,9 +290,12 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     def held(window: Window) -> Recording:
         return loop.recording(window.start, window.stop, command=command, between="held")
 
+    hidden = 0.0
+    if windows:
+        hidden = hidden_between_rows(told, between, windows[0].start, windows[0].stop)
     return relation_of(
         loop.name, loop.axis, loop.kind, command, integrates, windows, between,
-        held if between is None else None,
+        held if between is None else None, hidden,
     )  # fmt: skip
 
 

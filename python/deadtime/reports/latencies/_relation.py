@@ -129,11 +129,12 @@ def relation_of(
     windows: list[Window],
     between: Between | None = None,
     held: Callable[[Window], Recording] | None = None,
+    hidden: float = 0.0,
 ) -> LoopLatency:
     """Fit the plant of a loop to its windows, or say why that tells nothing.
 
     Where it is not known whether commands hold or move between rows, `held` gives a window with
-    commands that hold; the likelier of the two is taken.
+    commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not adequate.
     """
     ends = _ends_of(windows)
     told = [one for one in windows if one.tells]
@@ -152,6 +153,12 @@ def relation_of(
         return refused(str(error).partition("; check ")[0])
     if why := _no_answer(fit, told[0]):
         return refused(why)
+    if fit.delay_plus_lag < hidden:
+        fit = _doubted(
+            fit,
+            f"the {command} moves between rows of the log by more than it shows, which hides times "
+            f"below {stated(hidden, 0.0, 's')}",
+        )
     cost = None
     if command == "actuator":
         cost = cost_of(fit, told[0].recording)
