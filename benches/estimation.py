@@ -30,11 +30,15 @@ estimates, 200 a row, and to print the gain margin of the true loop beside the d
 Run ``python benches/estimation.py --firmware [--keep DIR | --read DIR] [--quick]`` to fly
 ArduPilot's Copter in its software-in-the-loop build, and to estimate on these flights
 (`reality.firmware`). The flights take 15 minutes at the speed of the clock; `--keep` keeps their
-recordings and `--read` estimates on them again.
+recordings and `--read` estimates on them again. With ``--drawn N [--seed SEED]`` commands wait for
+drawn times, and the estimates are from the log of the vehicle (`reality.drawn`).
 
 Run ``python benches/estimation.py --rates [--runs N] [--method TEXT] [--quick]`` to estimate on
 simulated rate loops of multirotors at 1 kHz, beside the deconvolved step response and the masked
 cross-correlation of the field's tools (`rate_loops`).
+
+The other tables are in folders of their own; the first ones are one file, because cases, methods
+and what each method is given are read together, and the command line that chooses between all.
 """
 
 from __future__ import annotations
