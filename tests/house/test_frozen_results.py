@@ -119,6 +119,7 @@ MADE = {
     "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
     "TransferFunction": lambda: dtm.feedback(2.0 / dtm.s * dtm.delay(0.36)),
+    "SharedNumber": lambda: dtm.estimation.shared_number([estimated(), estimated()]),
     "Whiteness": lambda: dtm.estimation.Whiteness(1.0, 0.5, 3, 0.1),
 }
 WAYS = {

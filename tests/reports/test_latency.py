@@ -1,5 +1,7 @@
 """The latency report, on logs with known truth and on recorded flights."""
 
+from dataclasses import replace
+
 import deadtime as dtm
 import numpy as np
 import pytest
@@ -33,6 +35,19 @@ def test_the_vehicle_is_told_from_its_own_log(found):
     assert low < GAIN < high
     assert value == one.estimate.delay_plus_lag
     assert found.headline() == one.headline()
+
+
+def test_axes_share_a_delay(found, tmp_path):
+    # Two axes of one vehicle: two logs of the same loop, with noise of their own.
+    other = dtm.latency(log_of(tmp_path, seed=6))
+    both = replace(found, loops=(*found.loops, *other.loops)).shared("rate")
+    assert both.adequate
+    low, high = both.interval
+    assert low < DELAY < high
+    each = [one.loop("roll rate", "actuator").estimate.ci() for one in (found, other)]
+    assert high - low < min(high - low for low, high in each)
+    with pytest.raises(ValueError, match="1 of the 1 loops of rate have an adequate estimate"):
+        found.shared("rate")
 
 
 def test_the_cost_in_gain_holds_that_of_the_true_vehicle(found):

@@ -1,7 +1,7 @@
 """Estimate the delay of a control loop from a recording, with a confidence interval.
 
 `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several plants,
-`_result` is what they return.
+`_result` is what they return, `_shared` combines several.
 `methods` holds one file a method, `data` what they read from a recording, `models` what they fit,
 `fit` least squares, profiles and residuals, `planning` the bounds of planned experiments.
 """
@@ -10,6 +10,7 @@ from deadtime.estimation._choose import PlantChoice, choose_plant
 from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
+from deadtime.estimation._shared import SharedNumber, shared_number
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
@@ -50,6 +51,7 @@ __all__ = [
     "PlannedBound",
     "PlantChoice",
     "Relay",
+    "SharedNumber",
     "Waveform",
     "Whiteness",
     "choose_plant",
@@ -57,4 +59,5 @@ __all__ = [
     "damping_ratio",
     "estimate_delay",
     "identifiability",
+    "shared_number",
 ]

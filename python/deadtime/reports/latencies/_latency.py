@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
 from deadtime._base.progress import Stages, stage_report
+from deadtime.estimation import SharedNumber, shared_number
 from deadtime.recordings import Log, LogLoop, Recording, open_log
 from deadtime.reports.latencies._budget import Stage, stages_of
 from deadtime.reports.latencies._controller import between_rows, hidden_between_rows
@@ -75,6 +76,38 @@ class Latency(ReadOnlyArrays):
     def estimated(self) -> tuple[LoopLatency, ...]:
         """The loops whose time was not refused."""
         return tuple(one for one in self.loops if one.estimate is not None)
+
+    def shared(self, kind: str, command: Command = "actuator", name: str = "delay") -> SharedNumber:
+        """What the loops of one kind say together about a number that they share.
+
+        Parameters
+        ----------
+        kind : str
+            ``"rate"``, ``"attitude"``, ``"velocity"`` or ``"position"``.
+        command : {"actuator", "setpoint"}
+            From what the time counts.
+        name : str
+            ``"delay"``, or ``"delay+lag"`` where the axes are alike.
+
+        Returns
+        -------
+        SharedNumber
+            Of the adequate estimates, each with its own gain, lag and noise.
+
+        Raises
+        ------
+        ValueError
+            When fewer than two of these loops have an adequate estimate.
+        """
+        asked = [one for one in self.loops if (one.kind, one.command) == (kind, command)]
+        fits = [one.estimate for one in asked if one.estimate is not None]
+        told = [fit for fit in fits if fit.adequate]
+        if len(told) < 2:
+            raise ValueError(
+                f"{len(told)} of the {len(asked)} loops of {kind} have an adequate estimate from "
+                f"the {command}: a shared number needs two"
+            )
+        return shared_number(told, name)
 
     def headline(self) -> str:
         """The shortest answer: the fastest loop of the vehicle that is told, in one line."""

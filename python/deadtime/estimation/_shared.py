@@ -1,0 +1,189 @@
+"""What several estimates say together about a number that they share.
+
+Recordings of several axes share the delay of the link, not gain, lag or noise. Each estimate has a
+profile over the number, with everything else of its own fitted. Their recordings are independent,
+so their statistics add up: S(x) = sum of t_i(x)^2. Its minimum is the likeliest common value. The
+interval ends where S has risen by the square of a Gaussian quantile. If they do share the number,
+the minimum is chi-squared with one degree of freedom less than there are estimates (Cochran 1954).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from deadtime._base.digits import between, stated
+from deadtime._base.plain import plain
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.fit._profile import floor_of, unit_of
+from deadtime.estimation.fit._residuals import SIGNIFICANCE
+
+#: Step that the search for an end begins with, as a share of the smallest interval; and most steps.
+FIRST_STEP, STEPS = 0.25, 60
+
+#: Share of the smallest interval to which the minimum and the ends are found.
+TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class SharedNumber:
+    """A number that several estimates share.
+
+    Attributes
+    ----------
+    name : str
+        The number, such as ``"delay"``.
+    value : float
+        The likeliest common value.
+    interval : (float, float)
+        Its interval.
+    level : float
+        The level of the interval.
+    estimates : tuple of float
+        The value of each estimate.
+    p_value : float
+        Probability of estimates that differ as much, or more, if they share the number.
+    adequate : bool
+        Whether all estimates are adequate and do not contradict one another.
+    """
+
+    name: str
+    value: float
+    interval: tuple[float, float]
+    level: float
+    estimates: tuple[float, ...]
+    p_value: float
+    adequate: bool
+
+    @property
+    def agree(self) -> bool:
+        """Whether the estimates may share the number."""
+        return self.p_value >= SIGNIFICANCE
+
+    def summary(self) -> str:
+        """The number in one line."""
+        from scipy import special
+
+        low, high = self.interval
+        error = (high - low) / (2.0 * float(special.ndtri(0.5 + 0.5 * self.level)))
+        unit = unit_of(self.name)
+        text = (
+            f"{self.name} of {len(self.estimates)} estimates: {stated(self.value, error, unit)} "
+            f"({100.0 * self.level:g} %: {between(low, high, error, unit)})"
+        )
+        if not self.agree:
+            each = ", ".join(stated(one, error, unit) for one in self.estimates)
+            return f"{text}; they contradict one another (p = {self.p_value:.2g}): {each}"
+        return text if self.adequate else f"{text}; not adequate, for one of them is not"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The number as plain values for JSON."""
+        found: dict[str, Any] = plain({**vars(self), "agree": self.agree})
+        return found
+
+
+def shared_number(
+    estimates: Sequence[DelayEstimate], name: str = "delay", level: float = 0.95
+) -> SharedNumber:
+    """Combine estimates from independent recordings that share one number and nothing else.
+
+    Parameters
+    ----------
+    estimates : sequence of DelayEstimate
+        Two or more, such as those of roll, pitch and yaw, whose commands take the same way.
+    name : str
+        What they share: ``"delay"``, ``"gain"``, ``"delay+lag"``, or another fitted number.
+    level : float
+        Of the interval, between 0 and 1.
+
+    Returns
+    -------
+    SharedNumber
+        With gain, lag and noise of each recording fitted by themselves.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer than two estimates, one has no profile (its method has none), or the
+        number was not fitted in one of them.
+
+    See Also
+    --------
+    estimate_delay : Several recordings that share all numbers, fitted together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> time = np.arange(300) * 0.02
+    >>> told = 0.2 * np.sign(np.sin(3.7 * (time - 0.3))) * (time > 0.3)
+    >>> loop = dtm.ControlLoop(dtm.FactoredPlant([0.1]), dtm.P(1.0), sample_time=0.02)
+    >>> noise = 0.003 * np.random.default_rng(1).standard_normal((2, 300))
+    >>> found = []
+    >>> for lag, one in zip((0.05, 0.15), noise):
+    ...     vehicle = dtm.FactoredPlant([lag]).transfer_function() * dtm.delay(0.06)
+    ...     angle = np.ravel(vehicle.simulate(time, told).outputs) + one
+    ...     axis = dtm.Recording(time, told, angle, command=told)
+    ...     found.append(dtm.estimate_delay(axis, loop, free=("delay", "gain", "lag_1")))
+    >>> both = dtm.estimation.shared_number(found)
+    >>> both.agree, both.interval[0] < 0.06 < both.interval[1]
+    (True, True)
+    """
+    from scipy import optimize, special
+
+    if len(estimates) < 2:
+        raise ValueError(f"{len(estimates)} estimates were given: a shared number needs two")
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+    ends = [one.ci(level, name) for one in estimates]
+    values = [one._value(name) for one in estimates]
+    known: dict[float, float] = {}
+
+    def total(value: float) -> float:
+        if value not in known:
+            known[value] = math.fsum(
+                float(one.profile(name, [value])[1][0]) ** 2 for one in estimates
+            )
+        return known[value]
+
+    width = min(high - low for low, high in ends)
+    low, high = min(values), max(values)
+    best = low
+    if high - low > TOLERANCE * width:
+        found = optimize.minimize_scalar(
+            total, bounds=(low, high), method="bounded", options={"xatol": TOLERANCE * width}
+        )
+        best = min((low, high, float(found.x)), key=total)
+    least = total(best)
+    rise = float(special.ndtri(0.5 + 0.5 * level)) ** 2
+    interval = tuple(
+        _end(lambda x: total(x) - least - rise, best, sign * width, floor_of(name))
+        for sign in (-1.0, 1.0)
+    )
+    p_value = float(special.chdtrc(len(estimates) - 1, least))
+    return SharedNumber(
+        name=name,
+        value=best,
+        interval=(interval[0], interval[1]),
+        level=level,
+        estimates=tuple(values),
+        p_value=p_value,
+        adequate=p_value >= SIGNIFICANCE and all(one.adequate for one in estimates),
+    )
+
+
+def _end(excess: Callable[[float], float], start: float, width: float, floor: float) -> float:
+    """Where the excess, below zero at the start, becomes zero to this side; or the floor."""
+    from scipy import optimize
+
+    near, step = start, FIRST_STEP * width
+    for _ in range(STEPS):
+        far = max(near + step, floor)
+        if excess(far) >= 0.0:
+            return float(optimize.brentq(excess, near, far, xtol=TOLERANCE * abs(width)))
+        if far == floor:
+            return floor
+        near, step = far, 1.5 * step
+    raise ValueError(f"no end of the interval is found on the way from {start:.6g} to {near:.6g}")
