@@ -116,12 +116,22 @@ def test_sampled_poles_carry_their_rounding_error():
     assert pair[0].imag > 0.0
 
 
-def test_a_sampled_loop_without_delay_has_a_pole_at_minus_infinity():
-    # Its one held command is an eigenvalue of zero beside 1 - 2 Ts: a pole at minus infinity.
+def test_what_is_gone_after_a_sample_is_no_pole():
+    # Its one held command is an eigenvalue z of zero beside 1 - 2 Ts.
     found = dtm.ControlLoop(INTEGRATOR, dtm.P(2.0), delay=0.0, sample_time=0.1).rightmost(2)
+    assert len(found) == 1
     assert found[0].real == pytest.approx(math.log(0.8) / 0.1, rel=1e-12)
-    assert found[1].real == -math.inf
-    assert found.resolved.tolist() == [True, False]
+    assert found.resolved.tolist() == [True]
+    # y(k+1) = y(k) - 0.1 y(k-2), of which one state holds y alone.
+    late = dtm.ControlLoop(INTEGRATOR, dtm.P(1.0), delay=0.2, sample_time=0.1)
+    z = np.roots([1.0, -1.0, 0.0, 0.1])
+    expected = np.sort(np.log(z[z.imag >= 0.0].astype(complex)).real / 0.1)
+    np.testing.assert_allclose(np.sort(late.rightmost(8).roots.real), expected, rtol=1e-9)
+    # At rest after one sample: no pole at all.
+    at_once = late.replace(Kp=10.0, delay=0.0)
+    assert len(at_once.rightmost(2)) == 0
+    assert "0 roots" in repr(at_once.rightmost(2))
+    assert at_once.spectral_abscissa() == -math.inf
 
 
 # Continuous loops through their characteristic function

@@ -167,7 +167,8 @@ class LoopPoles:
             Of a continuous loop: roots of `characteristic`, with proved discs. Of a sampled loop:
             s = ln(z)/sample_time for the eigenvalues z of `transition_matrix`; the radii are no
             proof but bound the rounding error to first order, and a pole is ``resolved`` where
-            its disc keeps clear of the others.
+            its disc keeps clear of the others. Eigenvalues z = 0, whose motion is gone after a
+            sample, are left out, so that there may be fewer than `n`.
 
         Raises
         ------

@@ -43,7 +43,7 @@ def sampled_poles_in(
     inside = (x + shrunk > left) & (x + grown < right)
     inside &= np.where(is_real, (bottom <= 0.0) & (top >= 0.0), (y - turned > bottom))
     inside &= is_real | (y + turned < top)
-    possible = (x + grown >= left) & (x + shrunk <= right) & (x > -np.inf)
+    possible = (x + grown >= left) & (x + shrunk <= right)
     possible &= (y + turned >= bottom) & (y - turned <= top)
     inside &= possible
     unclear = np.flatnonzero(possible & ~inside)

@@ -104,8 +104,12 @@ def _eigenvalues(
 
 
 def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> RootSet:
-    """Return the `n` rightmost poles and their mirror images, with first-order error bounds."""
+    """Return the `n` rightmost poles and their mirror images, with first-order error bounds.
+
+    A pole at z = 0, which is gone after a sample, is none in s.
+    """
     z, errors = _eigenvalues(_balanced(matrix))
+    z, errors = z[z != 0.0], errors[z != 0.0]
     with np.errstate(divide="ignore", invalid="ignore"):
         poles = np.asarray(np.log(z) / sample_time, dtype=np.complex128)
         radii = errors / (np.abs(z) * sample_time)
@@ -113,15 +117,14 @@ def sampled_roots(matrix: NDArray[np.float64], sample_time: float, n: int) -> Ro
     # A pole and its mirror image are neighbours, the upper one first: keep n uppers.
     order = order[np.cumsum(z[order].imag >= 0.0) <= n]
     roots, radii = poles[order], radii[order]
-    with np.errstate(invalid="ignore"):  # z = 0 is a pole at minus infinity, never resolved
-        gaps = np.abs(roots[:, None] - poles[None, :])
+    gaps = np.abs(roots[:, None] - poles[None, :])
     gaps[np.arange(len(order)), order] = np.inf
-    furthest = float(roots.real.min())
+    furthest = float(roots.real.min()) if len(roots) else -np.inf
     return RootSet(
         roots,
         np.ones(len(roots), dtype=np.int64),
         radii,
-        radii < 0.5 * gaps.min(axis=1),
+        radii < 0.5 * gaps.min(axis=1, initial=np.inf),
         len(roots),
         ((furthest, np.inf), (-np.pi / sample_time, np.pi / sample_time)),
     )
