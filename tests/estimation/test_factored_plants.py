@@ -128,3 +128,17 @@ def test_the_command_of_the_loop_serves_where_none_was_logged():
 def test_a_name_that_the_plant_does_not_have_is_refused():
     with pytest.raises(ValueError, match=r"lag_3.*choose from .*lag_2"):
         dtm.estimate_delay(record_attitude(0, **VEHICLE), KNOWN, free=("delay", "lag_3"))
+
+
+def test_delay_and_zero_of_a_plant_that_jumps_are_refused_by_name():
+    # Rows at 20 ms: a jump 5 ms later by a longer zero gives the same rows.
+    time = 0.02 * np.arange(250)
+    told = 0.2 * np.sign(np.sin(3.7 * (time - 0.3))) * (time > 0.3)
+    output = answer(time, time, told, delay=0.05, lags=(0.1,), zero=0.03)
+    other = 0.1 - (0.1 - 0.03) * np.exp(0.005 / 0.1)
+    twin = answer(time, time, told, delay=0.045, lags=(0.1,), zero=other)
+    np.testing.assert_allclose(twin, output, atol=1e-12)
+    recording = dtm.Recording(time, told, output, command=told)
+    known = KNOWN.replace(plant=dtm.FactoredPlant([0.1], zero=0.01))
+    with pytest.raises(dtm.NotIdentifiableError, match="delay and zero cannot be told apart"):
+        dtm.estimate_delay(recording, known, free=("delay", "gain", "lag_1", "zero"))

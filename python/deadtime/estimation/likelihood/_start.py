@@ -99,12 +99,24 @@ def least_squares(
             start = PlantNumbers(point.delay, point.lags, quiet, its_gain, point.zero)
             found.append(likelihood.fit(start, ROUGH))
     if not found:
+        if {"delay", "zero"} <= set(model.names) and _tells_without_zero(model, runs[0], first):
+            raise NotIdentifiableError(
+                "delay and zero cannot be told apart: with a zero for every lag the output jumps "
+                "with the command, and rows do not tell a later jump from a smaller one; leave one "
+                "of them out of free=, or give the plant a further lag"
+            )
         raise NotIdentifiableError(
             "the output does not depend on the command within the window: widen it, or check that "
             "the columns belong together"
         )
     best = min(found, key=lambda one: one.objective)
     return NoiseFit(model, tuple(runs), False, likelihood.fit(best))
+
+
+def _tells_without_zero(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> bool:
+    """Whether a recording tells all numbers but the zero."""
+    names = tuple(name for name in model.names if name != "zero")
+    return bool(_minima(replace(model, names=names), rows, first))
 
 
 def _minima(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> list[PlantNumbers]:
