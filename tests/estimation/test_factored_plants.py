@@ -142,3 +142,18 @@ def test_delay_and_zero_of_a_plant_that_jumps_are_refused_by_name():
     known = KNOWN.replace(plant=dtm.FactoredPlant([0.1], zero=0.01))
     with pytest.raises(dtm.NotIdentifiableError, match="delay and zero cannot be told apart"):
         dtm.estimate_delay(recording, known, free=("delay", "gain", "lag_1", "zero"))
+
+
+def test_a_zero_that_starts_at_none_is_found():
+    recording = record_attitude(1, noise=1e-3, **VEHICLE, zero=0.08)
+    from_none, from_some = (
+        dtm.estimate_delay(
+            recording,
+            KNOWN.replace(plant=dtm.FactoredPlant([0.1, 0.1], zero=zero)),
+            free=(*FREE, "zero"),
+        )
+        for zero in (0.0, 0.01)
+    )
+    low, high = from_none.ci(0.99, "delay+lag")
+    assert low < 0.167 < high
+    assert from_none.delay_plus_lag == pytest.approx(from_some.delay_plus_lag, abs=1e-4)

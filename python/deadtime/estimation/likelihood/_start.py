@@ -88,7 +88,11 @@ def least_squares(
     model: PlantModel, runs: Sequence[FlightRows], delay: float, gain: float
 ) -> NoiseFit:
     """The fit under white noise alone; `delay` and `gain` where they are known."""
-    first = PlantNumbers(delay, model.lags, [RowNoise()], gain, model.zero)
+    zero = model.zero
+    if zero == 0.0 and "zero" in model.names:
+        # There its effect is that of a shorter delay: to first order, they cannot be told apart.
+        zero = float(np.median(np.diff(runs[0].time)))
+    first = PlantNumbers(delay, model.lags, [RowNoise()], gain, zero)
     quiet = [RowNoise()] * len(runs)
     likelihood = model.likelihood(runs, False)
     found = []
