@@ -514,7 +514,9 @@ def main() -> None:
         firmware.run(given.read, given.keep, given.processes, given.quick)
         return
     if given.designs:
-        print_designs(given.runs or (1 if given.quick else 200), given.processes)
+        print_designs(
+            given.runs or (1 if given.quick else 200), given.processes, 2 if given.quick else None
+        )
         return
     if given.rates:
         print_rates(given.runs or (2 if given.quick else 1000), given.processes, given.method)

@@ -73,8 +73,8 @@ def tried(name: str, numbers: range) -> list[Designed | None]:
     return [designed(name, number) for number in numbers]
 
 
-def print_designs(runs: int, processes: int) -> None:
-    """Design for `runs` flights a row, and print how the true loops do."""
+def print_designs(runs: int, processes: int, rows: int | None) -> None:
+    """Design for `runs` flights in each of the first `rows`, or all, and print how the true loops do."""
     print(
         f"{'gain margin of 2.5':24}{'adequate':>9}{'no gains':>9}{'met, %':>8}{'unstable':>10}"
         f"{'sharpest: met, %':>18}{'unstable':>10}{'least':>8}{'of the gain, %':>16}"
@@ -88,7 +88,7 @@ def print_designs(runs: int, processes: int) -> None:
                 pool.submit(tried, name, range(i, min(i + batch, runs)))
                 for i in range(0, runs, batch)
             ]
-            for name in ROWS
+            for name in ROWS[:rows]
         }
         for name, parts in waiting.items():
             found = [one for part in parts for one in part.result() if one is not None]
