@@ -74,7 +74,7 @@ def tried(name: str, numbers: range) -> list[Designed | None]:
 
 
 def print_designs(runs: int, processes: int, rows: int | None) -> None:
-    """Design for `runs` flights in each of the first `rows`, or all, and print how the true loops do."""
+    """Design for flights of the first `rows`, or of all, and print how the true loops do."""
     print(
         f"{'gain margin of 2.5':24}{'adequate':>9}{'no gains':>9}{'met, %':>8}{'unstable':>10}"
         f"{'sharpest: met, %':>18}{'unstable':>10}{'least':>8}{'of the gain, %':>16}"
