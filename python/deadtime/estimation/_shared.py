@@ -3,8 +3,10 @@
 Recordings of several axes share the delay of the link, not gain, lag or noise. Each estimate has a
 profile over the number, with everything else of its own fitted. Their recordings are independent,
 so their statistics add up: S(x) = sum of t_i(x)^2. Its minimum is the likeliest common value. The
-interval ends where S has risen by the square of a Gaussian quantile. If they do share the number,
-the minimum is chi-squared with one degree of freedom less than there are estimates (Cochran 1954).
+interval holds all values at which S is above it by less than the square of a Gaussian quantile. If
+they do share the number, the minimum is chi-squared with one degree of freedom less than there are
+estimates (Cochran 1954). Profiles over a delay have several minima where rows are far apart, and so
+has S: it is computed on a grid first.
 """
 
 from __future__ import annotations
@@ -14,14 +16,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from deadtime._base.digits import between, stated
 from deadtime._base.plain import plain
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 
-#: Step that the search for an end begins with, as a share of the smallest interval; and most steps.
-FIRST_STEP, STEPS = 0.25, 60
+#: Steps of the grid in the smallest interval, and most of them; most steps beyond the grid.
+IN_AN_INTERVAL, ON_THE_GRID, BEYOND = 8, 120, 60
 
 #: Share of the smallest interval to which the minimum and the ends are found.
 TOLERANCE = 1e-3
@@ -71,11 +75,12 @@ class SharedNumber:
         unit = unit_of(self.name)
         text = (
             f"{self.name} of {len(self.estimates)} estimates: {stated(self.value, error, unit)} "
-            f"({100.0 * self.level:g} %: {between(low, high, error, unit)})"
+            f"({100.0 * self.level:g} %: {between(low, high, error, unit)}; such differences, or "
+            f"larger: p = {self.p_value:.2g})"
         )
         if not self.agree:
             each = ", ".join(stated(one, error, unit) for one in self.estimates)
-            return f"{text}; they contradict one another (p = {self.p_value:.2g}): {each}"
+            return f"{text}; they contradict one another: {each}"
         return text if self.adequate else f"{text}; not adequate, for one of them is not"
 
     def to_dict(self) -> dict[str, Any]:
@@ -149,19 +154,22 @@ def shared_number(
         return known[value]
 
     width = min(high - low for low, high in ends)
-    low, high = min(values), max(values)
-    best = low
-    if high - low > TOLERANCE * width:
-        found = optimize.minimize_scalar(
-            total, bounds=(low, high), method="bounded", options={"xatol": TOLERANCE * width}
-        )
-        best = min((low, high, float(found.x)), key=total)
-    least = total(best)
-    rise = float(special.ndtri(0.5 + 0.5 * level)) ** 2
-    interval = tuple(
-        _end(lambda x: total(x) - least - rise, best, sign * width, floor_of(name))
-        for sign in (-1.0, 1.0)
+    low, high = min(low for low, _ in ends), max(high for _, high in ends)
+    count = min(ON_THE_GRID, math.ceil(IN_AN_INTERVAL * (high - low) / width))
+    grid = np.linspace(low, high, count + 1).tolist()
+    place = min(range(count + 1), key=lambda k: total(grid[k]))
+    near = grid[max(place - 1, 0)], grid[min(place + 1, count)]
+    found = optimize.minimize_scalar(
+        total, bounds=near, method="bounded", options={"xatol": TOLERANCE * width}
     )
+    best = min((grid[place], float(found.x)), key=total)
+    least = total(best)
+    limit = least + float(special.ndtri(0.5 + 0.5 * level)) ** 2
+
+    inside = [best, *(one for one in grid if total(one) < limit)]
+    step = (high - low) / count
+    edges = ((min(inside), -step), (max(inside), step))
+    interval = [_end(lambda x: total(x) - limit, *edge, floor_of(name)) for edge in edges]
     p_value = float(special.chdtrc(len(estimates) - 1, least))
     return SharedNumber(
         name=name,
@@ -174,15 +182,15 @@ def shared_number(
     )
 
 
-def _end(excess: Callable[[float], float], start: float, width: float, floor: float) -> float:
-    """Where the excess, below zero at the start, becomes zero to this side; or the floor."""
+def _end(excess: Callable[[float], float], start: float, step: float, floor: float) -> float:
+    """Where the excess, below zero at the start, becomes zero on this side; or the floor."""
     from scipy import optimize
 
-    near, step = start, FIRST_STEP * width
-    for _ in range(STEPS):
+    near, tolerance = start, TOLERANCE * abs(step)
+    for _ in range(BEYOND):
         far = max(near + step, floor)
         if excess(far) >= 0.0:
-            return float(optimize.brentq(excess, near, far, xtol=TOLERANCE * abs(width)))
+            return float(optimize.brentq(excess, near, far, xtol=tolerance))
         if far == floor:
             return floor
         near, step = far, 1.5 * step

@@ -92,7 +92,8 @@ class Latency(ReadOnlyArrays):
         Returns
         -------
         SharedNumber
-            Of the adequate estimates, each with its own gain, lag and noise.
+            Of the adequate estimates, each with its own gain, lag and noise. The vertical axis is
+            one of them; ``axes=`` of `latency` chooses.
 
         Raises
         ------
