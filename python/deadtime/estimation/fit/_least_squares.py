@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime.estimation.data._checks import excited
+from deadtime.estimation.fit._directions import Directions, all_directions
 from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.recordings import Recording
 
@@ -279,39 +280,27 @@ def solve(model: Model) -> Minimum:
 def minimise(
     model: Model,
     start: Array,
-    base: Array | None = None,
-    free: Array | None = None,
+    space: Directions | None = None,
     tolerance: float = TO_ROUNDING,
 ) -> Minimum:
-    """Search from `start` over the points base + free q.
+    """Search from `start` over the points of a space.
 
     Parameters
     ----------
     model : Model
     start : ndarray, shape (p,)
-    base : ndarray, shape (p,), optional
-        Point through which the parameters move; the origin if not given.
-    free : ndarray, shape (p, k), optional
-        Directions in which they move, each with an entry of 1 where the others have 0; all
-        directions if not given.
+    space : Directions, optional
+        All points if not given.
     tolerance : float
         Relative change of cost and parameters at which the search ends.
     """
     from scipy.optimize import least_squares
 
-    base = np.zeros(start.size) if base is None else base
-    free = np.eye(start.size) if free is None else free
-    moving = np.argmax(free > 0.0, axis=0)
-    low, high = model.low[moving].copy(), model.high[moving].copy()
-    for row in np.flatnonzero(np.any(free < 0.0, axis=1)):
-        # base - q has to stay within its own bounds.
-        column = int(np.argmin(free[row]))
-        high[column] = min(high[column], base[row] - model.low[row])
+    space = all_directions(start.size) if space is None else space
+    base, free = space.base, space.free
     if not free.shape[1]:
         return Minimum(base, model.misfit(base), model.jacobian(base))
-    bounded = np.isfinite(low)
-    least_width = 1e-12 * (1.0 + np.abs(low[bounded]))
-    high[bounded] = np.maximum(high[bounded], low[bounded] + least_width)
+    low, high = space.bounds(model)
 
     def misfit(q: Array) -> Array:
         return model.misfit(base + free @ q)
@@ -321,10 +310,10 @@ def minimise(
 
     found = least_squares(
         misfit,
-        np.clip(start[moving], low, high),
+        np.clip(start[space.moving], low, high),
         jac=jacobian,
         bounds=(low, high),
-        x_scale=model.scale[moving],
+        x_scale=model.scale[space.moving],
         xtol=tolerance,
         ftol=tolerance,
         gtol=None,  # an absolute bound, in units of the output squared

@@ -8,12 +8,13 @@ coloured, the quantile is widened by the ratio of robust and plain standard erro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime.estimation.fit._directions import Directions, held_directions
 from deadtime.estimation.fit._least_squares import TO_COMPARE, Minimum, Model, minimise
 
 Array = NDArray[np.float64]
@@ -130,38 +131,21 @@ class ProfileCost:
 
     def __call__(self, name: str, value: float) -> float:
         """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
-        base, free = self._held(name.split("+"), value)
-        least = minimise(self.model, self._linear(base, free), base, free, TO_COMPARE).cost
+        space = held_directions(self.model, self.best.point, name.split("+"), value, self.known)
+        least = minimise(self.model, self._linear(space), space, TO_COMPARE).cost
         # A parameter that is zero in the best fit is tried at zero here too.
         for place in np.flatnonzero(self.best.point < self.model.low):
-            column = np.flatnonzero(free[place] == 1.0)
+            column = np.flatnonzero(space.free[place] == 1.0)
             if column.size:
-                base[place] = self.best.point[place]
-                without = np.delete(free, column, axis=1)
-                start = self._linear(base, without)
-                found = minimise(self.model, start, base, without, TO_COMPARE)
+                space.base[place] = self.best.point[place]
+                without = Directions(space.base, np.delete(space.free, column, axis=1))
+                found = minimise(self.model, self._linear(without), without, TO_COMPARE)
                 least = min(least, found.cost)
         return least
 
-    def _linear(self, base: Array, free: Array) -> Array:
+    def _linear(self, space: Directions) -> Array:
         """Minimum of the linearised model with one quantity held."""
         jacobian = self.best.jacobian
-        away = jacobian @ (self.best.point - base)
-        moved, *_ = np.linalg.lstsq(jacobian @ free, away, rcond=None)
-        return np.asarray(base + free @ moved)
-
-    def _held(self, names: Sequence[str], value: float) -> tuple[Array, Array]:
-        """Base and directions in which the sum of `names` is `value`."""
-        labels = self.model.labels
-        value -= sum(self.known.get(name, 0.0) for name in names if name not in labels)
-        places = [labels.index(name) for name in names if name in labels]
-        fixed = places[0]
-        if len(places) == 1 and value != self.best.point[fixed]:
-            # Values between zero and the lower bound of the search are not simulated.
-            value = max(value, float(self.model.low[fixed]))
-        base = np.zeros(len(labels))
-        base[fixed] = value
-        free = np.delete(np.eye(len(labels)), fixed, axis=1)
-        for place in places[1:]:
-            free[fixed, place - (place > fixed)] = -1.0
-        return base, free
+        away = jacobian @ (self.best.point - space.base)
+        moved, *_ = np.linalg.lstsq(jacobian @ space.free, away, rcond=None)
+        return np.asarray(space.base + space.free @ moved)

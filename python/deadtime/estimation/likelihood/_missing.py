@@ -62,6 +62,8 @@ class HeldCommands(NamedTuple):
         error of that output; zero at its limit.
     steps : int
         In how many ways the reference may have changed between rows.
+    longest : int
+        Most samples in a row that are missing.
     """
 
     time: Array
@@ -69,6 +71,7 @@ class HeldCommands(NamedTuple):
     unknown: tuple[tuple[float, float], ...] = ()
     computed: tuple[tuple[float, float, float], ...] = ()
     steps: int = 1
+    longest: int = 0
 
 
 #: The output of the plant at some times, for a better guess than a straight line between rows.
@@ -153,7 +156,9 @@ def with_missing(
     every = np.concatenate([time, *places])
     order = np.argsort(every, kind="stable")
     values = np.concatenate([command, *commands])
-    return HeldCommands(every[order], values[order], unknown, tuple(computed), steps)
+    return HeldCommands(
+        every[order], values[order], unknown, tuple(computed), steps, int(counts.max())
+    )
 
 
 def _slopes(loop: ControlLoop, sent: Array) -> Array:

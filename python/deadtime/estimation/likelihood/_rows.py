@@ -41,10 +41,15 @@ class FlightRows(NamedTuple):
     rounding: float = 0.0
 
 
-def spikes(residuals: Array) -> NDArray[np.bool_]:
-    """Rows of these residuals that are outliers: far from the median of their neighbours."""
+def spikes(residuals: Array, rounding: float) -> NDArray[np.bool_]:
+    """Rows of these residuals that are outliers: far from the median of their neighbours.
+
+    Rows within a step of the rounding are none.
+    """
     away, robust = _from_neighbours(residuals)
-    found = np.abs(away) > SPIKE * robust if robust > 0.0 else np.zeros(away.size, dtype=bool)
+    found = np.abs(away) > max(SPIKE * robust, rounding)
+    if robust == 0.0:
+        found[:] = False
     if np.sum(found) > MOST_SPIKES * away.size:
         return np.zeros(away.size, dtype=bool)
     return found
@@ -65,11 +70,15 @@ def _from_neighbours(residuals: Array) -> tuple[Array, float]:
     return away, max(robust, LEAST_ROBUST * float(np.std(inner)))
 
 
-def is_outlier(whitened: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Rows whose whitened residual, in robust deviations, is beyond `SPIKE`."""
+def is_outlier(whitened: Array, residuals: Array, rows: FlightRows) -> NDArray[np.bool_]:
+    """Rows whose whitened residual, in robust deviations, is beyond `SPIKE`.
+
+    Rows within a step of the rounding are none.
+    """
+    used = rows.used
     sizes = np.abs(whitened[used])
     robust = max(float(np.median(sizes)) / MAD, LEAST_ROBUST)
-    found = used & (np.abs(whitened) > SPIKE * robust)
+    found = used & (np.abs(whitened) > SPIKE * robust) & (np.abs(residuals) > rows.rounding)
     if np.sum(~used) + np.sum(found) > MOST_SPIKES * used.size:
         return np.zeros(used.size, dtype=bool)
     # The rows after an outlier are predicted from it: only the first of a run is one.

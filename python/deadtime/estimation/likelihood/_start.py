@@ -151,7 +151,7 @@ def on_all_rows(fit: NoiseFit, runs: Sequence[FlightRows]) -> NoiseFit:
         ]
     whole = replace(fit, runs=tuple(runs))
     kept = [
-        rows._replace(used=rows.used & ~is_outlier(part.whitened, rows.used))
+        rows._replace(used=rows.used & ~is_outlier(part.whitened, part.residuals, rows))
         for rows, part in zip(runs, whole.parts, strict=True)
     ]
     whole = replace(fit, runs=tuple(kept))

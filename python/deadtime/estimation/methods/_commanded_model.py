@@ -79,16 +79,13 @@ class CommandedModel(ModelOfOne):
     start: Array
     air: Literal["command", "vehicle"]
 
-    def refilled(self, rows: FlightRows, commands: HeldCommands, error: float) -> FlightRows:
-        """The rows with these commands, computed from outputs with errors.
-
-        They and the gain of the plant are in `error`, in deviations of the white noise.
-        """
+    def refilled(self, rows: FlightRows, commands: HeldCommands, gain: float) -> FlightRows:
+        """The rows with these commands, computed from outputs with errors, for this gain."""
         return rows._replace(
             command_time=commands.time,
             command=commands.command,
             unknown=(*self._before, *commands.unknown),
-            uncertain=tuple((a, b, error * slope) for a, b, slope in commands.computed if slope),
+            uncertain=tuple((a, b, gain * slope) for a, b, slope in commands.computed if slope),
         )
 
     def rows(self, initial_output: float | None, check: RecordingCheck | None) -> FlightRows:

@@ -28,6 +28,7 @@ from deadtime.estimation.data._checks import (
     standard_errors,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording
+from deadtime.estimation.fit._directions import Directions
 from deadtime.estimation.fit._least_squares import Minimum, Model, minimise
 from deadtime.estimation.fit._profile import Profile, ProfileCost
 from deadtime.estimation.fit._residuals import (
@@ -89,7 +90,8 @@ def without_vanishing(model: Model, found: Minimum) -> Minimum:
         ):
             continue
         free = np.delete(kept, [*held, place], axis=1)
-        moved = minimise(model, np.clip(start, model.low, model.high), np.zeros(start.size), free)
+        space = Directions(np.zeros(start.size), free)
+        moved = minimise(model, np.clip(start, model.low, model.high), space)
         if at_end or moved.cost <= found.cost * (1.0 + VANISHING) + rounding:
             found, held = moved, [*held, place]
     return found

@@ -17,7 +17,7 @@ from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._free_numbers import NumbersProfile
 from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
 from deadtime.estimation.likelihood._profile import LikelihoodProfile, profile_of
-from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
+from deadtime.estimation.likelihood._rows import FlightRows, is_outlier, on_same_step
 from deadtime.estimation.likelihood._search import (
     SHORTER,
     NoiseFit,
@@ -49,7 +49,7 @@ def fitted_flight(model: PlantModel, rows: Sequence[FlightRows], first: PlantNum
     fit = fit_noise(model, runs, start)
     for _ in range(ROUNDS):
         found = [
-            is_outlier(part.whitened, one.used)
+            is_outlier(part.whitened, part.residuals, one)
             for part, one in zip(fit.parts, fit.runs, strict=True)
         ]
         if not any(np.any(rows) for rows in found):
@@ -130,7 +130,7 @@ def concluded_flight(
         names = tuple(values)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
     unseen = unseen_lag(fit)
-    left_out = sum(int(np.sum(~rows.used)) for rows in fit.runs)
+    left_out = sum(_outliers(rows) for rows in fit.runs)
     fitted = tuple(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)
         for run, part, one in zip(runs, fit.parts, noise, strict=True)
@@ -166,6 +166,12 @@ def concluded_flight(
         noise=noise[0],
         _profile=profile,
     )
+
+
+def _outliers(rows: FlightRows) -> int:
+    """Rows left out, but those of a rounded output that tell nothing besides another."""
+    left = ~rows.used
+    return int(np.sum(left & ~on_same_step(rows.output) if rows.rounding else left))
 
 
 def values_of(

@@ -39,9 +39,7 @@ from deadtime.estimation.likelihood._lost_commands import (
     Refilled,
     with_lost_commands,
 )
-from deadtime.estimation.likelihood._missing import (
-    predicted_commands,
-)
+from deadtime.estimation.likelihood._missing import predicted_commands, with_missing
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows, spikes
 from deadtime.estimation.likelihood._search import (
@@ -75,13 +73,14 @@ from deadtime.estimation.methods._method import (
     check_choice,
     check_initial_output,
 )
+from deadtime.estimation.methods._rounded_conclusion import read_as_intervals, rounding_is_all
 
 Array = NDArray[np.float64]
 
-#: Rounds of predicting the commands between rows and fitting again, the most samples at which a
-#: reference may have changed that are tried, and by how much of Akaike's criterion one of them has
-#: to be the best.
-REFILLS, MOST_STEPS, CLEARLY = 2, 8, 6.0
+#: Most rounds of predicting the commands between rows and fitting again, and the change of Akaike's
+#: criterion that ends them. The most samples at which a reference may have changed that are tried,
+#: and by how much of that criterion one of them has to be the best.
+REFILLS, SETTLED, MOST_STEPS, CLEARLY = 6, 0.5, 8, 6.0
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
 NEARLY_EXACT = 1e-4
@@ -240,7 +239,7 @@ def _estimated(
         return concluded_plain()
     whole = replace(white, runs=tuple(_given(linear, models, rows, numbers)[1]))
     kept = [
-        one._replace(used=one.used & ~spikes(part.residuals))
+        one._replace(used=one.used & ~spikes(part.residuals, one.rounding))
         for one, part in zip(whole.runs, whole.parts, strict=True)
     ]
     free_numbers = None
@@ -252,9 +251,12 @@ def _estimated(
     joint = None
     if any(one.commands.computed for one in models):
         fit, step, doubts = _with_predicted_commands(linear, fit, models, runs)
-        # Single rows are predicted well enough.
-        if any(one.commands.unknown for one in models) and not (numbers or is_long(rows)):
-            joint = with_lost_commands(fit, _refilling(linear, models, runs, step))
+        missing = max(one.commands.longest for one in models)
+        # Single rows are predicted well enough. Where most are missing, as in a log at a lower
+        # rate, the likelihood has too many kinks.
+        few = all(one.commands.time.size < 2 * one.logged.size for one in models)
+        if missing > 1 and few and not (numbers or is_long(rows)):
+            joint = with_lost_commands(fit, _refilling(linear, models, runs, step), missing)
     if joint is not None:
         fit, cov = joint
         profile: LikelihoodProfile = LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
@@ -285,7 +287,7 @@ def _estimated(
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )
-    return concluded_flight(
+    found = concluded_flight(
         method,
         linear,
         fitted,
@@ -295,6 +297,11 @@ def _estimated(
         details,
         adequacy,
     )
+    intervals_tell = common == names and type(profile) is LikelihoodProfile and not is_long(rows)
+    if intervals_tell and found.adequate and rounding_is_all(profile.fit):
+        repeated = [np.empty(0, int) if one is None else one.repeated for one in checks]
+        return read_as_intervals(found, models, rows, repeated)
+    return found
 
 
 def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
@@ -358,9 +365,22 @@ def _with_predicted_commands(
     unclear = max(steps) > 1 and sum(step > 1 for step in steps) == 1
     tried: list[tuple[NoiseFit, int | None]] = []
     for step in range(max(steps)) if unclear and max(steps) <= MOST_STEPS else (None,):
-        again, refilled = fit, _refilling(names, models, runs, step, unsure=True)
+        refilled = _refilling(names, models, runs, step, unsure=True)
+        between = [
+            one.refilled(
+                rows, with_missing(run.recording, run.loop, one.logged, step=step), abs(fit.gain)
+            )
+            for one, run, rows in zip(models, runs, fit.runs, strict=True)
+        ]
+        again = fitted_flight(fit.model, between, fit.with_gain)
+        # Predicted outputs are better than a straight line between rows, or not, as where they
+        # depend on each other through the controller.
         for _ in range(REFILLS):
-            again = fitted_flight(again.model, refilled(again), again.with_gain)
+            further = fitted_flight(again.model, refilled(again), again.with_gain)
+            gained = again.criterion - further.criterion
+            again = further if gained > 0.0 else again
+            if gained < SETTLED:
+                break
         tried.append((again, step))
     tried.sort(key=lambda one: one[0].criterion)
     best, step = tried[0]
@@ -399,8 +419,7 @@ def _refilling(
                 commands[i] = predicted_commands(
                     run.recording, loop, one.logged, commands[i], step, unsure
                 )
-                error = math.hypot(1.0, fit.numbers.noise[i].sensor)
-                rows = one.refilled(rows, commands[i], abs(fit.gain) * error)
+                rows = one.refilled(rows, commands[i], abs(fit.gain))
             found.append(rows)
         return found
 

@@ -8,22 +8,25 @@ use crate::{Error, memory};
 
 /// What the errors of computed commands, and the scatter of the times at which commands arrive, do
 /// to the states of the plant by the next row, in the order of the rows.
+///
+/// Commands are computed from outputs: their errors are in deviations of the whole `sensor` noise.
 pub(super) fn kicks(
     rows: &Rows,
     space: &PlantSpace,
     delay: f64,
     arrivals: f64,
+    sensor: f64,
 ) -> Result<Vec<Kick>, Error> {
     match space.b.len() {
         0 => Ok(Vec::new()),
-        1 => kicks_of::<1>(rows, space, delay, arrivals),
-        2 => kicks_of::<2>(rows, space, delay, arrivals),
-        3 => kicks_of::<3>(rows, space, delay, arrivals),
-        4 => kicks_of::<4>(rows, space, delay, arrivals),
-        5 => kicks_of::<5>(rows, space, delay, arrivals),
-        6 => kicks_of::<6>(rows, space, delay, arrivals),
-        7 => kicks_of::<7>(rows, space, delay, arrivals),
-        8 => kicks_of::<8>(rows, space, delay, arrivals),
+        1 => kicks_of::<1>(rows, space, delay, arrivals, sensor),
+        2 => kicks_of::<2>(rows, space, delay, arrivals, sensor),
+        3 => kicks_of::<3>(rows, space, delay, arrivals, sensor),
+        4 => kicks_of::<4>(rows, space, delay, arrivals, sensor),
+        5 => kicks_of::<5>(rows, space, delay, arrivals, sensor),
+        6 => kicks_of::<6>(rows, space, delay, arrivals, sensor),
+        7 => kicks_of::<7>(rows, space, delay, arrivals, sensor),
+        8 => kicks_of::<8>(rows, space, delay, arrivals, sensor),
         n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
     }
 }
@@ -33,6 +36,7 @@ fn kicks_of<const N: usize>(
     space: &PlantSpace,
     delay: f64,
     arrivals: f64,
+    sensor: f64,
 ) -> Result<Vec<Kick>, Error> {
     let Commands {
         time,
@@ -53,7 +57,7 @@ fn kicks_of<const N: usize>(
         found.push(Kick { row, state });
     };
     for (start, end, deviation) in uncertain {
-        let moved = steps.at(end - start, *end).apply(&[0.0; N], *deviation);
+        let moved = steps.at(end - start, *end).apply(&[0.0; N], sensor * deviation);
         add(&mut steps, *end, &moved);
     }
     if arrivals > 0.0 {

@@ -178,6 +178,7 @@ pub(super) fn evaluate(
         &space,
         values.delay,
         noise.arrivals.hypot(noise.stamps),
+        noise.sensor.hypot(1.0),
     )?;
     let variances = noise.variances(rows)?;
     let mut log_det = 0.0;
@@ -467,7 +468,7 @@ mod tests {
         let rows = rows.checked().unwrap();
         for noise in [QUIET, WINDY] {
             let found = at(&rows, &values(Gain::Eliminated, &[]), &noise);
-            let size = 0.5 * (2.6 - DELAY - 2.0);
+            let size = 0.5 * noise.sensor.hypot(1.0) * (2.6 - DELAY - 2.0);
             let (objective, _) = dense(&rows, &noise, &[(40, size)], None);
             assert!((found.objective - objective).abs() < 1e-7);
         }

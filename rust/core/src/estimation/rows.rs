@@ -12,8 +12,8 @@ pub struct Commands {
     /// Times between which the command is unknown: a linear unknown for each.
     pub unknown: Vec<(f64, f64)>,
     /// Times between which the command was computed, and its error: the standard deviation of the
-    /// response it causes, as a factor on that of a unit command, in white deviations. In the order
-    /// of their ends.
+    /// response it causes, as a factor on that of a unit command, in deviations of the noise of the
+    /// sensor, white and coloured together. In the order of their ends.
     pub uncertain: Vec<(f64, f64, f64)>,
 }
 
