@@ -24,6 +24,10 @@ Run ``python benches/estimation.py --reality --oracle [--unknown-noise] [--runs 
 [--rows NAME,NAME] [--quick]`` for the rows that have a bound: estimates by one who knows the
 process that made them, beside ours on the same runs (`reality.oracle`).
 
+Run ``python benches/estimation.py --reality --detectable [--runs N] [--rows NAME,NAME] [--quick]``
+for the share of recordings with lost commands, a changing delay or a lag left out that the best
+test of all could tell from good ones (`reality.detection`).
+
 Run ``python benches/estimation.py --designs [--runs N] [--quick]`` to design gains from such
 estimates, 200 a row, and to print the gain margin of the true loop beside the demanded one.
 
@@ -63,6 +67,7 @@ from deadtime.estimation._estimate import METHODS
 from rate_loops.table import print_rates
 from reality import drawn, firmware
 from reality.designs import print_designs
+from reality.detection import print_powers
 from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
 
@@ -484,6 +489,7 @@ def main() -> None:
     reality = parser.add_argument_group("recordings like those of real flights")
     reality.add_argument("--reality", action="store_true", help="print their table alone")
     reality.add_argument("--oracle", action="store_true", help="compare with an oracle instead")
+    reality.add_argument("--detectable", action="store_true", help="which faults can be found")
     reality.add_argument(
         "--unknown-noise", action="store_true", help="the oracle does not know the sizes of noise"
     )
@@ -528,6 +534,9 @@ def main() -> None:
             free = free_of(given.free) if given.free else None
         except ValueError as error:
             parser.error(str(error))
+        if given.detectable:
+            print_powers(conditions, min(runs, 200), given.processes)
+            return
         if given.oracle:
             print_oracle(conditions, runs, given.unknown_noise, given.processes)
             return

@@ -5,8 +5,7 @@ whitened residuals stay white. Beside their whiteness, these are tested:
 
 * a further lag beside the noise: the likelihood ratio, half its distribution at zero (Self & Liang
   1987);
-* a delay that is constant over the window: the cumulated score of the delay is a Brownian bridge
-  over its information (Nyblom 1989);
+* a delay that is constant over the window (`delay_change`);
 * air that is slower than the rows: faster air stands for something else;
 * recordings that agree about gain, and delay and lag together (`contradictions`);
 * air that moves the output as much while the vehicle rests (`air_at_rest`);
@@ -23,10 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.digits import stated
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
 from deadtime.estimation.likelihood._agreement import contradictions
 from deadtime.estimation.likelihood._air_at_rest import air_at_rest
+from deadtime.estimation.likelihood._changing_delay import NONE_SEEN, delay_change
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
@@ -51,9 +52,6 @@ RESTLESS = 15.0
 
 #: Deviation of residuals, in that of rounding, up to which they are those of rounding.
 MOST_ROUNDING = 1.5
-
-#: Largest difference of the cumulated score at the 1 % level (Kolmogorov).
-BRIDGE = 1.628
 
 
 @dataclass(frozen=True)
@@ -109,8 +107,13 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
     lacks = len(reasons) > plain
     for index, part in enumerate(fit.parts):
         where = f" in recording {index + 1}" if len(fit.parts) > 1 else ""
-        if part.score.size and bridge(part.score, part.whitened) > BRIDGE:
-            reasons.append(f"the delay is not constant over the window{where}")
+        # Commands that follow from the plant move with its numbers, which the test does not know.
+        change = delay_change(fit, index) if profile.commands_given else NONE_SEEN
+        if change.p_value < SIGNIFICANCE:
+            reasons.append(
+                f"the delay is not constant over the window{where}: it changes by "
+                f"{stated(change.spread, math.nan, 's')} (standard deviation)"
+            )
         mask = used[index]
         if grows_with_speed(part.whitened[mask], part.rate[mask]) < SIGNIFICANCE:
             reasons.append(
@@ -190,13 +193,6 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
     if best.objective >= least:
         return without, 1.0
     return best, 0.5 * float(special.chdtrc(1, least - best.objective))
-
-
-def bridge(score: Array, whitened: Array) -> float:
-    """Largest cumulated score of the delay, over its information."""
-    path = np.cumsum(score * whitened)
-    share = np.cumsum(score**2)
-    return float(np.max(np.abs(path - share * path[-1])))
 
 
 def grows_with_speed(whitened: Array, rate: Array) -> float:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,7 @@ KINKS, MANY = 1.2, 5
 class LostCommandsProfile(LikelihoodProfile):
     """Intervals from the covariance of the numbers that all recordings share."""
 
+    commands_given: ClassVar[bool] = False
     cov: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __reduce__(self) -> tuple[object, ...]:

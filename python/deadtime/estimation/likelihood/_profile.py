@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,8 @@ class LikelihoodProfile:
     fit: NoiseFit
     names: Mapping[str, str]
     preferred: str = "the noise is fitted"
+    #: Whether the commands are given, not functions of the plant that is fitted.
+    commands_given: ClassVar[bool] = True
     _ends: dict[tuple[str, float], tuple[float, float]] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[object, ...]:

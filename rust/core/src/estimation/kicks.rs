@@ -57,7 +57,9 @@ fn kicks_of<const N: usize>(
         found.push(Kick { row, state });
     };
     for (start, end, deviation) in uncertain {
-        let moved = steps.at(end - start, *end).apply(&[0.0; N], sensor * deviation);
+        let moved = steps
+            .at(end - start, *end)
+            .apply(&[0.0; N], sensor * deviation);
         add(&mut steps, *end, &moved);
     }
     if arrivals > 0.0 {

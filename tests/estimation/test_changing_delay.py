@@ -1,0 +1,79 @@
+"""The delay is constant over the window, or the estimate says that it is not."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation.likelihood._changing_delay import delay_change
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
+
+from reality import detection, table
+from reality.conditions import CONDITIONS, SAMPLE, Condition
+from reality.generator import record
+
+NAMED = {condition.name: condition for condition in CONDITIONS}
+
+
+def p_values(condition: Condition, runs: int) -> np.ndarray:
+    """Of the test in such recordings."""
+    found = []
+    for number in range(runs):
+        run = record(condition, number)
+        loop = dtm.ControlLoop(
+            dtm.Integrator(), dtm.P(run.vehicle.Kp), sample_time=SAMPLE, limit=1.0
+        )
+        fit = dtm.estimate_delay(table.recording_of(condition, run), loop, free=("delay", "gain"))
+        if isinstance(fit._profile, LikelihoodProfile):
+            found.append(delay_change(fit._profile.fit, 0).p_value)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", ["white", "air 0.02"])
+def test_a_constant_delay_is_called_changing_as_rarely_as_the_level_says(name):
+    found = p_values(NAMED[name], 60)
+    assert found.size > 55
+    # Of 60 values that are spread evenly, more than 12 are below 0.1 once in 150.
+    assert np.sum(found < 0.1) <= 12
+    assert np.sum(found < 0.01) <= 3
+
+
+def test_a_delay_that_grows_by_half_of_itself_is_found():
+    condition = replace(NAMED["delay ramps 100 ms"], delay_ramp=0.2, white=0.002)
+    fits = []
+    for number in range(16):
+        run = record(condition, number)
+        loop = table.given_loop(condition, run, condition.free)
+        fits.append(
+            dtm.estimate_delay(table.recording_of(condition, run), loop, free=condition.free)
+        )
+    assert sum(fit.adequate for fit in fits) <= 3
+    named = [
+        "the delay is not constant over the window: it changes by" in fit.message for fit in fits
+    ]
+    assert sum(named) >= 9
+
+
+def test_the_best_test_finds_nothing_where_there_is_no_fault():
+    # Its power is then the share of good recordings that it calls faulty.
+    ramp = replace(NAMED["delay ramps 100 ms"], delay_ramp=1e-9)
+    assert detection.power(ramp, 4) == pytest.approx(detection.LEVEL, abs=0.001)
+    wander = replace(NAMED["delay wanders 30 ms"], delay_wander=1e-6)
+    assert detection.power(wander, 6) == pytest.approx(detection.LEVEL, abs=0.04)
+    lost = replace(NAMED["commands lost 5 %"], commands_lost=1e-9)
+    assert detection.power(lost, 3) == pytest.approx(detection.LEVEL, abs=0.05)
+
+
+def test_the_best_test_finds_more_of_what_is_larger():
+    powers = [
+        detection.power(replace(NAMED["delay ramps 100 ms"], delay_ramp=size), 10)
+        for size in (0.02, 0.05, 0.1)
+    ]
+    assert powers == sorted(powers)
+    assert powers[-1] > 0.6
