@@ -135,7 +135,7 @@ def test_no_gain_below_the_margin_is_unstable(Kp, Kv, delay, period, lag):
     loop = sampled(dtm.Integrator(0.85, lag), dtm.PV(Kp, Kv, SMOOTH), delay, period)
     assume(loop.spectral_abscissa() < -1e-3)
     # Without the delay margin, which takes matrices of up to a thousand samples.
-    found = sampled_margins(loop._sampled_gain, True, lambda: (math.nan, math.nan))
+    found = sampled_margins(loop._sampled_gain, True, (math.nan, math.nan))
     assert radius(loop, found.gain_margin) == pytest.approx(1.0, abs=1e-7)
     for factor in np.linspace(1.0, found.gain_margin, 15)[:-1]:
         assert radius(loop, factor) < 1.0

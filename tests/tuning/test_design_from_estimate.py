@@ -143,6 +143,17 @@ def test_gains_that_meet_a_margin_but_not_by_its_estimate_are_returned():
 
 
 @pytest.mark.survey
+def test_gains_for_the_worst_of_a_wide_region_are_found_far_from_those_for_its_extremes():
+    """The search ended there, and named as the nearest a loop that had what was asked."""
+    flight = dtm.Experiment.step(8.0, rest=1.04).run(TRUTH, noise=0.03, seed=2)
+    fit = dtm.estimate_delay(flight, KNOWN, free=("delay", "gain", "lag"))
+    best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=6.0, allow_inadequate=True)
+    loops = [best.loop.replace(limit=None, **one) for one in best.region.points]
+    least = min(one.stable_range("gain")[1] / one.parameters["gain"] for one in loops)
+    # The worst has what was asked, and no more.
+    assert 6.0 <= least < 6.0 * 1.01
+
+
 @pytest.mark.parametrize("name", ["gust 0.05 1 s"])
 def test_flights_in_gusts(name):
     """Demanded is a gain margin of 2.5. A second number is what the design promised."""

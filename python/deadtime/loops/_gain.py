@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
@@ -111,11 +112,16 @@ class LoopGain:
         >>> loop.replace(sample_time=0.065).margin()
         <Margins: gain 2.012 at 4.002 rad/s, phase 45.09° at 1.997 rad/s, delay 0.3939 s at ...>
         """
+        return self._margin()
+
+    def _margin(self, delay_margin: bool = True) -> Margins:
+        """The margins; without the delay margin, which is NaN, where a sampled loop may save it."""
         loop = self.specification
-        if loop.sample_time is not None:
-            abscissa = sampled_abscissa(loop.model, loop.known_delay, loop.sample_time)
-            return sampled_margins(self._sampled_gain, abscissa < 0.0, self._further_delay)
-        return self.open_loop().margin()
+        if loop.sample_time is None:
+            return self.open_loop().margin()
+        stable = sampled_abscissa(loop.model, loop.known_delay, loop.sample_time) < 0.0
+        late = self._further_delay() if stable and delay_margin else (math.nan, math.nan)
+        return sampled_margins(self._sampled_gain, stable, late)
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Return the loop gain, cut at the command, at frequencies; its limit left out.

@@ -36,9 +36,9 @@ _CROSSING, _CROSSING_RELATIVE = 1e-15, 1e-14
 
 
 def sampled_margins(
-    gain: SampledLoopGain, stable: bool, further_delay: Callable[[], tuple[float, float]]
+    gain: SampledLoopGain, stable: bool, further_delay: tuple[float, float]
 ) -> Margins:
-    """Margins of the loop gain; `further_delay` gives the delay margin and its frequency."""
+    """Margins of the loop gain; `further_delay` is the delay margin and its frequency."""
     period = gain.sample_time
 
     def side(angle: Vector) -> Vector:
@@ -61,7 +61,7 @@ def sampled_margins(
     turned, turned_at = _first_loss(
         np.abs(degrees), crossovers / period, np.isfinite(degrees), 1.0, math.inf
     )
-    late, late_at = further_delay() if stable else (nan, nan)
+    late, late_at = further_delay
     if not stable:
         up = down = turned = up_at = down_at = turned_at = nan
     return Margins(

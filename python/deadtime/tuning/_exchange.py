@@ -29,6 +29,7 @@ from deadtime.tuning._margins import MARGINS, UNITS, RequiredMargins, exact_marg
 from deadtime.tuning._objectives import NEVER, Objective
 from deadtime.tuning._problem import Problem, Scenario, Vector
 from deadtime.tuning._search import Search
+from deadtime.tuning._survey import surveyed
 
 #: Most rounds of the exchange: two or three suffice where costs are continuous, and where steps are
 #: simulated, which jump, more do not help.
@@ -81,13 +82,15 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
         cost, worst = worst_scenario(problem, objective, gains, everywhere)
         seen = objective.worst(problem, gains, scenarios)
         added = [worst] if cost > seen + objective.tolerance * abs(seen) else []
-        missing = np.zeros(3)
+        missing = underestimated = np.zeros(3)
         if required.named:
             places = [*margin_places(search, gains), *scenarios[len(problem.corners) :]]
-            each = exact_margins(problem, gains, places)
-            missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
-            missing = np.where(required.vector > 0.0, missing, 0.0)
+            each = exact_margins(problem, gains, places, required)
+            missing = _missing(required, each)
             added += [places[int(np.argmin(each[:, i]))] for i in np.flatnonzero(missing)]
+            known = [one in scenarios for one in places]
+            if any(known):
+                underestimated = _missing(required, each[known])
         stalled = best is not None and cost > best.cost - _STALLED * abs(best.cost)
         if not missing.any() and (best is None or cost < best.cost):
             best = Found(gains, tuple(scenarios), cost, worst, len(everywhere))
@@ -97,9 +100,13 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
         if not missing.any() and (stalled or not added):
             break
         scenarios += [one for i, one in enumerate(added) if one not in added[:i]]
-        aimed = search.required.raised(missing)
+        aimed = search.required.raised(underestimated)
         search = replace(search, required=aimed, scenarios=tuple(scenarios))
         gains = search.locally(gains)
+        if required.named and search.short(gains) > _HOPELESS:
+            # Gains that have the margins in an added scenario may be far away.
+            search = replace(search, survey=surveyed(problem, search.survey.shape, scenarios))
+            gains = search.globally()
     if best is None:
         raise _unmet(search, required, gains)
     if best.cost >= NEVER:
@@ -111,6 +118,12 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
     return replace(best, scenarios=tuple(scenarios))
 
 
+def _missing(required: RequiredMargins, each: Vector) -> Vector:
+    """What margins (scenarios, 3) miss of the requirements at their least."""
+    missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
+    return np.where(required.vector > 0.0, missing, 0.0)
+
+
 def least_margins(each: Vector) -> Vector:
     """Least of margins (scenarios, 3); none at all where a scenario is not stable."""
     return np.asarray(np.where(np.isnan(each), 0.0, each).min(axis=0))
@@ -118,12 +131,12 @@ def least_margins(each: Vector) -> Vector:
 
 def _unmet(search: Search, required: RequiredMargins, gains: Vector) -> ValueError:
     """The error that names the requirements that are not met, and what is possible."""
-    problem = search.problem
+    problem, scenarios = search.problem, search.scenarios
     points = search.survey.points[search.survey.stable]
-    alone = search.estimate.of(points, problem.corners).max(axis=0)
-    short = required.shortfall(search.estimate.of(points, problem.corners))
-    candidates = [gains, points[int(np.argmin(short))]]
-    least = [least_margins(exact_margins(problem, one, problem.corners)) for one in candidates]
+    each = search.estimate.of(points, scenarios)
+    alone = each.max(axis=0)
+    candidates = [gains, points[int(np.argmin(required.shortfall(each)))]]
+    least = [least_margins(exact_margins(problem, one, scenarios)) for one in candidates]
     place = int(np.argmin([required.shortfall(one) for one in least]))
     wanted = ", ".join(_with_unit(name, value) for name, value in required.named.items())
     most = ", ".join(

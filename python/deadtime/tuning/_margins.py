@@ -95,9 +95,18 @@ class RequiredMargins(NamedTuple):
         return np.asarray(np.maximum(missing, 0.0).sum(axis=-1))
 
 
-def exact_margins(problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> Vector:
-    """Gain, phase and delay margin in each scenario, shape (scenarios, 3)."""
-    found = [problem.at(gains, one).margin() for one in scenarios]
+def exact_margins(
+    problem: Problem,
+    gains: Vector,
+    scenarios: Sequence[Scenario],
+    required: RequiredMargins | None = None,
+) -> Vector:
+    """Gain, phase and delay margin in each scenario, shape (scenarios, 3).
+
+    With `required` the delay margin, which takes most of the time, may be NaN where it is not.
+    """
+    late = required is None or required.delay_margin > 0.0
+    found = [problem.at(gains, one)._margin(late) for one in scenarios]
     return np.array([[getattr(one, name) for name in MARGINS] for one in found])
 
 

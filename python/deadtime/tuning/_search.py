@@ -179,7 +179,12 @@ class Search:
 
     def short(self, gains: Vector) -> float:
         """By how much gains fall short of the required margins, by the estimate."""
-        return float(self._shortfalls(gains[None, :])[0])
+        return self._short(gains, self.objective.worst(self.problem, gains, self.scenarios))
+
+    def _short(self, gains: Vector, cost: float) -> float:
+        """The same for gains of this cost; an unstable loop has crossings, which are no margins."""
+        stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
+        return float(self._shortfalls(gains[None, :])[0]) if stable else _UNSTABLE
 
     def _shortfalls(self, points: Vector, stride: int = 1) -> Vector:
         """The same of every row of gains."""
@@ -190,10 +195,7 @@ class Search:
         cost = self.objective.worst(self.problem, gains, self.scenarios)
         if not self.required.named:
             return cost
-        # An unstable loop has crossings, which are no margins.
-        stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
-        short = self.short(gains) if stable else _UNSTABLE
-        return cost + _PENALTY * self._scale * short
+        return cost + _PENALTY * self._scale * self._short(gains, cost)
 
     def _totals(self, axes: list[Vector], judge: Judge) -> Vector:
         """The same of every point of a grid."""

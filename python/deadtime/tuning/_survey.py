@@ -45,6 +45,11 @@ class Survey:
     abscissa: Vector
 
     @property
+    def shape(self) -> tuple[int, ...]:
+        """Points along each axis."""
+        return tuple(map(len, self.axes))
+
+    @property
     def points(self) -> Vector:
         """Every point of the grid, one a row."""
         return grid_points(self.axes)
@@ -99,8 +104,10 @@ def grid_points(axes: Sequence[Vector]) -> Vector:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
-def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
-    """Map the free gains of a problem in each of its corners."""
+def surveyed(
+    problem: Problem, shape: Sequence[int] | None, scenarios: Sequence[Scenario] = ()
+) -> Survey:
+    """Map the free gains of a problem in each of its corners, or in these scenarios."""
     free = problem.free
     counts = _SHAPES[len(free)] if shape is None else tuple(shape)
     if len(counts) != len(free) or min(counts) < 2:
@@ -111,7 +118,7 @@ def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
         axes = tuple(
             np.linspace(*spans[name], count) for name, count in zip(free, counts, strict=True)
         )
-        survey = Survey(axes, worst_abscissa(problem, axes, problem.corners))
+        survey = Survey(axes, worst_abscissa(problem, axes, scenarios or problem.corners))
         if survey.stable.any():
             return survey
     tried = ", nor in ".join(
