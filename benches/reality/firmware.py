@@ -1,13 +1,15 @@
 """Estimates on flights against ArduPilot's Copter: what is added to the delay must come out.
 
-The vehicle limits acceleration and jerk of the velocity that it is told (`deadtime.RateLimited`).
-Each flight is estimated with an integrator and a lag after these limits, as the vehicle says them,
-and without them. The sum is that of delay and lag. It is compared between flights whose commands
-waited for different times before they were sent.
+The vehicle limits acceleration and jerk of the velocity that it is told (`deadtime.RateLimited`),
+and its controller of the velocity lets that overshoot. Each flight is estimated with the plants of
+`PLANTS`: an integrator and a lag without these limits, that after them, as the vehicle says them,
+and an integrator, two lags and a zero after them. The sum is that of delay and lags less the zero.
+It is compared between flights whose commands waited for different times before they were sent.
 
 An estimate should be adequate where the unexplained part of the rise is below twice the noise of
-the quiet rows: the root mean square of the residuals in the first `RISE` seconds after each step,
-beside that of the residuals around their mean in the last `QUIET` seconds before the next.
+the quiet rows: the deviation of the residuals around their mean over `QUIET` seconds, in the first
+`RISE` seconds after each step, beside that in the last ones before the next. The wandering of the
+vehicle over longer times shows in neither.
 """
 
 from __future__ import annotations
@@ -41,14 +43,26 @@ RISE, QUIET = 3.0, 2.0
 #: The sum has to rise by what was added within this, s.
 WITHIN = 0.015
 
-FREE = ("delay", "gain", "lag")
+#: Clocks that are this far from a line, in s, cannot be converted: the machine stood still.
+CLOCK = 0.005
+
+#: Plants, whether behind the limits of the vehicle, and what is fitted.
+PLANTS: dict[str, tuple[bool, Any, tuple[str, ...]]] = {
+    "lag": (False, dtm.Integrator(1.0, lag=0.1), ("delay", "gain", "lag")),
+    "limits": (True, dtm.Integrator(1.0, lag=0.1), ("delay", "gain", "lag")),
+    "zero": (
+        True,
+        dtm.FactoredPlant([0.15, 0.1], zero=0.2, integrator=True),
+        ("delay", "gain", "lag_1", "lag_2", "zero"),
+    ),
+}
 
 
 class Estimated(NamedTuple):
     """One estimate; times in s, the noise in m."""
 
     flight: Flight
-    limited: bool
+    plant: str
     total: float
     interval: tuple[float, float]
     gain: float
@@ -110,8 +124,8 @@ def fly(folder: Path, flights: Iterable[Flight]) -> None:
         raise SystemExit("a session of the firmware failed; its words are in firmware.log")
 
 
-def estimated(folder: Path, flight: Flight, limited: bool, own_log: bool = False) -> Estimated:
-    """Estimate one flight, with the limits that the vehicle says or without; in other processes.
+def estimated(folder: Path, flight: Flight, plant: str, own_log: bool = False) -> Estimated:
+    """Estimate one flight with a plant of `PLANTS`; this runs in other processes.
 
     `own_log`: from the log of the vehicle, not from that of the controller.
     """
@@ -128,37 +142,47 @@ def estimated(folder: Path, flight: Flight, limited: bool, own_log: bool = False
             command="command",
         )
     acceleration, jerk = (facts["parameters"][name] for name in SHAPING[flight.axis])
-    plant: Any = dtm.Integrator(1.0, lag=0.1)
+    limited, vehicle, free = PLANTS[plant]
     if limited:
-        plant = dtm.RateLimited(plant, rate=0.01 * acceleration, rate_of_rate=jerk)
-    loop = dtm.ControlLoop(plant, dtm.P(GAINS[flight.axis]), sample_time=SAMPLE, limit=LIMIT)
+        vehicle = dtm.RateLimited(vehicle, rate=0.01 * acceleration, rate_of_rate=jerk)
+    loop = dtm.ControlLoop(vehicle, dtm.P(GAINS[flight.axis]), sample_time=SAMPLE, limit=LIMIT)
     # What the controller computes from is not in the log of the vehicle.
     method = "output_error" if own_log else "auto"
     try:
-        fit = dtm.estimate_delay(recording, loop, free=FREE, method=method)
+        if not own_log and facts["clock_misfit"] > CLOCK:
+            late = 1e3 * facts["clock_misfit"]
+            raise dtm.NotIdentifiableError(f"the clocks are {late:.0f} ms from a line")
+        fit = dtm.estimate_delay(recording, loop, free=free, method=method)
     except dtm.NotIdentifiableError as error:
-        nothing = math.nan
-        ends = (nothing, nothing)
+        nothing = (math.nan, math.nan)
         return Estimated(
-            flight, limited, nothing, ends, nothing, False, nothing, nothing, f"refused: {error}"
+            flight, plant, *nothing[:1], nothing, math.nan, False, *nothing, str(error)
         )
     steps = [step.time for step in recording.steps()]
-    since = recording.time - np.array(steps)[np.searchsorted(steps, recording.time) - 1]
-    rising = (recording.time > steps[0]) & (since < RISE)
-    quiet = [
-        fit.residuals[(recording.time > step + HOLD - QUIET) & (recording.time < step + HOLD)]
-        for step in steps
-    ]
-    lag = fit.loop.parameters["lag"]
+
+    def around_mean(*begins: float) -> float:
+        """Deviation of the residuals over `QUIET` seconds that begin so long after each step."""
+        return float(
+            np.sqrt(
+                np.mean(
+                    [
+                        np.var(fit.residuals[(recording.time > at) & (recording.time < at + QUIET)])
+                        for step in steps
+                        for at in (step + begin for begin in begins)
+                    ]
+                )
+            )
+        )
+
     return Estimated(
         flight,
-        limited,
-        fit.delay + lag,
+        plant,
+        fit.delay_plus_lag,
         fit.ci(0.95, "delay+lag"),
         fit.loop.parameters["gain"],
         fit.adequate,
-        float(np.sqrt(np.mean(fit.residuals[rising] ** 2))),
-        float(np.sqrt(np.mean([np.var(part) for part in quiet]))),
+        around_mean(0.0, RISE - QUIET),
+        around_mean(HOLD - QUIET),
         fit.message,
     )
 
@@ -172,23 +196,23 @@ def facts_of(folder: Path, flight: Flight) -> dict[str, Any]:
 def print_table(folder: Path, flights: Sequence[Flight], processes: int) -> None:
     """Estimate all flights and print them, then what the sums rise by."""
     print(
-        f"{'flight':24}{'limits':>7}{'sum':>8}{'95 % interval':>19}{'gain':>7}{'rise mm':>9}"
+        f"{'flight':24}{'plant':>7}{'sum':>8}{'95 % interval':>19}{'gain':>7}{'rise mm':>9}"
         f"{'quiet mm':>9}  adequate, or why not"
     )
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         waiting = [
-            pool.submit(estimated, folder, flight, limited)
-            for limited in (False, True)
-            for flight in flights
+            pool.submit(estimated, folder, flight, plant) for plant in PLANTS for flight in flights
         ]
         found = []
         for one in waiting:
             found.append(one.result())
             print(line(found[-1]), flush=True)
-    print(f"\n{'rise of the sum, s':24}{'limits':>7}{'added':>7}{'rise':>8}  by repeat; overlap")
-    for limited, axis, wind in product((False, True), GAINS, WINDS):
-        some = [e for e in found if (e.limited, *e.flight[:2]) == (limited, axis, wind)]
-        print_rises(f"{axis}, {wind}", [one for one in some if one.limited == limited])
+    print(f"\n{'rise of the sum, s':24}{'plant':>7}{'added':>7}{'rise':>8}  by repeat; overlap")
+    for plant, axis, wind in product(PLANTS, GAINS, WINDS):
+        print_rises(
+            f"{axis}, {wind}",
+            [e for e in found if (e.plant, *e.flight[:2]) == (plant, axis, wind)],
+        )
     for name in sorted({flight.wind for flight in flights}):
         print_jitter(folder, name, [flight for flight in flights if flight.wind == name])
 
@@ -199,7 +223,7 @@ def line(one: Estimated) -> str:
     _, found, reasons = one.message.partition("not adequate: ")
     reasons = reasons.rpartition(" (try")[0] if found else one.message
     return (
-        f"{one.flight.name:24}{'yes' if one.limited else 'no':>7}{one.total:8.3f}"
+        f"{one.flight.name:24}{one.plant:>7}{one.total:8.3f}"
         f"{low:10.3f} –{high:7.3f}{one.gain:7.3f}{1e3 * one.unexplained:9.1f}"
         f"{1e3 * one.noise:9.1f}  {'adequate' if one.adequate else reasons}"
     )
@@ -207,6 +231,7 @@ def line(one: Estimated) -> str:
 
 def print_rises(name: str, found: Sequence[Estimated]) -> None:
     """By how much the sum rises over that without added delay, and whether repeats agree."""
+    found = [one for one in found if not math.isnan(one.total)]
     base = np.mean([one.total for one in found if one.flight.added == 0.0])
     for added in sorted({one.flight.added for one in found}):
         some = [one for one in found if one.flight.added == added]
@@ -214,7 +239,7 @@ def print_rises(name: str, found: Sequence[Estimated]) -> None:
         overlap = max(e.interval[0] for e in some) <= min(e.interval[1] for e in some)
         right = abs(float(np.mean(rises)) - added) <= WITHIN
         print(
-            f"{name:24}{'yes' if some[0].limited else 'no':>7}{added:7.2f}{np.mean(rises):8.3f}"
+            f"{name:24}{some[0].plant:>7}{added:7.2f}{np.mean(rises):8.3f}"
             f"  {' '.join(f'{rise:.3f}' for rise in rises)}; "
             f"{'overlap' if overlap else 'no overlap'}; {'met' if right else 'missed'}"
         )
@@ -223,6 +248,7 @@ def print_rises(name: str, found: Sequence[Estimated]) -> None:
 def print_jitter(folder: Path, wind: str, flights: Sequence[Flight]) -> None:
     """How late the loop was."""
     facts = [facts_of(folder, flight) for flight in flights]
+    facts = [one for one in facts if one["clock_misfit"] <= CLOCK]
     late = np.array([one["late"] for one in facts])
     sent = np.array([one["sent_late"] for one in facts])
     print(

@@ -53,14 +53,14 @@ def test_what_commands_wait_comes_out_of_a_flight(tmp_path):
     flights = [Flight("height", "calm", added, 1) for added in (0.0, wait)]
     firmware.fly(tmp_path, flights)
     # From the log of the controller, which knows its own commands and the position it was told.
-    without, late = (firmware.estimated(tmp_path, one, limited=True) for one in flights)
+    without, late = (firmware.estimated(tmp_path, one, plant="limits") for one in flights)
     assert late.total - without.total == pytest.approx(wait, abs=firmware.WITHIN)
     # What the plant lacks is far above the noise, so neither may be called adequate.
     assert late.unexplained > 2.0 * late.noise
     assert not without.adequate
     assert not late.adequate
     # From the DataFlash that the vehicle itself wrote.
-    found = [firmware.estimated(tmp_path, one, limited=True, own_log=True) for one in flights]
+    found = [firmware.estimated(tmp_path, one, plant="limits", own_log=True) for one in flights]
     [(waited, rise)] = rises(tmp_path, found)
     # On a busy machine commands leave late; the log has when they came.
     assert waited == pytest.approx(wait, abs=0.03)

@@ -5,10 +5,13 @@ whitened residuals stay white. Beside their whiteness, these are tested:
 
 * a further lag beside the noise: the likelihood ratio, half its distribution at zero (Self & Liang
   1987);
+* a delay at its bound, zero: beyond it the likelihood may not rise (score test);
 * a delay that is constant over the window (`delay_change`);
 * air that is slower than the rows: faster air stands for something else;
 * recordings that agree about gain, and delay and lag together (`contradictions`);
 * air that moves the output as much while the vehicle rests (`air_at_rest`);
+* where the residuals are not white, a colour that is the same while the vehicle rests, and neither
+  a further lag with a zero beside the noise (`colour_at_rest`, `overshoots`);
 * noise that does not grow with the speed of the output, as it does where time stamps are not the
   times of the samples (Breusch & Pagan 1979).
 """
@@ -28,6 +31,7 @@ from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whitenes
 from deadtime.estimation.likelihood._agreement import contradictions
 from deadtime.estimation.likelihood._air_at_rest import air_at_rest
 from deadtime.estimation.likelihood._changing_delay import NONE_SEEN, delay_change
+from deadtime.estimation.likelihood._colour_at_rest import colour_at_rest, overshoots
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
@@ -68,12 +72,16 @@ class Adequacy:
         Why the model is not adequate; empty where it is.
     plant_lacks : bool
         Whether one of them is that the plant lacks something: a lag, or what the air stands for.
+    coloured : bool
+        Whether the whitened residuals have a colour that is there while the vehicle rests, too:
+        then the intervals have to be made valid for it.
     """
 
     whiteness: Whiteness
     further_lag: float
     reasons: tuple[str, ...]
     plant_lacks: bool = False
+    coloured: bool = False
 
 
 def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -> Adequacy:
@@ -83,10 +91,12 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
     whitened = [part.whitened[mask] for part, mask in zip(fit.parts, used, strict=True)]
     whiteness = whiteness_of(np.concatenate(whitened), 0, [piece.size for piece in whitened])
     reasons = []
-    if not whiteness.white and not all(
+    rounded = all(
         rounding_explains(part.residuals[mask], rows)
         for part, mask, rows in zip(fit.parts, used, fit.runs, strict=True)
-    ):
+    )
+    coloured = not (whiteness.white or rounded) and _has_colour_at_rest(profile)
+    if not (whiteness.white or rounded or coloured):
         reasons.append(
             "the residuals are not white beside the fitted noise (lag-1 autocorrelation "
             f"{whiteness.autocorrelation:.2f})"
@@ -103,6 +113,16 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
         reasons.append(
             f"a further lag of {further:.3g} s would move delay and lag together to {total:.3g} s, "
             "out of their interval"
+        )
+    elif coloured and (one := overshoots(fit))[1] < SIGNIFICANCE:
+        reasons.append(
+            f"a further lag of {one[0].lags[-1]:.3g} s with a zero of {one[0].zero:.3g} s makes "
+            "the recording likelier: the plant lacks them"
+        )
+    if below_zero(fit) < SIGNIFICANCE:
+        reasons.append(
+            "the delay is at zero, and below zero the recording would be likelier: the plant lags "
+            "more than the vehicle, or lacks something"
         )
     lacks = len(reasons) > plain
     for index, part in enumerate(fit.parts):
@@ -133,7 +153,17 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
             )
             lacks = True
     reasons += contradictions(profile)
-    return Adequacy(whiteness, further, tuple(reasons), lacks)
+    return Adequacy(whiteness, further, tuple(reasons), lacks, coloured)
+
+
+def _has_colour_at_rest(profile: LikelihoodProfile) -> bool:
+    """Whether what is not white is noise with a colour, for which the intervals can be made valid.
+
+    That is known of plain profiles alone, and of recordings that are not long.
+    """
+    fit = profile.fit
+    plain = type(profile) is LikelihoodProfile and not is_long(fit.runs)
+    return plain and all(colour_at_rest(fit, run) for run in range(len(fit.runs)))
 
 
 def rounding_explains(residuals: Array, rows: FlightRows) -> bool:
@@ -193,6 +223,17 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
     if best.objective >= least:
         return without, 1.0
     return best, 0.5 * float(special.chdtrc(1, least - best.objective))
+
+
+def below_zero(fit: NoiseFit) -> float:
+    """Probability of such a slope of the likelihood at a delay of zero, which is its bound."""
+    from scipy import special
+
+    if "delay" not in fit.model.names or fit.numbers.delay > 0.0:
+        return 1.0
+    slopes = [float(part.score @ part.whitened) for part in fit.parts if part.score.size]
+    size = abs(math.fsum(slopes)) / math.sqrt(max(1, len(slopes)))
+    return float(special.ndtr(-size))
 
 
 def grows_with_speed(whitened: Array, rate: Array) -> float:

@@ -12,12 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import RowNoise
+from deadtime._deadtime import RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Places = NDArray[np.intp]
 
 #: Rows over which changes are taken.
 OVER = (4, 8, 16)
@@ -39,6 +40,14 @@ def air_at_rest(fit: NoiseFit, run: int) -> float:
     return min(1.0, len(OVER) * min(_over(fit, run, rows, noise, count) for count in OVER))
 
 
+def rows_since_motion(rows: FlightRows, part: RowLikelihood, places: Places) -> Places:
+    """How many rows before these places the vehicle moved last; very many where it never did."""
+    speed = np.abs(part.rate / part.gain)
+    moves = np.flatnonzero(speed > MOVES * float(speed.max()))
+    last = np.searchsorted(moves, places, side="right")
+    return places - np.where(last > 0, moves[np.maximum(last, 1) - 1], -rows.time.size)
+
+
 def _over(fit: NoiseFit, run: int, rows: FlightRows, noise: RowNoise, count: int) -> float:
     from scipy import special
 
@@ -47,10 +56,7 @@ def _over(fit: NoiseFit, run: int, rows: FlightRows, noise: RowNoise, count: int
         return 1.0
     between = float(np.median(np.diff(rows.time)))
     speed = np.abs(part.rate / part.gain)
-    moves = np.flatnonzero(speed > MOVES * float(speed.max()))
-    first = np.arange(rows.time.size - count)
-    last = np.searchsorted(moves, first + count, side="right")
-    since = first - np.where(last > 0, moves[np.maximum(last, 1) - 1], -rows.time.size)
+    since = rows_since_motion(rows, part, np.arange(count, rows.time.size)) - count
     used = rows.used[count:] & rows.used[:-count]
     used &= np.abs(rows.time[count:] - rows.time[:-count] - count * between) < UNEVEN * between
     moving, resting = used & (since < SHOWS), used & (since > RESTS)

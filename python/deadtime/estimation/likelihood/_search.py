@@ -311,8 +311,9 @@ def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
                 speed = like.rate / like.gain
             moves = speed if part == "stamps" else np.diff(rows.command)
             size = float(np.max(np.abs(moves), initial=0.0))
+            steady = part == "arrivals" and rows.command.size > STEADY * rows.time.size
             # A gain of zero leaves no finite speed.
-            if not 0.0 < size < np.inf or rows.command.size > STEADY * rows.time.size:
+            if not 0.0 < size < np.inf or steady:
                 return found
             runs.append(rows._replace(speed=speed))
             noise.append(changed(one, **{part: getattr(one, part) or 1.0 / size}))

@@ -28,6 +28,7 @@ from deadtime.estimation.fit._least_squares import (
     solve_jointly,
 )
 from deadtime.estimation.likelihood._adequacy import adequacy_of
+from deadtime.estimation.likelihood._colour_at_rest import coloured_profile
 from deadtime.estimation.likelihood._free_numbers import (
     MOST_NUMBERS,
     NumbersProfile,
@@ -284,6 +285,9 @@ def _estimated(
             # Where air moves the output far more than the command does, least squares sees nothing.
             if not gain_is_certain(profile):
                 raise
+    if adequacy.coloured:
+        profile = coloured_profile(profile)
+        message += ", intervals widened for residuals that are coloured at rest, too"
     details["initial_output"] = (
         initial_output if initial_output is not None else profile.initial_output
     )

@@ -1,0 +1,107 @@
+"""Residuals with a colour that is there while the vehicle rests, too, say nothing of the plant."""
+
+import pickle
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime.estimation.likelihood import _colour_at_rest as colour
+from deadtime.estimation.likelihood._profile import common_covariance
+from scipy import signal
+
+SAMPLE, DELAY, GAIN = 0.065, 0.3, 0.9
+TIME = SAMPLE * np.arange(560)
+STEPS = np.where(TIME < 4.0, 0.0, (TIME - 4.0) // 8.0 % 2 == 0).astype(float)
+LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=SAMPLE, limit=1.0)
+FREE = ("delay", "gain")
+
+#: A position that is corrected five times a second, by a resonance, and what is white, m.
+RESONANCE = np.poly(0.98 * np.exp(2j * np.pi * 5.0 * SAMPLE * np.array([1.0, -1.0]))).real
+SIZE, WHITE = 0.0006, 0.0002
+
+#: The plant between command and speed: none, a lag, or one that overshoots.
+STIFF = dtm.FactoredPlant(integrator=True)
+LAGGED = dtm.FactoredPlant([0.15], integrator=True)
+OVERSHOOTING = dtm.FactoredPlant([0.15, 0.15], zero=0.27, integrator=True)
+FINE = 13
+
+
+def flown(seed, plant=STIFF, moving_only=False):
+    """Four steps, by the states of the plant over a thirteenth of a sample each."""
+    random = np.random.default_rng(seed)
+    told = signal.lfilter([1.0], RESONANCE, random.standard_normal(2000))[-TIME.size :]
+    noise = SIZE * told / told.std() + WHITE * random.standard_normal(TIME.size)
+    num, den = plant.polynomials()
+    system = signal.tf2ss(GAIN * num, den)
+    a, b, c, *_ = signal.cont2discrete(system, SAMPLE / FINE)
+    # The delay is 4.6 samples, which is 60 of these steps.
+    waits = np.zeros(round(DELAY / (SAMPLE / FINE)))
+    state = np.zeros((a.shape[0], 1))
+    command, output = np.zeros(TIME.size), np.zeros(TIME.size)
+    before = 0.0
+    for row in range(TIME.size):
+        position = (c @ state).item()
+        moves = abs(position - before) > 0.1 * SAMPLE
+        output[row] = position + (noise[row] if moves or not moving_only else 0.3 * WHITE)
+        before = position
+        command[row] = np.clip(STEPS[row] - output[row], -1.0, 1.0)
+        for _ in range(FINE):
+            state = a @ state + b * waits[0]
+            waits = np.append(waits[1:], command[row])
+    return dtm.Recording(TIME, STEPS, output, command)
+
+
+def test_an_estimate_under_such_noise_is_adequate_and_its_intervals_hold_the_truth():
+    fits = [dtm.estimate_delay(flown(seed), LOOP, free=FREE) for seed in range(40)]
+    assert not any(fit.whiteness.white for fit in fits)
+    adequate = [fit for fit in fits if fit.adequate]
+    assert len(adequate) >= 34
+    held = [
+        [low <= truth <= high for fit in adequate for low, high in [fit.ci(0.95, name)]]
+        for name, truth in (("delay", DELAY), ("gain", GAIN))
+    ]
+    assert all(np.mean(one) >= 0.87 for one in held)
+    assert "coloured at rest" in adequate[0].message
+
+
+@pytest.mark.parametrize("plant", [LAGGED, OVERSHOOTING])
+def test_a_plant_that_lacks_something_is_refused_under_such_noise(plant):
+    fits = [dtm.estimate_delay(flown(seed, plant), LOOP, free=FREE) for seed in range(6)]
+    assert not any(fit.adequate for fit in fits)
+
+
+def test_a_plant_that_overshoots_is_told_from_one_that_lags():
+    loop = LOOP.replace(plant=dtm.Integrator(1.0, lag=0.1))
+    fit = dtm.estimate_delay(flown(1, OVERSHOOTING), loop, free=(*FREE, "lag"))
+    assert not fit.adequate
+    richer = LOOP.replace(plant=dtm.FactoredPlant([0.2, 0.1], zero=0.2, integrator=True))
+    free = (*FREE, "lag_1", "lag_2", "zero")
+    fit = dtm.estimate_delay(flown(1, OVERSHOOTING), richer, free=free)
+    assert fit.adequate
+    low, high = fit.ci(0.95, "delay+lag")
+    assert low < DELAY + 0.03 < high
+
+
+def test_a_colour_that_is_not_there_at_rest_is_a_reason():
+    fits = [dtm.estimate_delay(flown(seed, moving_only=True), LOOP, free=FREE) for seed in range(4)]
+    assert not any(fit.adequate for fit in fits)
+
+
+def test_derivatives_of_the_rows_have_the_covariance_of_the_likelihood():
+    fit = dtm.estimate_delay(flown(2), LOOP, free=FREE)._profile.fit
+    columns = colour._columns(fit, 0)[fit.runs[0].used]
+    found = np.linalg.inv(columns.T @ columns) * fit.parts[0].variance
+    np.testing.assert_allclose(found, common_covariance(fit), rtol=0.02)
+
+
+def test_the_colour_makes_no_interval_shorter():
+    fit = dtm.estimate_delay(flown(3), LOOP, free=FREE)
+    factors = fit._profile.colour
+    assert all(1.0 <= factors[name] < 3.0 for name in ("delay", "gain"))
+
+
+def test_the_estimate_survives_a_copy():
+    fit = dtm.estimate_delay(flown(4), LOOP, free=FREE)
+    again = pickle.loads(pickle.dumps(fit))
+    assert isinstance(again._profile, colour.ColouredProfile)
+    assert again.ci(0.9) == fit.ci(0.9)
