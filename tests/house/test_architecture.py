@@ -39,6 +39,7 @@ LIKELIHOOD = {
     "estimation.likelihood._adequacy",
     "estimation.likelihood._agreement",
     "estimation.likelihood._air_at_rest",
+    "estimation.likelihood._changing_delay",
     "estimation.likelihood._colour_at_rest",
     "estimation.likelihood._lost_commands",
     "estimation.likelihood._power",
