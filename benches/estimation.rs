@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::estimation::{
-    Commands, Fit, Free, Model, Noise, Plant, Point, Quantity, Rows, Search, Timing,
+    Commands, Fit, Free, Limits, Model, Noise, Plant, Point, Quantity, Rows, Search, Timing,
 };
 use deadtime::{Error, Task};
 
@@ -133,8 +133,16 @@ fn likelihood(criterion: &mut Criterion) {
                 continue;
             };
             group.bench_function(format!("end, {name}"), |bencher| {
-                bencher
-                    .iter(|| model.end(black_box(&best), Quantity::Total, 0.01, 3.84, 0.0, &task));
+                bencher.iter(|| {
+                    model.end(
+                        black_box(&best),
+                        Quantity::Total,
+                        0.01,
+                        3.84,
+                        Limits::floor(0.0),
+                        &task,
+                    )
+                });
             });
         }
         group.finish();

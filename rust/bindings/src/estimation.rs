@@ -1,8 +1,8 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Commands, Disturbance, Entry, Evaluation, Fit, Free, Model, Noise, Plant, Point, Quantity,
-    Rows, Search, Timing, whiten,
+    Commands, Disturbance, Entry, Evaluation, Fit, Free, Limits, Model, Noise, Plant, Point,
+    Quantity, Rows, Search, Timing, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -267,6 +267,18 @@ impl FlightLikelihood {
         run_here(py, |task| self.model.objective(&point, task))
     }
 
+    /// −2 ln L of all recordings at each of these delays and the other numbers; finite also where the
+    /// numbers that are searched cannot be told apart.
+    fn over_delays(
+        &self,
+        py: Python<'_>,
+        numbers: &PlantNumbers,
+        delays: Vec<f64>,
+    ) -> PyResult<Vec<f64>> {
+        let point = numbers.fit().point;
+        run_here(py, |task| self.model.over_delays(&point, &delays, task))
+    }
+
     /// The maximum from a starting point; under its noise unless `noise` is searched too.
     #[pyo3(signature = (start, tolerance=1e-6, noise=true))]
     fn fit(
@@ -297,7 +309,10 @@ impl FlightLikelihood {
         Ok(PlantNumbers::from_fit(&found))
     }
 
-    /// The end of an interval, and the lowest point seen on the way.
+    /// The end of an interval, and the lowest point seen on the way, at which the search ends if it is
+    /// `lower` than the best by as much.
+    #[pyo3(signature = (best, quantity, reach, rise, floor, lower=f64::INFINITY))]
+    #[expect(clippy::too_many_arguments, reason = "the numbers of one search")]
     fn end(
         &self,
         py: Python<'_>,
@@ -306,10 +321,12 @@ impl FlightLikelihood {
         reach: f64,
         rise: f64,
         floor: f64,
+        lower: f64,
     ) -> PyResult<(f64, PlantNumbers)> {
+        let limits = Limits { floor, lower };
         let (best, quantity) = (self.known(best), read(quantity)?);
         let (end, lowest) = run_here(py, |task| {
-            self.model.end(&best, quantity, reach, rise, floor, task)
+            self.model.end(&best, quantity, reach, rise, limits, task)
         })?;
         Ok((end, PlantNumbers::from_fit(&lowest)))
     }

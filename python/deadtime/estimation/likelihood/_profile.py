@@ -48,8 +48,8 @@ BETTER = 0.02
 #: Air that may be there unseen, in the weak air of the search.
 UNSEEN = tuple(2.0**k for k in range(-6, 5))
 
-#: Most restarts from better minima that intervals find.
-RESTARTS = 4
+#: Most restarts from better minima, at which the search for an interval ends.
+RESTARTS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +173,13 @@ class LikelihoodProfile:
         """What a sum of times holds besides the numbers of the kernel, s."""
         return self.fit.model.own_lag if self.names[name] == "total" else 0.0
 
-    def ends(self, name: str, level: float) -> tuple[tuple[float, float], PlantNumbers]:
-        """The interval, and the lowest minimum that was seen on the way."""
+    def ends(
+        self, name: str, level: float, lower: float = math.inf
+    ) -> tuple[tuple[float, float], PlantNumbers]:
+        """The interval, and the lowest minimum that was seen on the way.
+
+        The search ends at a minimum that is `lower` by as much: there is no interval then.
+        """
         kernel = self.names[name]
         leads = kernel == "total" and ("zero" in self.fit.model.names or self.fit.model.zero > 0.0)
         floor = -math.inf if kernel in ("gain", "zero") or leads else 0.0
@@ -184,29 +189,34 @@ class LikelihoodProfile:
         reach = max(self.stderr[name] * math.sqrt(rise), 1e-9)
         found, lowest = [], self.centre
         for sign in (-1.0, 1.0):
-            end, low = self.fit.likelihood.end(self.centre, kernel, sign * reach, rise, floor)
+            end, low = self.fit.likelihood.end(
+                self.centre, kernel, sign * reach, rise, floor, lower
+            )
             found.append(0.0 if end == floor else end)
             lowest = min(lowest, low, key=lambda one: one.objective)
-        return (found[0], found[1]), lowest
+            if lowest.objective < self.centre.objective - lower:
+                break
+        return (found[0], found[-1]), lowest
 
 
-def profile_of(
-    fit: NoiseFit, names: Mapping[str, str], first: Iterable[str], level: float = 0.95
+def best_profile(
+    profile: LikelihoodProfile, first: Iterable[str], level: float = 0.95
 ) -> LikelihoodProfile:
-    """The profile of the best minimum: the intervals of `first` may find a better one."""
-    profile = LikelihoodProfile(fit, names)
-    if is_long(fit.runs):
+    """The profile, or that of a better minimum which the intervals of `first` find."""
+    if is_long(profile.fit.runs):
         return profile
     for _ in range(RESTARTS):
         better = None
         for name in first:
-            profile._ends[name, level], lowest = profile.ends(name, level)
+            found, lowest = profile.ends(name, level, BETTER)
             if lowest.objective < profile.centre.objective - BETTER:
                 better = lowest
                 break
+            profile._ends[name, level] = found
         if better is None:
             break
-        profile = LikelihoodProfile(fit.moved(fit.likelihood.fit(better)), names)
+        fit = profile.fit
+        profile = LikelihoodProfile(fit.moved(fit.likelihood.fit(better)), profile.names)
     return profile
 
 

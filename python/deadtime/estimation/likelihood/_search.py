@@ -389,12 +389,14 @@ def grid_minima(
         def at(delay: float, objective: float = math.inf, some: list[float] = some) -> PlantNumbers:
             return PlantNumbers(delay, some, noise, first.gain, first.zero, objective=objective)
 
-        values = np.array([likelihood.objective(at(delay)) for delay in delays])
+        values = np.array(likelihood.over_delays(at(delays[0]), delays))
         padded = np.r_[np.inf, values, np.inf]
         is_least = (values <= padded[:-2]) & (values <= padded[2:])
         # Where the command has no effect yet, the likelihood is infinite.
         places = np.flatnonzero(is_least & np.isfinite(values))
-        minima += [at(delays[i], float(values[i])) for i in places.tolist()]
+        found = [at(delays[i], float(values[i])) for i in places.tolist()]
+        # Nor do rows tell the numbers apart in which it has only just begun.
+        minima += [one for one in found if math.isfinite(likelihood.objective(one))]
     return sorted(minima, key=_objective)
 
 

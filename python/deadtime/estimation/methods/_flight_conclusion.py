@@ -16,7 +16,7 @@ from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._free_numbers import NumbersProfile
 from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
-from deadtime.estimation.likelihood._profile import LikelihoodProfile, profile_of
+from deadtime.estimation.likelihood._profile import LikelihoodProfile, best_profile
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier, on_same_step
 from deadtime.estimation.likelihood._search import (
     SHORTER,
@@ -78,7 +78,8 @@ def profile_for(
     """The profile over the names, and over the sum of delay and lag."""
     found = profiled(fit.model, names)
     total = [name for name, kernel in found.items() if kernel == "total"]
-    return profile_of(fit, found, total if intervals == "sum" and total else found)
+    first = total if intervals == "sum" and total else found
+    return best_profile(LikelihoodProfile(fit, found), first)
 
 
 def profiled(model: PlantModel, names: tuple[str, ...]) -> dict[str, str]:

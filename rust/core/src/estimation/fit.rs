@@ -173,11 +173,35 @@ impl Model {
         self.check(point)?;
         let mut sum = self.penalty(point);
         for run in 0..self.runs.len() {
-            sum += self
-                .part(run, point, None, Wanted::Objective, task)?
-                .objective;
+            sum += self.part(run, point, None, Wanted::Slopes, task)?.objective;
         }
         Ok(sum)
+    }
+
+    /// −2 ln L of all recordings at each of these delays and the other numbers of a point; finite also
+    /// where the numbers that are searched cannot be told apart.
+    ///
+    /// # Errors
+    ///
+    /// As for `at`.
+    pub fn over_delays(
+        &self,
+        point: &Point,
+        delays: &[f64],
+        task: &Task,
+    ) -> Result<Vec<f64>, Error> {
+        self.check(point)?;
+        let mut at = point.clone();
+        let mut found = Vec::with_capacity(delays.len());
+        for delay in delays {
+            at.timing = Timing::Delay(*delay);
+            let mut sum = self.penalty(&at);
+            for run in 0..self.runs.len() {
+                sum += self.part(run, &at, None, Wanted::Value, task)?.objective;
+            }
+            found.push(sum);
+        }
+        Ok(found)
     }
 
     /// What a negative delay costs.
@@ -201,6 +225,20 @@ impl Model {
         tolerance: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
+        self.fit_near(start, held, searched, tolerance, &mut None, task)
+    }
+
+    /// The same from the inverse Hessian of a search near by, if there was one, which becomes that of
+    /// this one.
+    pub(super) fn fit_near(
+        &self,
+        start: &Point,
+        held: Option<Quantity>,
+        searched: Search,
+        tolerance: f64,
+        near: &mut Option<Vec<f64>>,
+        task: &Task,
+    ) -> Result<Fit, Error> {
         self.check(start)?;
         refuse_if!(
             !(tolerance.is_finite() && tolerance > 0.0),
@@ -221,7 +259,7 @@ impl Model {
         let mut trial = start.clone();
         // Recordings whose numbers did not change keep their part of the sum.
         let mut kept: Vec<Option<(Point, Value)>> = vec![None; self.runs.len()];
-        let found = minimise(&variables, tolerance, |z| {
+        let found = minimise(&variables, tolerance, near, |z, wanted| {
             for (slot, value) in slots.iter().zip(z) {
                 put(&mut trial, *slot, *value);
             }
@@ -231,16 +269,23 @@ impl Model {
                 if self.runs.len() > 1 {
                     own.noise = trial.noise.get(run).copied().into_iter().collect();
                 }
-                if !matches!(kept.get(run), Some(Some((point, _))) if *point == own) {
-                    let part = self.part(run, &trial, held, Wanted::Objective, task)?;
-                    let is_gain = matches!(self.gain_at(&trial, held), Gain::Searched(_));
-                    let part = by.part(&slots, &trial, is_gain, &part);
-                    if let Some(place) = kept.get_mut(run) {
-                        *place = Some((own, part));
-                    }
-                }
-                if let Some(Some((_, part))) = kept.get(run) {
+                if let Some(Some((_, part))) = kept
+                    .get(run)
+                    .filter(|known| matches!(known, Some((point, _)) if *point == own))
+                {
                     sum.add(part);
+                    continue;
+                }
+                let part = self.part(run, &trial, held, wanted, task)?;
+                if wanted == Wanted::Value {
+                    sum.value += part.objective;
+                    continue;
+                }
+                let is_gain = matches!(self.gain_at(&trial, held), Gain::Searched(_));
+                let part = by.part(&slots, &trial, is_gain, &part);
+                sum.add(&part);
+                if let Some(place) = kept.get_mut(run) {
+                    *place = Some((own, part));
                 }
             }
             Ok(sum)

@@ -129,8 +129,11 @@ pub(super) struct Searched {
 /// What is asked of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wanted {
-    /// The objective alone.
-    Objective,
+    /// The objective alone, which is finite also where the numbers that are searched cannot be told
+    /// apart.
+    Value,
+    /// With its slope and curvature.
+    Slopes,
     /// All of it.
     All,
 }
@@ -151,6 +154,9 @@ pub(super) fn evaluate(
         used <= count,
         "{used} rows for {count} unknowns: the likelihood needs more rows than unknowns"
     );
+    let none = Derivatives::none();
+    let by = if wanted == Wanted::Value { &none } else { by };
+    let (_, count) = sizes(rows, values, by);
     let space = plant.space(&values.lags, values.zero);
     let mut mean = Mean::new(rows, plant, &space, values, by, task)?;
     let (linear, all) = (mean.linear, count + 1);
@@ -237,7 +243,7 @@ pub(super) fn evaluate(
         residuals: Vec::new(),
         rate: Vec::new(),
     };
-    if wanted == Wanted::Objective {
+    if wanted != Wanted::All {
         return Ok(found);
     }
     found.linear = solved;
@@ -589,7 +595,7 @@ mod tests {
             &values,
             &QUIET,
             &by,
-            Wanted::Objective,
+            Wanted::Slopes,
             &Task::new(),
         );
         assert!(found.is_err_and(|error| error.to_string().starts_with("5 rows for 5 unknowns")));

@@ -45,6 +45,15 @@ pub(super) struct Derivatives {
 }
 
 impl Derivatives {
+    /// By nothing.
+    pub(super) fn none() -> Self {
+        Self {
+            delay: false,
+            lags: Vec::new(),
+            zero: false,
+        }
+    }
+
     /// Is there a derivative by this lag? A lag of zero has no state, so none.
     fn by_lag(&self, values: &Values, lag: usize) -> bool {
         self.lags.get(lag) == Some(&true) && values.lags.get(lag).is_some_and(|lag| *lag != 0.0)

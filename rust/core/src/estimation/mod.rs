@@ -35,6 +35,7 @@ pub use fit::{Fit, Model, Search};
 pub use likelihood::{Evaluation, Noise};
 pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};
+pub use profile::Limits;
 pub use rows::{Commands, Rows};
 pub use variables::Free;
 pub use whiten::whiten;

@@ -30,6 +30,12 @@ impl Triangle {
         count: usize,
         task: &Task,
     ) -> Result<Self, Error> {
+        // The same operations in the same order, in wider registers where the machine has them.
+        pulp::Arch::new().dispatch(|| Self::made(columns, length, count, task))
+    }
+
+    #[inline(always)]
+    fn made(columns: &[f64], length: usize, count: usize, task: &Task) -> Result<Self, Error> {
         const WHAT: &str = "the triangular factor";
         let block = BLOCK.max(BLOCK_SHARE * count).min(length);
         let stride = count + block;

@@ -112,6 +112,7 @@ fn product<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
 /// Sums that a dot product is split into, so that they are computed side by side.
 const SUMS: usize = 8;
 
+#[inline(always)]
 pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; SUMS];
     let (left, right) = (x.chunks_exact(SUMS), y.chunks_exact(SUMS));

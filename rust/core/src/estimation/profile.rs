@@ -9,13 +9,13 @@ use crate::{Error, Task};
 const FARTHEST: f64 = 64.0;
 
 /// Accuracy of an end, as a share of the half width.
-const TOLERANCE: f64 = 2e-3;
+const TOLERANCE: f64 = 4e-3;
 
 /// Widest first step to the end of an interval of a time, as a share of delay and lag together.
 const WIDEST: f64 = 0.25;
 
 /// Accuracy of −2 ln L where a quantity is held.
-const RISE_TOLERANCE: f64 = 1e-3;
+const RISE_TOLERANCE: f64 = 2e-3;
 
 /// A lag of at most so many times the shortest is none; a second search starts at this one, in rows.
 const AT_LEAST: f64 = 2.0;
@@ -23,6 +23,25 @@ const SECOND_LAG: f64 = 1.5;
 
 /// Most refinements of an end.
 const REFINEMENTS: usize = 12;
+
+/// How far the search for an end goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// The least end.
+    pub floor: f64,
+    /// How far below that of the best fit −2 ln L is where the search ends, because the best is none.
+    pub lower: f64,
+}
+
+impl Limits {
+    /// The least end alone.
+    pub fn floor(floor: f64) -> Self {
+        Self {
+            floor,
+            lower: f64::INFINITY,
+        }
+    }
+}
 
 impl Quantity {
     /// A point with the quantity at this value and the others near where they were.
@@ -80,6 +99,18 @@ impl Model {
         value: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
+        self.held_near(near, quantity, value, &mut None, task)
+    }
+
+    /// The same from the inverse Hessian of a search near by, as in `fit_near`.
+    fn held_near(
+        &self,
+        near: &Fit,
+        quantity: Quantity,
+        value: f64,
+        inverse: &mut Option<Vec<f64>>,
+        task: &Task,
+    ) -> Result<Fit, Error> {
         let lags = near.point.lags.len();
         if let Quantity::Lag(i) = quantity {
             refuse_if!(
@@ -88,9 +119,8 @@ impl Model {
             );
         }
         let start = quantity.held(&near.point, value, self);
-        let fit =
-            |start: &Point| self.fit(start, Some(quantity), Search::All, RISE_TOLERANCE, task);
-        let found = fit(&start)?;
+        let (held, all) = (Some(quantity), Search::All);
+        let found = self.fit_near(&start, held, all, RISE_TOLERANCE, inverse, task)?;
         // A search does not come back from a lag of zero.
         let least = AT_LEAST * SHORTEST_LAG * self.row_time;
         let vanished = |(i, lag): &(usize, &f64)| {
@@ -101,7 +131,7 @@ impl Model {
         };
         let mut start = found.point.clone();
         start.lags[i] = (SECOND_LAG * self.row_time).copysign(start.lags[i]);
-        let second = fit(&start)?;
+        let second = self.fit(&start, held, all, RISE_TOLERANCE, task)?;
         Ok(if second.objective < found.objective {
             second
         } else {
@@ -112,7 +142,7 @@ impl Model {
     /// The end of the interval of a quantity: where −2 ln L has risen by `rise`.
     ///
     /// `reach` is about its distance from the best value, with its sign. Returns the end and the
-    /// lowest fit seen on the way, which may be below the best.
+    /// lowest fit seen on the way, which may be below the best; `limits` may end the search there.
     ///
     /// # Errors
     ///
@@ -123,15 +153,19 @@ impl Model {
         quantity: Quantity,
         reach: f64,
         rise: f64,
-        floor: f64,
+        limits: Limits,
         task: &Task,
     ) -> Result<(f64, Fit), Error> {
+        let Limits { floor, lower } = limits;
         refuse_if!(
             reach == 0.0 || !reach.is_finite() || !(rise > 0.0 && rise.is_finite()),
             "an interval of half width {reach} to a rise of {rise}: give finite numbers, not zero, \
              and a rise above it"
         );
-        refuse_if!(floor.is_nan(), "the least end is {floor}: give a number");
+        refuse_if!(
+            floor.is_nan() || lower.is_nan(),
+            "the least end is {floor}, and the search ends {lower} below: give numbers"
+        );
         // Two lags that come out equal have standard errors without bound: the search for an end
         // begins nearer, and goes as far as any time that the recordings may tell.
         let widest = (WIDEST * best.point.total()).max(self.row_time);
@@ -146,17 +180,21 @@ impl Model {
         let centre = quantity.value(&best.point);
         let mut lowest = best.clone();
         let mut near = best.clone();
+        let mut inverse = None;
         let (mut inner, mut inner_rise) = (centre, 0.0);
         let mut outer = centre + reach;
         let mut bracket = None;
         let mut width = reach;
         while width.abs() <= farthest {
             outer = (centre + width).max(floor);
-            let next = self.held(&near, quantity, outer, task)?;
+            let next = self.held_near(&near, quantity, outer, &mut inverse, task)?;
             if next.objective < lowest.objective {
                 lowest = next.clone();
             }
             let found = next.objective - best.objective;
+            if found < -lower {
+                return Ok((outer, lowest));
+            }
             if found >= rise {
                 bracket = Some(found);
                 break;
@@ -188,13 +226,16 @@ impl Model {
                 0.5
             };
             let middle = inner + (outer - inner) * share;
-            let next = self.held(&near, quantity, middle, task)?;
+            let next = self.held_near(&near, quantity, middle, &mut inverse, task)?;
             if next.objective < lowest.objective {
                 lowest = next.clone();
             }
+            if next.objective - best.objective < -lower {
+                return Ok((middle, lowest));
+            }
             outer_rise = (next.objective - best.objective).max(0.0);
             let found = outer_rise.sqrt() - goal;
-            if found.abs() < 2e-3 * goal {
+            if found.abs() < TOLERANCE * goal {
                 return Ok((middle, lowest));
             }
             if found > 0.0 {
@@ -273,7 +314,7 @@ mod tests {
                         quantity,
                         sign * reach,
                         rise,
-                        f64::NEG_INFINITY,
+                        Limits::floor(f64::NEG_INFINITY),
                         &Task::new(),
                     )
                     .unwrap();
@@ -302,7 +343,7 @@ mod tests {
                     Quantity::Total,
                     sign * reach,
                     3.84,
-                    f64::NEG_INFINITY,
+                    Limits::floor(f64::NEG_INFINITY),
                     &Task::new(),
                 );
                 end.unwrap().0
@@ -316,8 +357,35 @@ mod tests {
         let (model, best) = fitted(&[0.17]);
         let floor = 6.5e-5;
         // No rise is as large, so that the search goes on to the floor.
-        let found = model.end(&best, Quantity::Lag(0), -0.05, 1e6, floor, &Task::new());
+        let found = model.end(
+            &best,
+            Quantity::Lag(0),
+            -0.05,
+            1e6,
+            Limits::floor(floor),
+            &Task::new(),
+        );
         assert_eq!(found.unwrap().0, floor);
+    }
+
+    #[test]
+    fn a_search_ends_at_a_lower_fit_if_asked_to() {
+        let (model, mut best) = fitted(&[0.17]);
+        // A fit that is not the best of its neighbours.
+        best.point.lags = vec![0.1];
+        best.objective = model.objective(&best.point, &Task::new()).unwrap();
+        let end = |lower| {
+            let limits = Limits { floor: 0.0, lower };
+            model
+                .end(&best, Quantity::Total, 4e-3, 3.84, limits, &Task::new())
+                .unwrap()
+        };
+        let (first, lowest) = end(0.02);
+        assert!((first - Quantity::Total.value(&best.point) - 4e-3).abs() < 1e-12);
+        assert!(lowest.objective < best.objective - 0.02);
+        let (whole, other) = end(f64::INFINITY);
+        assert!(whole > first);
+        assert!(other.objective <= lowest.objective);
     }
 
     #[test]
@@ -326,7 +394,7 @@ mod tests {
         let task = Task::new();
         let end = |quantity, reach, rise, floor| {
             model
-                .end(&best, quantity, reach, rise, floor, &task)
+                .end(&best, quantity, reach, rise, Limits::floor(floor), &task)
                 .unwrap_err()
                 .to_string()
         };

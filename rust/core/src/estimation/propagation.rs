@@ -60,6 +60,7 @@ impl<const N: usize> Propagation<N> {
     }
 
     /// Φ P Φᵀ + Q.
+    #[inline(always)]
     pub(super) fn predicted(&self, p: &Square<N>) -> Square<N> {
         let mut next = self.moved(p);
         add(&mut next, &self.q);
@@ -67,6 +68,7 @@ impl<const N: usize> Propagation<N> {
     }
 
     /// Φ P Φᵀ for a symmetric P.
+    #[inline(always)]
     fn moved(&self, p: &Square<N>) -> Square<N> {
         let left = product(&self.phi, p);
         std::array::from_fn(|i| {
@@ -76,6 +78,7 @@ impl<const N: usize> Propagation<N> {
 }
 
 /// Add a matrix; has any entry changed?
+#[inline(always)]
 pub(super) fn add<const N: usize>(to: &mut Square<N>, what: &Square<N>) -> bool {
     let mut changed = false;
     for (to, what) in to.iter_mut().flatten().zip(what.iter().flatten()) {
@@ -90,6 +93,7 @@ pub(super) fn scaled<const N: usize>(a: &Square<N>, factor: f64) -> Square<N> {
     a.map(|row| row.map(|entry| entry * factor))
 }
 
+#[inline(always)]
 pub(super) fn product<const N: usize>(a: &Square<N>, b: &Square<N>) -> Square<N> {
     let mut out = [[0.0; N]; N];
     for (out, row) in out.iter_mut().zip(a) {

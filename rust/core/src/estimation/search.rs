@@ -10,6 +10,7 @@
 
 use std::ops::Range;
 
+use super::likelihood::Wanted;
 use crate::Error;
 
 /// Most iterations, and those over the first variables alone.
@@ -52,7 +53,8 @@ pub(super) struct Variable {
     pub(super) longest: f64,
 }
 
-/// The function, and the known part of its slope and curvature by the first variables.
+/// The function, and the known part of its slope and curvature by the first variables, which need not
+/// be there where the value alone is wanted.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Value {
     pub(super) value: f64,
@@ -89,16 +91,20 @@ pub(super) struct Minimum {
 }
 
 /// Search from the starting point until a step promises less than `tolerance`.
+///
+/// `known_inverse` is the inverse of the Hessian at the end of a search near by, if there was one, and then
+/// that of this one: neighbours need fewer steps with it.
 pub(super) fn minimise(
     variables: &[Variable],
     tolerance: f64,
-    mut function: impl FnMut(&[f64]) -> Result<Value, Error>,
+    known_inverse: &mut Option<Vec<f64>>,
+    mut function: impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
 ) -> Result<Minimum, Error> {
     let mut x: Vec<f64> = variables
         .iter()
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
-    let mut found = function(&x)?;
+    let mut found = function(&x, Wanted::Slopes)?;
     let (n, known) = (x.len(), found.slope.len());
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverted(&found.curvature, known) else {
@@ -131,6 +137,9 @@ pub(super) fn minimise(
     let mut lacking = difference(&gradient, &found.slope);
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
+    if let Some(near) = known_inverse.take_if(|near| near.len() == n * n) {
+        (inverse, fresh) = (near, false);
+    }
     let mut stalled = 0;
     for _ in 0..ITERATIONS {
         let step = direction(variables, &x, &inverse, &gradient);
@@ -177,6 +186,7 @@ pub(super) fn minimise(
             (exact, fresh) = (true, true);
         }
     }
+    *known_inverse = Some(inverse);
     Ok(Minimum {
         place: x,
         value: found.value,
@@ -190,7 +200,7 @@ fn line_search(
     value: f64,
     gradient: &[f64],
     step: &[f64],
-    function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
+    function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
 ) -> Result<Option<(Value, Vec<f64>)>, Error> {
     let mut share = 1.0;
     let mut trial = x.to_vec();
@@ -200,7 +210,7 @@ fn line_search(
             *trial = (x + share * step).clamp(variable.low, variable.high);
         }
         let moved = difference(&trial, x);
-        let found = function(&trial)?;
+        let found = function(&trial, Wanted::Slopes)?;
         if found.value < value + SUFFICIENT * product(gradient, &moved) && found.value < value {
             x.copy_from_slice(&trial);
             return Ok(Some((found, moved)));
@@ -223,7 +233,7 @@ impl Quotients {
         x: &[f64],
         found: &Value,
         which: Range<usize>,
-        function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
+        function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
     ) -> Result<Self, Error> {
         let value = found.value;
         let (mut slope, mut curvature) = (Vec::new(), Vec::new());
@@ -237,7 +247,7 @@ impl Quotients {
             );
             let mut away = |step: f64| -> Result<f64, Error> {
                 at[i] = x[i] + step;
-                let found = function(&at)?.value;
+                let found = function(&at, Wanted::Value)?.value;
                 at[i] = x[i];
                 Ok(found)
             };
@@ -287,7 +297,7 @@ fn by_quotients(
     steps: &mut [f64],
     x: &[f64],
     found: &Value,
-    function: &mut impl FnMut(&[f64]) -> Result<Value, Error>,
+    function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     let (n, known) = (x.len(), found.slope.len());
     let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
@@ -425,18 +435,50 @@ mod tests {
     #[test]
     fn a_curved_valley_is_followed_to_its_minimum() {
         let rosenbrock =
-            |x: &[f64]| unknown((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
+            |x: &[f64], _| unknown((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
         let around = [variable(-0.5, -9.0, 9.0), variable(0.5, -9.0, 9.0)];
-        let found = minimise(&around, 1e-12, rosenbrock);
+        let found = minimise(&around, 1e-12, &mut None, rosenbrock);
         assert!(found.is_ok_and(|found| (found.place[0] - 1.0).abs() < 1e-3 && found.value < 1e-6));
     }
 
     #[test]
+    fn the_inverse_of_a_search_near_by_saves_evaluations_and_changes_no_minimum() {
+        // Two variables that almost have the same effect.
+        let evaluations = std::cell::Cell::new(0);
+        let valley = |place: f64, from: f64, near: &mut Option<Vec<f64>>| {
+            evaluations.set(0);
+            let around = [variable(from, -9.0, 9.0), variable(from + 0.4, -9.0, 9.0)];
+            let around = around.map(|one| Variable {
+                longest: 1.0,
+                ..one
+            });
+            minimise(&around, 1e-9, near, |x, _| {
+                evaluations.set(evaluations.get() + 1);
+                let (a, b) = (x[0] + x[1] - place, x[0] - x[1] + 0.3);
+                unknown(50.0 * a * a + 0.5 * b * b + 0.01 * a.powi(4))
+            })
+            .unwrap()
+        };
+        let mut near = None;
+        let first = valley(1.0, 0.0, &mut near);
+        let after_first = valley(1.2, first.place[0], &mut near);
+        let with_it = evaluations.get();
+        let alone = valley(1.2, first.place[0], &mut None);
+        assert!(
+            with_it < evaluations.get(),
+            "{with_it} of {}",
+            evaluations.get()
+        );
+        assert!((after_first.value - alone.value).abs() < 1e-8);
+    }
+
+    #[test]
     fn a_minimum_beyond_a_bound_is_found_on_it() {
-        let bowl = |x: &[f64]| unknown((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
+        let bowl = |x: &[f64], _| unknown((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
         let found = minimise(
             &[variable(1.0, 0.0, 9.0), variable(1.5, -9.0, 9.0)],
             1e-12,
+            &mut None,
             bowl,
         );
         assert!(
@@ -448,7 +490,7 @@ mod tests {
     fn a_known_slope_saves_evaluations_and_what_it_lacks_is_found() {
         // The sum of squares of a line and a curve, and a part whose slope is not known.
         let mut evaluations = 0;
-        let function = |x: &[f64]| {
+        let function = |x: &[f64], _| {
             evaluations += 1;
             let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
             let by = [[1.0, -2.0 * x[0]], [2.0, 10.0]];
@@ -465,8 +507,8 @@ mod tests {
             longest: 10.0,
             ..variable(start, -9.0, 9.0)
         };
-        let found = minimise(&[free(0.0), free(2.0)], 1e-10, function);
-        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, |x| {
+        let found = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, function);
+        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x, _| {
             let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
             unknown(line * line + curve * curve + 0.1 * x[0])
         });

@@ -86,17 +86,19 @@ pub(super) fn whiten_in_place(
     task: &Task,
 ) -> Result<f64, Error> {
     let mut log_det = 0.0;
+    // The same operations in the same order, in wider registers where the machine has them.
+    let machine = pulp::Arch::new();
     for group in columns.chunks_mut(LANES * time.len()) {
         log_det = match joint.c.len() {
-            0 => pass::<0>(time, known, group, joint, kicks, task)?,
-            1 => pass::<1>(time, known, group, joint, kicks, task)?,
-            2 => pass::<2>(time, known, group, joint, kicks, task)?,
-            3 => pass::<3>(time, known, group, joint, kicks, task)?,
-            4 => pass::<4>(time, known, group, joint, kicks, task)?,
-            5 => pass::<5>(time, known, group, joint, kicks, task)?,
-            6 => pass::<6>(time, known, group, joint, kicks, task)?,
-            7 => pass::<7>(time, known, group, joint, kicks, task)?,
-            8 => pass::<8>(time, known, group, joint, kicks, task)?,
+            0 => machine.dispatch(|| pass::<0>(time, known, group, joint, kicks, task))?,
+            1 => machine.dispatch(|| pass::<1>(time, known, group, joint, kicks, task))?,
+            2 => machine.dispatch(|| pass::<2>(time, known, group, joint, kicks, task))?,
+            3 => machine.dispatch(|| pass::<3>(time, known, group, joint, kicks, task))?,
+            4 => machine.dispatch(|| pass::<4>(time, known, group, joint, kicks, task))?,
+            5 => machine.dispatch(|| pass::<5>(time, known, group, joint, kicks, task))?,
+            6 => machine.dispatch(|| pass::<6>(time, known, group, joint, kicks, task))?,
+            7 => machine.dispatch(|| pass::<7>(time, known, group, joint, kicks, task))?,
+            8 => machine.dispatch(|| pass::<8>(time, known, group, joint, kicks, task))?,
             n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
         };
     }
@@ -118,6 +120,7 @@ fn has_converged<const N: usize>(p: &Square<N>, before: &Square<N>) -> bool {
 }
 
 /// One pass over up to `LANES` columns with N states.
+#[inline(always)]
 fn pass<const N: usize>(
     time: &[f64],
     known: Known<'_>,
