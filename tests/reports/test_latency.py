@@ -85,6 +85,9 @@ def test_summary_dict_and_page(found, tmp_path):
     told = found.to_dict()
     assert told["loops"][0]["loop"] == "roll rate"
     assert told["filters"][0]["source"] == "INS_GYRO_FILTER 20"
+    own = found.loops[0]
+    intervals = told["loops"][0]["estimate"]["interval_95"]
+    assert intervals == {"delay+lag": list(own.sum_of()[2])}
     page = found.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 1 + len(found.estimated)
     assert "src=" not in page

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -268,8 +268,14 @@ class DelayEstimate(ReadOnlyArrays):
             (error for other, error in self.stderr.items() if unit_of(other) == "s"), default=0.0
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """All results but the arrays, as plain values for JSON."""
+    def to_dict(self, intervals: Iterable[str] | None = None) -> dict[str, Any]:
+        """All results but the arrays, as plain values for JSON.
+
+        Parameters
+        ----------
+        intervals : iterable of str, optional
+            Of which quantities there are intervals, of all by default: some take long.
+        """
         found: dict[str, Any] = {
             "method": self.method,
             "delay": self.delay,
@@ -281,7 +287,7 @@ class DelayEstimate(ReadOnlyArrays):
                 name: value if math.isfinite(value) else None for name, value in self.stderr.items()
             },
             "interval_95": (
-                {name: list(self.ci(0.95, name)) for name in self.stderr}
+                {name: list(self.ci(0.95, name)) for name in intervals or self.stderr}
                 if self.calibrated
                 else None
             ),

@@ -103,7 +103,12 @@ class LoopLatency(ReadOnlyArrays):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The time as plain values for JSON."""
+        """The time as plain values for JSON.
+
+        Of the numbers of the estimate, only delay and lag together have an interval besides their
+        standard errors: `estimate` has the others, and some take long.
+        """
+        fit = self.estimate
         found: dict[str, Any] = plain(
             {
                 "loop": self.loop,
@@ -113,7 +118,7 @@ class LoopLatency(ReadOnlyArrays):
                 "windows": self.windows,
                 "promise": self.promise,
                 "refusal": self.refusal,
-                "estimate": None if self.estimate is None else self.estimate.to_dict(),
+                "estimate": None if fit is None else fit.to_dict(intervals=("delay+lag",)),
                 "cost": None if self.cost is None else self.cost.to_dict(),
             }
         )
