@@ -50,6 +50,18 @@ def test_axes_share_a_delay(found, tmp_path):
         found.shared("rate")
 
 
+def test_a_closed_loop_of_second_order_has_a_pair_of_complex_poles(tmp_path):
+    # Kp GAIN/(LAG s² + s + Kp GAIN), sampled: damping 0.59. The rate follows a ramp late by
+    # 1/(Kp GAIN), and a setpoint that is held by half a period less.
+    log = log_of(tmp_path, delay=0.0, Kp=3.0, seed=5)
+    one = dtm.latency(log).loop("roll rate", "setpoint")
+    assert one.estimate.adequate
+    assert one.estimate.loop.plant.has_pair
+    low, high = one.sum_of()[2]
+    assert low < 1.0 / (3.0 * GAIN) - 0.5 / 200.0 < high
+    assert high - low < 0.01
+
+
 def test_the_cost_in_gain_holds_that_of_the_true_vehicle(found):
     cost = found.loop("roll rate", "actuator").cost
     true = dtm.ControlLoop(dtm.Integrator(GAIN, LAG), dtm.P(0.9), delay=DELAY)

@@ -125,8 +125,8 @@ class Tlog:
 DELAY, LAG, GAIN = 0.012, 0.030, 8.0
 
 
-def flown_copter(seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=True):
-    """A DataFlash log in which the roll rate follows doublets under a P controller of gain 0.9.
+def flown_copter(seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=True, Kp=0.9):
+    """A DataFlash log in which the roll rate follows doublets under a P controller.
 
     The vehicle is gain/(s (lag s + 1)) behind a delay, exact where that is a multiple of 0.5 ms.
     """
@@ -154,7 +154,7 @@ def flown_copter(seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=
         if k % every == 0:
             asked = 40.0 * np.sign(np.sin(2.0 * np.pi * at / 1.1)) * (steps and at > 1.0)
             seen = np.degrees(velocity) + np.degrees(noise) * random.standard_normal()
-            sent = 0.9 * np.radians(asked - seen)
+            sent = Kp * np.radians(asked - seen)
             log.add("RATE", 10_000 + round(at * 1e6), asked, seen, sent)
         told[k] = sent
         arrived = told[k - late] if k >= late else 0.0

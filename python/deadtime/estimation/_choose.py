@@ -271,19 +271,30 @@ def choose_plant(
             plant = replace(plant, lags=(*plant.lags, further), zero=0.0)
         if found := tried(_lags(count), plant):
             plant = found  # where the search of the next plants begins
-        first, second = (*sorted(plant.lags, reverse=True), 0.0, 0.0)[:2]
-        if second > ALIKE * first > 0.0:
-            rest = sorted(plant.lags, reverse=True)[2:]
-            frequency = 2.0 * DAMPING / (first + second)
-            paired = replace(
-                plant, lags=rest, pole_frequency=frequency, pole_damping=DAMPING, zero=0.0
-            )
-            tried(f"a pair, {_lags(len(rest))}" if rest else "a pair", paired)
+        if (paired := with_pair(plant)) is not None:
+            rest = len(paired.lags)
+            tried(f"a pair, {_lags(rest)}" if rest else "a pair", paired)
     if not estimates:
         raise NotIdentifiableError(next(iter(refusals.values())))
     criteria = {name: bic(fit) for name, fit in estimates.items()}
-    chosen = min(_adequate(estimates), key=lambda name: criteria[name])
-    return PlantChoice(estimates, criteria, refusals, chosen)
+    return PlantChoice(estimates, criteria, refusals, likeliest(estimates))
+
+
+def with_pair(plant: FactoredPlant) -> FactoredPlant | None:
+    """The plant with complex poles for its two longest lags; None where those are not alike."""
+    ordered = sorted(plant.lags, reverse=True)
+    first, second = (*ordered, 0.0, 0.0)[:2]
+    if plant.has_pair or not second > ALIKE * first > 0.0:
+        return None
+    frequency = 2.0 * DAMPING / (first + second)
+    return replace(
+        plant, lags=ordered[2:], pole_frequency=frequency, pole_damping=DAMPING, zero=0.0
+    )
+
+
+def likeliest(estimates: Mapping[str, DelayEstimate]) -> str:
+    """Name of the likeliest plant among the adequate ones, or among all where none is."""
+    return min(_adequate(estimates), key=lambda name: bic(estimates[name]))
 
 
 def _lags(count: int) -> str:

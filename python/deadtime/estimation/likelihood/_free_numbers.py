@@ -37,6 +37,9 @@ Fits: TypeAlias = Callable[..., NoiseFit]
 #: step, its accuracy, and the most evaluations for each number.
 AWAY, STEP, ACCURACY, MOST = 0.25, 0.05, 1e-3, 40
 
+#: Accuracy of -2 ln L in that search, and at its end.
+CLOSE, EXACT = 1e-3, 1e-6
+
 #: Most numbers that are searched so: the points around the start are three to the power of them.
 MOST_NUMBERS = 4
 
@@ -204,14 +207,15 @@ def _values(first: Mapping[str, float], logs: Array) -> dict[str, float]:
 def _fits(fit: NoiseFit, given: Given, first: Mapping[str, float], white: bool = False) -> Fits:
     """The function that fits plant and noise, or the plant alone, with numbers given."""
 
-    def at(logs: Array, near: NoiseFit = fit) -> NoiseFit:
+    def at(logs: Array, near: NoiseFit = fit, tolerance: float = EXACT) -> NoiseFit:
         model, rows = given(_values(first, logs))
         likelihood = model.likelihood(rows, near.trim)
         starts = [near.numbers]
         if not white and any(noise.air == 0.0 for noise in near.numbers.noise):
             # Without air there is none after a search either.
             starts.append(with_noise(near.numbers, airs_of(model, rows)[1]))
-        found = min((likelihood.fit(one) for one in starts), key=lambda one: one.objective)
+        fits = (likelihood.fit(one, tolerance) for one in starts)
+        found = min(fits, key=lambda one: one.objective)
         return NoiseFit(model, tuple(rows), near.trim, found)
 
     return at
@@ -222,9 +226,14 @@ def _likeliest(at: Fits, first: Mapping[str, float]) -> Array:
     from scipy.optimize import minimize
 
     middle = np.log(np.abs(list(first.values())))
+    tried: list[NoiseFit] = []
 
     def objective(logs: Array) -> float:
-        return at(logs).numbers.objective
+        # The best so far is near.
+        found = at(logs, *tried[-1:], tolerance=CLOSE)
+        if not tried or found.numbers.objective < tried[-1].numbers.objective:
+            tried.append(found)
+        return found.numbers.objective
 
     around = [middle + np.array(moves) for moves in product((-AWAY, 0.0, AWAY), repeat=len(first))]
     middle = min(around, key=objective)

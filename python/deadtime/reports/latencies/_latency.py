@@ -227,7 +227,9 @@ def latency(
     -----
     Of each loop the windows are ranked by the Cramér-Rao bound of delay and lag together that they
     promise. The best is fitted by gain, delay and one lag, or two lags where one is not adequate;
-    where that is, together with up to two others. From the setpoint the plant follows its command;
+    where that is, together with up to two others. From the setpoint, two lags that come out alike
+    give way to a pair of complex poles if that is adequate, as of a rate loop that is closed by a
+    proportional controller. From the setpoint the plant follows its command;
     from what the controller commands it integrates.
 
     Examples

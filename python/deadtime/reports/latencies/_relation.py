@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain
 from deadtime.estimation import DelayEstimate, OutputError, estimate_delay
-from deadtime.estimation._choose import bic
+from deadtime.estimation._choose import bic, likeliest, with_pair
 from deadtime.loops import ControlLoop, FactoredPlant, P
 from deadtime.recordings import Recording
 from deadtime.reports.latencies._controller import Between
@@ -56,7 +56,8 @@ class LoopLatency(ReadOnlyArrays):
     promise : float
         Standard error of delay and lag together that the first window promises, s.
     estimate : DelayEstimate or None
-        Gain, delay and one or two lags, over all windows together; None where it was refused.
+        Gain, delay and one or two lags, or a pair of complex poles, over all windows together; None
+        where it was refused.
     refusal : str
         Why there is no estimate; empty where there is one.
     cost : GainCost or None
@@ -209,26 +210,36 @@ def _fitted(
     """The plant that fits all windows, or the first of them where they contradict one another."""
     first = max(0.5 * windows[0].time, windows[0].recording.sample_time)
 
-    def tried(parts: list[Recording], lags: tuple[float, ...]) -> DelayEstimate:
-        plant = FactoredPlant(lags, integrator=integrates)
+    def lagging(*lags: float) -> FactoredPlant:
+        return FactoredPlant(lags, integrator=integrates)
+
+    def tried(parts: list[Recording], plant: FactoredPlant) -> DelayEstimate:
         names = ["delay", *(name for name in plant.parameters if name != "zero")]
         loop = ControlLoop(plant, P(1.0))
         return estimate_delay(parts, loop, method=METHOD, free=names)
 
     def richer(parts: list[Recording], fit: DelayEstimate) -> DelayEstimate:
-        """The fit, or that with two lags where one is not enough."""
+        """The fit, or that with two lags, or a pair of poles, where one lag is not enough."""
         if fit.adequate or LACKING not in fit.message:
             return fit
+        found = {"1 lag": fit}
         try:
-            more = tried(parts, (first, SECOND * first))
+            found["2 lags"] = more = tried(parts, lagging(first, SECOND * first))
+            # A loop that is closed around a lag is of second order, and mostly oscillates.
+            if not (integrates or more.adequate) and LACKING in more.message:
+                pair = with_pair(cast(FactoredPlant, more.loop.plant))
+                complex_poles = None if pair is None else tried(parts, pair)
+                # Noise takes the place of what a pair lacks, which least squares tells better.
+                if complex_poles is not None and complex_poles.adequate:
+                    return complex_poles
         except NotIdentifiableError:
-            return fit
-        return more if more.adequate or bic(more) < bic(fit) else fit
+            pass
+        return found[likeliest(found)]
 
     parts = [one.recording for one in windows]
-    fit, doubt = tried(parts[:1], (first,)), ""
+    fit, doubt = tried(parts[:1], lagging(first)), ""
     if held is not None:
-        still = tried([held(windows[0])], (first,))
+        still = tried([held(windows[0])], lagging(first))
         better = bic(fit) - bic(still)
         if abs(better) < CLEARLY:
             doubt = _either(fit, still)
@@ -241,8 +252,7 @@ def _fitted(
     if len(parts) == 1 or not fit.adequate:
         return fit
     try:
-        lags = tuple(v for n, v in fit.loop.parameters.items() if n.startswith("lag"))
-        together = tried(parts, lags)
+        together = tried(parts, cast(FactoredPlant, fit.loop.plant))
     except NotIdentifiableError:
         return fit
     reasons = together.message.partition(" (try ")[0].split("; ")

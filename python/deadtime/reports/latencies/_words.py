@@ -6,6 +6,7 @@ import math
 
 from deadtime._base.digits import stated
 from deadtime.estimation import DelayEstimate
+from deadtime.estimation.fit._profile import unit_of
 from deadtime.reports.latencies._relation import LoopLatency
 
 
@@ -20,8 +21,7 @@ def numbers_of(fit: DelayEstimate) -> list[str]:
             low, high = fit.ci(0.95, name)
             error = (high - low) / 3.92
         shown = "lag" if single and name == "lag_1" else name.replace("_", " ")
-        unit = "" if name == "gain" else "s"
-        found.append(f"{shown} {stated(value, error, unit)}")
+        found.append(f"{shown} {stated(value, error, unit_of(name))}")
     return found
 
 
