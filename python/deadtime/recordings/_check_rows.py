@@ -105,6 +105,11 @@ def read_rows(columns: Columns) -> Rows:
     return Rows(row_time, mean_time, jitter, stamps, adjacent, holes, repeated, share)
 
 
+def repeated_rows(columns: Columns) -> NDArray[np.intp]:
+    """Rows that repeat the one before while the output moves."""
+    return _repeated(columns)[0]
+
+
 def _repeated(columns: Columns) -> tuple[NDArray[np.intp], float]:
     """Rows that repeat the one before while the output moves, and their share of moving rows."""
     none = np.empty(0, dtype=np.intp)

@@ -30,6 +30,11 @@ NEAR_WHOLE = 0.25
 #: Missing samples in a row from which their mean command is unknown.
 HOLE = 3
 
+#: Commands with times of their own: fewest that show how they were logged, the share of steps that
+#: are alike where that was regular, the share of changes where each was logged, and the share of
+#: the rows at the end in which lost ones may have no effect yet.
+FEWEST, REGULAR, MOVES, END = 16, 0.8, 0.5, 0.2
+
 #: Error of the output that is predicted in such a hole, in deviations of the white noise.
 SHARED = 2.0
 
@@ -76,6 +81,32 @@ class HeldCommands(NamedTuple):
 
 #: The output of the plant at some times, for a better guess than a straight line between rows.
 Predicted: TypeAlias = Callable[[Array], Array]
+
+
+def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
+    """Commands with times of their own, without holding one where the next ones were lost.
+
+    Commands that were logged regularly, each time they were computed, leave a gap where some were
+    lost. After a usual step the mean of those around it is taken; where many were lost, it is an
+    unknown. Near the end of the rows it has no effect yet.
+    """
+    plain = HeldCommands(time, command)
+    steps = np.diff(time)
+    if steps.size < FEWEST:
+        return plain
+    usual = float(np.median(steps))
+    regular = np.mean(np.abs(steps - usual) < NEAR_WHOLE * usual) > REGULAR
+    if not regular or np.mean(np.diff(command) != 0.0) <= MOVES:
+        return plain
+    gaps = np.flatnonzero(steps > 1.5 * usual)
+    every = np.concatenate([time, time[gaps] + usual])
+    values = np.concatenate([command, 0.5 * (command[gaps] + command[gaps + 1])])
+    order = np.argsort(every, kind="stable")
+    last = rows[-1] - END * (rows[-1] - rows[0])
+    many = gaps[(steps[gaps] > HOLE * usual) & (time[gaps] >= rows[0]) & (time[gaps + 1] <= last)]
+    many = many[np.argsort(-steps[many], kind="stable")][: int(MOST_UNKNOWN * rows.size)]
+    unknown = [(float(time[k] + usual), float(time[k + 1])) for k in np.sort(many)]
+    return HeldCommands(every[order], values[order], tuple(unknown))
 
 
 def with_missing(

@@ -21,6 +21,10 @@ MAD, LEAST_ROBUST = 0.6745, 0.1
 #: share of the rows is equal to the row before.
 ROUNDING, ROUNDED = 1e-6, 0.2
 
+#: Share of the rows at which a rounded output turns back from which its noise is about half a step.
+#: Rounding errors are then as good as white, and every row tells (Widrow 1961).
+DITHERED = 0.18
+
 #: Rows whose times do not scatter.
 NO_SPEED = np.empty(0)
 
@@ -86,7 +90,14 @@ def is_outlier(whitened: Array, residuals: Array, rows: FlightRows) -> NDArray[n
 
 
 def rounding_of(output: Array) -> float:
-    """The step to which an output was rounded, if its rows often stay on one step; else zero."""
+    """The step to which an output was rounded, if its rows often stay on one step; else zero.
+
+    None counts where noise moves the output to and fro over its steps.
+    """
+    changes = np.diff(output)
+    changes = changes[changes != 0.0]
+    if np.count_nonzero(changes[1:] * changes[:-1] < 0.0) > DITHERED * output.size:
+        return 0.0
     steps = np.diff(np.unique(output))
     step = float(np.min(steps, initial=np.inf))
     is_rounded = np.all(np.abs(steps - step * np.rint(steps / step)) < ROUNDING * step)
@@ -97,10 +108,11 @@ def on_same_step(output: Array) -> NDArray[np.bool_]:
     """Rows of a rounded output that tell nothing besides another row on the same step.
 
     Neighbours on one step of the sensor have the same rounding error. Of those the middle row
-    stays, where that error is least.
+    stays, where that error is least; of two in the middle the earlier and the later one in turn, so
+    that none makes the output early.
     """
     first = np.flatnonzero(np.r_[True, np.diff(output) != 0.0])
     ends = np.r_[first[1:], output.size]
     found = np.ones(output.size, dtype=bool)
-    found[(first + ends - 1) // 2] = False
+    found[(first + ends - 1 + np.arange(first.size) % 2) // 2] = False
     return found

@@ -26,10 +26,7 @@ from deadtime.estimation.fit._least_squares import (
     Ends,
     ModelOfOne,
 )
-from deadtime.estimation.likelihood._missing import (
-    HeldCommands,
-    with_missing,
-)
+from deadtime.estimation.likelihood._missing import HeldCommands, with_lost, with_missing
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of
 from deadtime.estimation.likelihood._search import (
     LONGEST,
@@ -201,7 +198,7 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
         )
     check_moves(data.output, command)
     if data.sent is not None and not computed:
-        commands = HeldCommands(data.sent.time, limited(data.sent.values, loop))
+        commands = with_lost(data.sent.time, limited(data.sent.values, loop), data.time)
     else:
         commands = with_missing(recording, loop, command)
     missing = data.sent is None and commands.time.size > command.size

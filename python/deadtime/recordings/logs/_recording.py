@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 
 from deadtime._base.errors import RecordingError
+from deadtime.recordings._check_rows import repeated_rows
+from deadtime.recordings._findings import Columns
 from deadtime.recordings._recording import Recording
 from deadtime.recordings.logs._contents import Array
 from deadtime.recordings.logs._series import Series
@@ -26,7 +28,10 @@ def recording_of(
     part: tuple[float | None, float | None],
     between: Literal["held", "lines"] | None = None,
 ) -> Recording:
-    """The response of a loop, and what it is told, over a part of the log."""
+    """The response of a loop, and what it is told, over a part of the log.
+
+    Rows in which the response is an old one, read once and logged again, are left out.
+    """
     if between not in (None, "held", "lines"):
         raise ValueError(f"between={between!r} is not one of 'held', 'lines', None")
     start, stop = part
@@ -42,6 +47,9 @@ def recording_of(
             f"{name} has no rows from {low:g} to {high:g} s that follow {told.source}"
         )
     time, output = time[rows], output[rows]
+    fresh = np.ones(time.size, dtype=bool)
+    fresh[repeated_rows(Columns(time, np.zeros_like(time), output, None))] = False
+    time, output = time[fresh], output[fresh]
     kept = sent >= time[0] - EARLIER * (time[-1] - time[0])
     kept |= sent >= sent[np.searchsorted(sent, time[0], side="right") - 1]
     units = {"output": response.unit, "reference": setpoint.unit, "command": told.unit}

@@ -9,7 +9,6 @@ from typing import Any
 from deadtime._base.digits import stated
 from deadtime._base.plain import plain
 from deadtime.recordings import Log
-from deadtime.reports.latencies._controller import period_of
 from deadtime.reports.latencies._filters import FilterDelay
 from deadtime.reports.latencies._relation import LoopLatency
 
@@ -59,7 +58,7 @@ def stages_of(
     """The stages of one loop that the log tells about.
 
     From setpoint to response the loop is closed, and this is no sum of what follows. From what the
-    controller commands to the response it is: filters and hold are computed, and the rest is that
+    controller commands to the response it is: filters are computed, and the rest is that
     of actuators and airframe.
     """
     own = {one.command: one for one in relations if one.loop == loop and one.estimate is not None}
@@ -75,11 +74,6 @@ def stages_of(
         return tuple(stages)
     known = [one for one in filters if one.path == "response"]
     stages += [Stage(one.name, one.delay, 0.0, one.source, part=True) for one in known]
-    period = period_of(log, "rate")
-    # Commands that are logged each time they are computed hold in the model too.
-    if period is not None and vehicle.between == "lines":
-        name = "half a period of the controller"
-        stages.append(Stage(name, 0.5 * period.time, 0.0, period.source, part=True))
     computed = math.fsum(stage.time for stage in stages if stage.part)
     if computed > 0.0:
         rest = whole.time - computed

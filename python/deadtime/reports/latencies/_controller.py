@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from deadtime.recordings import Log
+from deadtime.recordings import Log, LogLoop
 from deadtime.recordings.logs._names import Kind
 from deadtime.recordings.logs._recording import moves
 from deadtime.recordings.logs._series import Series
+from deadtime.recordings.logs._windows import outside, shared
+
+#: What is followed: the setpoint of the loop, or what its controller commands.
+Command: TypeAlias = Literal["setpoint", "actuator"]
 
 #: Whether commands hold from row to row of a log, or move in straight lines.
 Between: TypeAlias = Literal["held", "lines"]
@@ -17,22 +22,27 @@ Between: TypeAlias = Literal["held", "lines"]
 #: Rows further apart than this many periods do not hold each command.
 EACH = 1.5
 
+#: Longest part of a recording of each kind of loop, s, and the share of it in which a response
+#: settles after commands that are unknown.
+LENGTHS, SETTLES = {"rate": 4.0, "attitude": 8.0, "velocity": 12.0, "position": 20.0}, 0.05
+
 #: Least rate of PX4's loops of velocity and position, Hz: that of its estimates.
 PX4_OUTER = 50.0
 
 
 class Period(NamedTuple):
-    """The time between commands, s, and the parameter that tells it."""
+    """The time between commands, s, what tells it, and whether it may be shorter."""
 
     time: float
     source: str
+    at_most: bool = False
 
 
 def period_of(log: Log, kind: Kind) -> Period | None:
     """The period of the controller of a loop, if it is known."""
     told = log.parameters
     if log.autopilot == "PX4" and kind in ("velocity", "position"):
-        return Period(1.0 / PX4_OUTER, f"at least {PX4_OUTER:g} Hz")
+        return Period(1.0 / PX4_OUTER, f"at least {PX4_OUTER:g} Hz", True)
     for name in ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX"):
         if told.get(name, 0.0) > 0.0:
             return Period(1.0 / told[name], f"{name} {told[name]:g}")
@@ -41,6 +51,33 @@ def period_of(log: Log, kind: Kind) -> Period | None:
         time = told["looptime"] * steps
         return Period(1e-6 * time, f"looptime {told['looptime']:g} µs, times {steps:g}")
     return None
+
+
+def hold_of(log: Log, kind: Kind) -> tuple[float, float]:
+    """Half the time for which a command holds, and by how much that may be wrong, s."""
+    period = period_of(log, kind)
+    if period is None:
+        return 0.0, 0.0
+    half = 0.5 * period.time
+    return (0.5 * half, 0.5 * half) if period.at_most else (half, 0.0)
+
+
+def known_commands(log: Log, loop: LogLoop, command: Command, between: Between | None) -> LogLoop:
+    """The loop with commands at the times from which they act, where it answers to known ones.
+
+    A command that is computed more often than it is logged holds for a period of the controller,
+    and lines between its rows are half of that early. After a pause in its rows, the response
+    still answers to commands that are not in the log.
+    """
+    told = loop.signals[command]
+    if between == "lines":
+        told = replace(told, time=told.time + hold_of(log, loop.kind)[0])
+    settles = SETTLES * LENGTHS[loop.kind]
+    pauses = [(low, high + settles) for low, high in sorted([*told.gaps, *log.gaps])]
+    kept = tuple(shared(list(loop.segments), outside(pauses)))
+    if command == "setpoint":
+        return replace(loop, segments=kept, setpoint=told)
+    return replace(loop, segments=kept, actuator=told)
 
 
 #: Share of the variance of a command, off the line between its neighbours, from which it is rough;

@@ -16,11 +16,16 @@ from deadtime._base.progress import Stages, stage_report
 from deadtime.estimation import SharedNumber, shared_number
 from deadtime.recordings import Log, LogLoop, Recording, open_log
 from deadtime.reports.latencies._budget import Stage, stages_of
-from deadtime.reports.latencies._controller import between_rows, hidden_between_rows
+from deadtime.reports.latencies._controller import (
+    Command,
+    between_rows,
+    hidden_between_rows,
+    hold_of,
+    known_commands,
+)
 from deadtime.reports.latencies._filters import FilterDelay, filters_of
 from deadtime.reports.latencies._relation import LoopLatency, relation_of
 from deadtime.reports.latencies._windows import (
-    Command,
     Window,
     best_windows,
     rows_of_a_window,
@@ -321,17 +326,20 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
         return LoopLatency(loop.name, loop.axis, loop.kind, command, (), math.inf, None, why)
     told = loop.signals[command]
     between = between_rows(log, loop.kind, told)
+    loop = known_commands(log, loop, command, between)
+    told = loop.signals[command]
     windows = best_windows(loop, command, integrates, between)
 
     def held(window: Window) -> Recording:
         return loop.recording(window.start, window.stop, command=command, between="held")
 
     hidden = 0.0
+    unsure = hold_of(log, loop.kind)[1] if between == "lines" else 0.0
     if windows:
         hidden = hidden_between_rows(told, between, windows[0].start, windows[0].stop)
     return relation_of(
         loop.name, loop.axis, loop.kind, command, integrates, windows, between,
-        held if between is None else None, hidden,
+        held if between is None else None, hidden, unsure,
     )  # fmt: skip
 
 

@@ -16,9 +16,9 @@ from deadtime.estimation import DelayEstimate, OutputError, estimate_delay
 from deadtime.estimation._choose import bic, likeliest, with_pair
 from deadtime.loops import ControlLoop, FactoredPlant, P
 from deadtime.recordings import Recording
-from deadtime.reports.latencies._controller import Between
+from deadtime.reports.latencies._controller import Between, Command
 from deadtime.reports.latencies._cost import GainCost, cost_of
-from deadtime.reports.latencies._windows import LONGEST, OF_A_ROW, Command, Window
+from deadtime.reports.latencies._windows import LONGEST, OF_A_ROW, Window
 
 #: The second lag that is tried, as a share of the first.
 SECOND = 0.3
@@ -136,11 +136,13 @@ def relation_of(
     between: Between | None = None,
     held: Callable[[Window], Recording] | None = None,
     hidden: float = 0.0,
+    unsure: float = 0.0,
 ) -> LoopLatency:
     """Fit the plant of a loop to its windows, or say why that tells nothing.
 
     Where it is not known whether commands hold or move between rows, `held` gives a window with
-    commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not adequate.
+    commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not adequate,
+    nor one whose interval is narrow against `unsure`, s, by which commands may hold longer or less.
     """
     ends = _ends_of(windows)
     told = [one for one in windows if one.tells]
@@ -164,6 +166,13 @@ def relation_of(
             fit,
             f"the {command} moves between rows of the log by more than it shows, which hides times "
             f"below {stated(hidden, 0.0, 's')}",
+        )
+    low, high = fit.ci(0.95, "delay+lag")
+    if unsure > WORTH * (high - low):
+        fit = _doubted(
+            fit,
+            "the log does not tell how long the controller holds its commands, which is worth "
+            f"{stated(unsure, 0.0, 's')} more or less",
         )
     cost = None
     if command == "actuator":

@@ -13,22 +13,18 @@ c = (1 + rho)/(1 - rho) for residuals of lag-1 autocorrelation rho, which are wo
 from __future__ import annotations
 
 from itertools import product
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime.estimation.models._held import HeldResponse
 from deadtime.recordings import LogLoop, Recording
-from deadtime.reports.latencies._controller import Between
+from deadtime.reports.latencies._controller import LENGTHS, Between, Command
 
 Array = NDArray[np.float64]
 
-#: What is followed: the setpoint of the loop, or what its controller commands.
-Command: TypeAlias = Literal["setpoint", "actuator"]
-
-#: Length of a window, s, for each kind of loop, and its fewest and most rows.
-LENGTHS = {"rate": 4.0, "attitude": 8.0, "velocity": 12.0, "position": 20.0}
+#: Fewest and most rows of a window.
 FEWEST, MOST = 24, 6000
 
 #: Shares of that length that are tried, and of its own by which one window comes after another.
