@@ -62,6 +62,8 @@ def _print_log(log: Log) -> None:
     if log.key_parameters:
         shown = ", ".join(f"{name} {value:g}" for name, value in log.key_parameters.items())
         print_text(f"parameters: {shown}")
+    if log.link is not None:
+        print_text(log.link.summary())
     for remark in log.remarks:
         print_text(remark, "yellow")
 

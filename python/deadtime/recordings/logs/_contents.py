@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime.recordings.logs._link import Link
+
 Array = NDArray[np.float64]
 
 
@@ -55,6 +57,8 @@ class LogContents:
         the topics.
     gaps : tuple of (float, float)
         Where the logger lost data: start and stop, s.
+    link : Link, optional
+        The way of the messages to the ground station that logged them.
     """
 
     format: str
@@ -67,3 +71,4 @@ class LogContents:
     remarks: tuple[str, ...] = ()
     span: tuple[float, float] | None = None
     gaps: tuple[tuple[float, float], ...] = ()
+    link: Link | None = None

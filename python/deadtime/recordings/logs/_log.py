@@ -12,6 +12,7 @@ from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
 from deadtime.recordings._recording import Recording
 from deadtime.recordings.logs._contents import LogContents
+from deadtime.recordings.logs._link import Link
 from deadtime.recordings.logs._names import AutopilotNames, Kind, LoopNames
 from deadtime.recordings.logs._recording import recording_of
 from deadtime.recordings.logs._segments import segments_of
@@ -198,6 +199,8 @@ class Log(ReadOnlyArrays):
         Where the logger lost data, s.
     remarks : tuple of str
         What was damaged or left out, in sentences.
+    link : Link or None
+        The way of the messages to the ground station, in a tlog.
     contents : LogContents
         All topics, by their names in the log, with times on the vehicle's clock.
     """
@@ -215,6 +218,7 @@ class Log(ReadOnlyArrays):
     loops: Mapping[str, LogLoop]
     gaps: tuple[tuple[float, float], ...]
     remarks: tuple[str, ...]
+    link: Link | None
     contents: LogContents = field(repr=False)
 
     def __repr__(self) -> str:
@@ -256,6 +260,8 @@ class Log(ReadOnlyArrays):
         if self.key_parameters:
             shown = ", ".join(f"{name} = {value:g}" for name, value in self.key_parameters.items())
             lines.append(f"parameters: {shown}")
+        if self.link is not None:
+            lines.append(self.link.summary())
         lines.extend(self.remarks)
         return "\n".join(lines)
 
@@ -265,8 +271,9 @@ class Log(ReadOnlyArrays):
         found = {name: getattr(self, name) for name in names.split()}
         modes = [{"from": at, "name": name} for at, name in self.modes]
         loops = [loop.to_dict() for loop in self.loops.values()]
+        link = None if self.link is None else self.link.to_dict()
         rest = {"modes": modes, "loops": loops, "gaps": self.gaps, "remarks": self.remarks}
-        shown: dict[str, Any] = plain({**found, **rest})
+        shown: dict[str, Any] = plain({**found, **rest, "link": link})
         return shown
 
 
@@ -299,6 +306,7 @@ def log_of(contents: LogContents, names: AutopilotNames, source: str) -> Log:
         loops=FrozenDict(loops),
         gaps=tuple((low - start, high - start) for low, high in contents.gaps),
         remarks=tuple(dict.fromkeys(remarks)),
+        link=contents.link,
         contents=contents,
     )
 

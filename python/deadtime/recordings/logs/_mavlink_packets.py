@@ -90,8 +90,8 @@ class Batch:
         Where in the file.
     ground : ndarray
         When the ground station received them, s since 1970.
-    system, component : ndarray of int
-        The senders.
+    system, component, number : ndarray of int
+        The senders, and their numbers of the packets.
     units : mapping of str to str
         Units of fields.
     """
@@ -102,6 +102,7 @@ class Batch:
     ground: Array
     system: NDArray[np.uint8]
     component: NDArray[np.uint8]
+    number: NDArray[np.uint8]
     units: Mapping[str, str]
 
     def senders(self) -> dict[tuple[int, int], NDArray[np.int64]]:
@@ -113,7 +114,7 @@ class Batch:
 
     def taken(self, rows: NDArray[np.bool_]) -> Batch:
         """The messages of these rows."""
-        parts = ("records", "places", "ground", "system", "component")
+        parts = ("records", "places", "ground", "system", "component", "number")
         return replace(self, **{name: getattr(self, name)[rows] for name in parts})
 
 
@@ -142,7 +143,6 @@ def _batch(
     size = dtype.itemsize
     payload = np.zeros((places.size, size), dtype=np.uint8)
     right = np.zeros(places.size, dtype=bool)
-    sender = np.zeros((places.size, 2), dtype=np.uint8)
     starts = places + STAMP
     shapes = content[starts].astype(np.int64) << 8 | content[starts + 1]
     for shape in np.unique(shapes):
@@ -160,19 +160,28 @@ def _batch(
         right[rows] = _checksum(checked) == told
         used = min(length, size)
         payload[rows, :used] = whole[:, head - 1 : head - 1 + used]
-        first = head - 1 - 5 if head == FIRST[0xFD] else head - 1 - 3
-        sender[rows] = whole[:, first : first + 2]
+    number, system, component = numbers_and_senders(content, places)
     stamps = _gathered(content, places, STAMP).view(">u8")[:, 0]
     batch = Batch(
         name=definition.msgname,
         records=payload.view(dtype)[:, 0],
         places=places,
         ground=1e-6 * stamps.astype(float),
-        system=sender[:, 0],
-        component=sender[:, 1],
+        system=system,
+        component=component,
+        number=number,
         units=definition.fieldunits_by_name,
     )
     return batch.taken(right), int(np.count_nonzero(~right))
+
+
+def numbers_and_senders(
+    content: NDArray[np.uint8], places: NDArray[np.int64]
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.uint8]]:
+    """Number, system and component of the packets at these places."""
+    at = places + STAMP
+    at += np.where(content[at] == 0xFD, 4, 2)
+    return content[at], content[at + 1], content[at + 2]
 
 
 def _gathered(

@@ -6,13 +6,22 @@ definitions of pymavlink: one by one they would take a minute for a flight.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import MissingExtraError, RecordingError
 from deadtime.recordings.logs._ardupilot_modes import COPTER, PLANE, ROVER
 from deadtime.recordings.logs._contents import Array, LogContents, Topic
-from deadtime.recordings.logs._mavlink_packets import Batch, batches, find_packets
+from deadtime.recordings.logs._link import Link, half_round_trip, lost_packets, transport_of
+from deadtime.recordings.logs._mavlink_packets import (
+    Batch,
+    Packets,
+    batches,
+    find_packets,
+    numbers_and_senders,
+)
 from deadtime.recordings.logs._names import UNITS
 from deadtime.recordings.logs._px4_modes import MODES, VEHICLES
 
@@ -88,6 +97,7 @@ def read_tlog(data: bytes, source: str) -> LogContents:
         modes=_modes(heartbeat, autopilot, kind),
         remarks=tuple(remarks),
         span=(float(clock[1][0]), float(clock[1][-1])),
+        link=_link(data, packets, found, vehicle, dialect.mavlink_map),
     )
 
 
@@ -158,6 +168,62 @@ def _boot_time(batch: Batch) -> Array | None:
         time = batch.records["time_usec"].astype(float)
         return 1e-6 * time if time.size and time.max() < SINCE_1970 else None
     return None
+
+
+def _link(
+    data: bytes, packets: Packets, found: list[Batch], vehicle: Sender, known: Collection[int]
+) -> Link | None:
+    """The way of the vehicle's messages to the ground station; None where the log does not tell."""
+    told = []
+    for batch in found:
+        rows, time = batch.senders().get(vehicle), _boot_time(batch)
+        if (
+            rows is not None
+            and time is not None
+            and "time_boot_ms" in (batch.records.dtype.names or ())
+        ):
+            told.append((rows.size, batch.name, time[rows], batch.ground[rows]))
+    if not told:
+        return None
+    count, name, sent, received = max(told, key=lambda one: one[:2])
+    way = transport_of(sent, received)
+    if way is None:
+        return None
+    transport, drift = way
+    half, trips = _round_trip(found, vehicle)
+    numbers = _numbers(data, packets, found, vehicle, known)
+    return Link(
+        name, count, float(np.median(transport)), float(np.quantile(transport, 0.95)), drift,
+        half, trips, numbers.size, lost_packets(numbers),
+    )  # fmt: skip
+
+
+def _round_trip(found: list[Batch], vehicle: Sender) -> tuple[float | None, int]:
+    """From the requests of others and the vehicle's answers, which have a time of its own."""
+    for batch in found:
+        if batch.name == "TIMESYNC":
+            own = (batch.system == vehicle[0]) & (batch.component == vehicle[1])
+            request = batch.records["tc1"] == 0
+            number = batch.records["ts1"].astype(np.int64)
+            asked, answered = ~own & request, own & ~request
+            return half_round_trip(
+                (number[asked], batch.ground[asked]), (number[answered], batch.ground[answered])
+            )
+    return None, 0
+
+
+def _numbers(
+    data: bytes, packets: Packets, found: list[Batch], vehicle: Sender, known: Collection[int]
+) -> NDArray[np.uint8]:
+    """Numbers of the vehicle's packets in their order, with those of unknown messages."""
+    places = np.concatenate([batch.places for batch in found])
+    kinds, every = np.array(packets.types), np.array(packets.places, dtype=np.int64)
+    strange = every[~np.isin(kinds, list(known))]
+    inside = (strange > places.min()) & (strange < places.max())
+    content = np.frombuffer(data, dtype=np.uint8)
+    places = np.sort(np.concatenate([places, strange[inside]]))
+    number, system, component = numbers_and_senders(content, places)
+    return np.asarray(number[(system == vehicle[0]) & (component == vehicle[1])])
 
 
 def _topics(found: list[Batch], vehicle: Sender, clock: Clock) -> dict[str, Topic]:

@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from deadtime._base.digits import stated
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
 from deadtime._base.progress import Stages, stage_report
 from deadtime.estimation import SharedNumber, shared_number
 from deadtime.recordings import Log, LogLoop, Recording, open_log
+from deadtime.recordings.logs import Link
 from deadtime.reports.latencies._budget import Stage, stages_of
 from deadtime.reports.latencies._controller import (
     Command,
@@ -54,6 +56,8 @@ class Latency(ReadOnlyArrays):
         The filters that the parameters of the log name.
     remarks : tuple of str
         What was damaged or left out of the log.
+    link : Link or None
+        The way of the messages to the ground station, in a tlog.
     """
 
     source: str
@@ -62,6 +66,7 @@ class Latency(ReadOnlyArrays):
     stages: Mapping[str, tuple[Stage, ...]] = field(default_factory=dict)
     filters: tuple[FilterDelay, ...] = ()
     remarks: tuple[str, ...] = ()
+    link: Link | None = None
 
     def loop(self, name: str, command: Command = "setpoint") -> LoopLatency:
         """The time of one loop.
@@ -131,6 +136,8 @@ class Latency(ReadOnlyArrays):
         if refused:
             lines.append("refused:")
             lines += [f"  {one.name}: {one.refusal}" for one in refused]
+        if self.link is not None:
+            lines.append(self.link.summary())
         return "\n".join([*lines, *self.remarks])
 
     def _lines(self, one: LoopLatency) -> list[str]:
@@ -160,6 +167,7 @@ class Latency(ReadOnlyArrays):
                 },
                 "filters": [one._asdict() for one in self.filters],
                 "remarks": self.remarks,
+                "link": None if self.link is None else self.link.to_dict(),
             }
         )
         return found
@@ -180,7 +188,7 @@ class Latency(ReadOnlyArrays):
 
         text = render(
             self.source, self.vehicle, self.headline(), self.loops, self.stages, self.filters,
-            self.remarks,
+            self.remarks, self.link,
         )  # fmt: skip
         return write_page(text, Path(path))
 
@@ -267,8 +275,28 @@ def latency(
         loops=tuple(found),
         stages=FrozenDict({name: some for name, some in stages.items() if some}),
         filters=filters,
-        remarks=log.remarks,
+        remarks=(*log.remarks, *_sent_from_the_ground(log, chosen)),
+        link=log.link,
     )
+
+
+def _sent_from_the_ground(log: Log, loops: list[LogLoop]) -> list[str]:
+    """A remark on setpoints that the ground station stamped when it sent them."""
+    if log.link is None:
+        return []
+    names = [one.name for one in loops if one.setpoint.source.startswith("SET_")]
+    if not names:
+        return []
+    half = log.link.half_round_trip
+    worth = (
+        "which this log does not tell"
+        if half is None
+        else f"at least {stated(2.0 * half, 0.0, 's')}"
+    )
+    return [
+        f"{', '.join(names)}: the setpoint is stamped where it was sent, on the ground; its time "
+        f"to the response holds the link there and back, {worth}"
+    ]
 
 
 def _chosen(log: Log, axes: Iterable[str] | None, names: Iterable[str] | None) -> list[LogLoop]:

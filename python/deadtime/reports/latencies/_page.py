@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from deadtime._base.digits import between, stated
 from deadtime._base.page import escaped, page, picture, table, table_row
+from deadtime.recordings.logs import Link
 from deadtime.reports.latencies._budget import Stage
 from deadtime.reports.latencies._filters import FilterDelay
 from deadtime.reports.latencies._plots import plot_fit, plot_latency
@@ -24,6 +25,7 @@ def render(
     stages: Mapping[str, Sequence[Stage]],
     filters: Sequence[FilterDelay],
     remarks: Sequence[str],
+    link: Link | None,
 ) -> str:
     """The page as text."""
     estimated = [one for one in loops if one.estimate is not None]
@@ -56,6 +58,9 @@ def render(
             "<h2>Filters that the log names</h2>",
             table(("filter", "on", "delay at low frequencies", "parameters"), rows),
         ]
+    if link is not None:
+        words = link.summary()
+        body += ["<h2>The link</h2>", f"<p>{escaped(words[0].upper() + words[1:])}.</p>"]
     for number, one in enumerate(estimated):
         body += _fit(number, one)
     refused = [one for one in loops if one.estimate is None]
