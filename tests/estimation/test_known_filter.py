@@ -63,6 +63,19 @@ def test_filtered_noise_and_torques_are_told_from_the_vehicle(known):
     assert found.adequate
 
 
+def test_noise_behind_the_filter_leaves_what_is_computed_nearly_white():
+    # Noise of the sensor, and a tenth as much added behind the filter, as by digits.
+    random = np.random.default_rng(1)
+    known = KnownFilter.of(BIQUAD)
+    output = signal.lfilter(*BIQUAD, random.standard_normal(200_000))
+    output += 0.1 * np.std(output) * random.standard_normal(output.size)
+    before = known.undone(output)[known.start :]
+    count = before.size // known.together
+    means = before[: count * known.together].reshape(count, -1).mean(axis=1)
+    for lag in (1, 2, 3):
+        assert abs(np.mean(means[lag:] * means[:-lag])) < 0.06 * np.var(means)
+
+
 @given(st.floats(0.05, 0.95))
 def test_a_first_order_filter_is_undone_exactly(k):
     x = np.random.default_rng(1).standard_normal(300)

@@ -283,8 +283,8 @@ def repeated(share: float) -> Logger:
     """Rows of the response that hold the value of the row before."""
 
     def change(rows: Rows, random: np.random.Generator, _: Flight) -> Rows:
-        source = np.arange(rows.time.size)
-        source[1:][random.uniform(size=source.size - 1) < share] -= 1
+        again = random.uniform(size=rows.time.size) < share
+        source = np.maximum.accumulate(np.where(again, 0, np.arange(rows.time.size)))
         return Rows(rows.time, rows.values[source])
 
     return _logged(change, "response")

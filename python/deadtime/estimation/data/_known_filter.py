@@ -5,7 +5,9 @@ that are logged. With its zeros inside the unit circle, x = A/B y is what the se
 noise is white again. A low-pass has zeros at the Nyquist frequency, on the circle, and its inverse
 has no end there. They are moved to a circle of radius `LARGEST`: C instead of B. What is computed
 is then B/C x, which differs from x near the Nyquist frequency alone, and by a known delay. The mean
-of two rows has no part there. Rows are averaged over the time by which the filter is late, in which
+of two rows has no part there. What is added behind the filter, as by the digits of a log, is
+amplified near that frequency by up to A/C, and a larger circle than needed lets it colour what is
+computed. Rows are averaged over the time by which the filter is late, in which
 filtered rows are alike, and at least in pairs.
 """
 
@@ -25,7 +27,7 @@ Array = NDArray[np.float64]
 
 #: Radius of the circle to which zeros are moved; zeros at lower frequencies than a quarter of the
 #: rate of the rows stay where they are, up to this radius.
-LARGEST, LARGEST_LOW = 0.8, 0.98
+LARGEST, LARGEST_LOW = 0.5, 0.98
 
 #: Share of the start that may be left when rows are used.
 FORGOTTEN = 1e-6
