@@ -1,11 +1,13 @@
 """Delay and lag from logs whose rows and clocks are as logs have them."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from deadtime.estimation.likelihood._missing import with_lost
 from deadtime.estimation.likelihood._rows import on_same_step, rounding_of
+from deadtime.reports.latencies._controller import period_of, smeared
 from deadtime.reports.latencies._latency import _told
 from sampled_loops import LOGGERS, fly, made
 from scipy import stats
@@ -22,8 +24,8 @@ DOUBTED = {
     ("height", "steps of 0.1 hPa"),
 }
 
-#: Logs of the survey (the pages state what came out of 60), and the probability of a false alarm at
-#: either end.
+#: Logs of the survey (`benches/README.md` has what came out of more), and the probability of a false
+#: alarm at either end.
 LOGS, ALARM = int(os.environ.get("DEADTIME_LOGS", "5")), 0.01
 
 
@@ -97,3 +99,16 @@ def test_noise_of_half_a_step_makes_all_rows_tell():
     noise = np.random.default_rng(2).standard_normal(400)
     assert rounding_of(np.round(ramp + 0.1 * noise)) == 1.0
     assert rounding_of(np.round(ramp + 0.5 * noise)) == 0.0
+
+
+def test_lines_between_rare_rows_of_a_command_are_known_to_what_their_changes_tell():
+    flight, log = made("rate", "commands: every fifth row", 1007)
+    told = log.loop(flight.kind.loop).actuator
+    # Sixteen equal steps, each at any time between its rows.
+    values = np.repeat(np.arange(17.0), 2)
+    steps = replace(told, time=0.05 * np.arange(34.0), values=values)
+    period = period_of(log, "rate")
+    expected = (0.05 - period.time) / np.sqrt(12.0 * 16.0)
+    assert smeared(log, "rate", steps, 0.0, 2.0) == pytest.approx(expected)
+    # Intervals of 2 ms did not know of it: of 28 such answers 18 held the truth.
+    assert answered("rate", "commands: every fifth row", 1007)[1] is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -110,3 +111,18 @@ def hidden_between_rows(told: Series, between: Between | None, start: float, sto
     off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
     rough = float(np.mean(off**2)) > ROUGH * float(np.mean((values - trend) ** 2))
     return ROWS * told.period if rough else 0.0
+
+
+def smeared(log: Log, kind: Kind, told: Series, start: float, stop: float) -> float:
+    """How far lines between rows may move commands in time, s, by one standard deviation.
+
+    A change of the command comes at any time between two rows, but for the period of the controller
+    before the later one. Of n changes of like size the mean is known to that time over sqrt(12 n).
+    """
+    period = period_of(log, kind)
+    rows = (told.time >= start) & (told.time <= stop) & np.isfinite(told.values)
+    squares = np.diff(told.values[rows]) ** 2
+    if period is None or not np.any(squares):
+        return 0.0
+    count = float(np.sum(squares) ** 2 / np.sum(squares**2))
+    return max(0.0, told.period - period.time) / math.sqrt(12.0 * count)

@@ -24,6 +24,7 @@ from deadtime.reports.latencies._controller import (
     hidden_between_rows,
     hold_of,
     known_commands,
+    smeared,
 )
 from deadtime.reports.latencies._filters import FilterDelay, filters_of
 from deadtime.reports.latencies._relation import LoopLatency, relation_of
@@ -364,7 +365,10 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     hidden = 0.0
     unsure = hold_of(log, loop.kind)[1] if between == "lines" else 0.0
     if windows:
-        hidden = hidden_between_rows(told, between, windows[0].start, windows[0].stop)
+        first = (windows[0].start, windows[0].stop)
+        hidden = hidden_between_rows(told, between, *first)
+        if between == "lines":
+            unsure = math.hypot(unsure, smeared(log, loop.kind, told, *first))
     return relation_of(
         loop.name, loop.axis, loop.kind, command, integrates, windows, between,
         held if between is None else None, hidden, unsure,

@@ -171,8 +171,8 @@ def relation_of(
     if unsure > WORTH * (high - low):
         fit = _doubted(
             fit,
-            "the log does not tell how long the controller holds its commands, which is worth "
-            f"{stated(unsure, 0.0, 's')} more or less",
+            "the log does not tell when commands changed between its rows, or how long each holds, "
+            f"which is worth {stated(unsure, 0.0, 's')} more or less",
         )
     cost = None
     if command == "actuator":
