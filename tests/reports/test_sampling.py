@@ -24,8 +24,8 @@ DOUBTED = {
     ("height", "steps of 0.1 hPa"),
 }
 
-#: Logs of the survey (`benches/README.md` has what came out of more), and the probability of a false
-#: alarm at either end.
+#: Logs of the survey (`benches/README.md` has what came out of more), and the probability of a
+#: false alarm at either end.
 LOGS, ALARM = int(os.environ.get("DEADTIME_LOGS", "5")), 0.01
 
 
