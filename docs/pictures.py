@@ -358,8 +358,36 @@ def latency() -> None:
     fit.plot()[0].figure.savefig(IMAGES / "latency-roll.png", dpi=90)
 
 
+def rows_of_logs() -> None:
+    """Roll in two logs, one with rows as close as its delay and one with rows further apart."""
+    flights = Path(__file__).resolve().parents[2] / "shared/data/flights"
+    names = ("px4_sitl_takeoff.ulg", "arducopter_2014-10-18_21-19-07.bin")
+    if not all((flights / name).exists() for name in names):
+        print(f"rows of logs: {' or '.join(names)} is not beside the project")
+        return
+    figure, axes = plt.subplots(2, 1, figsize=(8.0, 5.5), layout="constrained")
+    for ax, name in zip(axes, names, strict=True):
+        log = dtm.open_log(flights / name)
+        loop = log.loop("roll")
+        answer = dtm.latency(log, loops=("roll",)).loop("roll")
+        middle = 0.5 * sum(answer.windows[0][:2])
+        for signal, label, style in (
+            (loop.setpoint, "setpoint", {"drawstyle": "steps-post", "color": "0.5"}),
+            (loop.response, "response", {"color": "C0"}),
+        ):
+            near = np.abs(signal.time - middle) < 2.0
+            values = np.degrees(signal.values[near])
+            ax.plot(signal.time[near], values, ".-", linewidth=1.0, label=label, **style)
+        rows = f"a row each {1e3 * loop.response.period:.0f} ms"
+        ax.set(title=f"{log.vehicle}: {rows}", xlabel="time / s", ylabel="roll / °")
+        ax.grid(alpha=0.3)
+    axes[0].legend()
+    figure.savefig(IMAGES / "rows-of-logs.png", dpi=90)
+
+
 if __name__ == "__main__":
     latency()
+    rows_of_logs()
     flying()
     thrust()
     designing()
