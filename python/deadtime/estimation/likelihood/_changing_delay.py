@@ -107,7 +107,7 @@ def _later(
 def _scored(fit: NoiseFit, run: int) -> tuple[float, Array]:
     """The statistic for the noise of the fit, and the likeliest change at each command, s."""
     rows, one = fit.runs[run], fit.with_gain
-    shapes = _shapes(rows, rows.command_time)
+    shapes = _shapes(rows)
     numbers = PlantNumbers(one.delay, one.lags, [one.noise[run]], fit.gain, one.zero)
     step = STEP * float(np.median(np.diff(rows.time)))
     mean = _residuals(fit, rows, numbers)
@@ -134,9 +134,10 @@ def _with_later(rows: FlightRows, delays: Array) -> FlightRows:
     return rows._replace(command_time=rows.command_time + share * delays)
 
 
-def _shapes(rows: FlightRows, time: Array) -> Array:
-    """The changes of the delay of commands at these times, shape (2, n)."""
-    share = np.clip((time - rows.time[0]) / (rows.time[-1] - rows.time[0]), 0.0, 1.0)
+def _shapes(rows: FlightRows) -> Array:
+    """The changes of the delay at each command, shape (2, n)."""
+    since = rows.command_time - rows.time[0]
+    share = np.clip(since / (rows.time[-1] - rows.time[0]), 0.0, 1.0)
     return np.cos(np.pi * np.outer(WAVES, share))
 
 

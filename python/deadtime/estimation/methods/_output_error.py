@@ -368,12 +368,13 @@ def _with_predicted_commands(
     steps = [one.commands.steps for one in models]
     unclear = max(steps) > 1 and sum(step > 1 for step in steps) == 1
     tried: list[tuple[NoiseFit, int | None]] = []
+    size = abs(fit.gain)
     for step in range(max(steps)) if unclear and max(steps) <= MOST_STEPS else (None,):
         refilled = _refilling(names, models, runs, step, unsure=True)
         between = [
-            one.refilled(
-                rows, with_missing(run.recording, run.loop, one.logged, step=step), abs(fit.gain)
-            )
+            one.refilled(rows, with_missing(run.recording, run.loop, one.logged, step=step), size)
+            if one.commands.computed
+            else rows
             for one, run, rows in zip(models, runs, fit.runs, strict=True)
         ]
         again = fitted_flight(fit.model, between, fit.with_gain)
