@@ -1,12 +1,15 @@
 """Commands in missing rows follow from the plant that is fitted, and tell of it."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
+from deadtime.estimation.likelihood._missing import _closed
+from deadtime.estimation.models._held import path_of
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
@@ -35,6 +38,51 @@ def test_a_hole_in_the_rise_costs_no_more_than_the_bound_says(number):
     assert fit.stderr["delay"] < 3.0 * least
     low, high = fit.ci(0.95)
     assert low < fit.delay < high
+
+
+# Of 522 and 203 the whole answer lies in the hole; 40 was predicted from two noisy rows before it;
+# in 360 the nearest maximum of the likelihood was 60 ms away from the highest.
+@pytest.mark.parametrize(
+    ("name", "number"), [("hole of 1 s", n) for n in (40, 203, 522)] + [("rows lost 20 %", 360)]
+)
+def test_the_highest_of_several_maxima_is_found(name, number):
+    run, fit = estimate(name, number)
+    least, _ = bounds(NAMED[name], run, ("delay", "gain"))
+    low, high = fit.ci(0.95)
+    assert low < run.vehicle.delay < high
+    assert abs(fit.delay - run.vehicle.delay) < 5.0 * least
+
+
+def test_a_lag_near_zero_beside_a_hole_is_estimated():
+    condition = replace(NAMED["lag free white"], name="hole, lag free", hole=1.0)
+    for number in range(6):
+        run = record(condition, number)
+        recording = table.recording_of(condition, run)
+        loop = table.given_loop(condition, run, condition.free)
+        fit = dtm.estimate_delay(recording, loop, free=condition.free)
+        assert np.isfinite(fit.stderr["delay+lag"])
+
+
+def test_the_loop_answers_an_error_of_a_predicted_output():
+    # Each output from which a command is computed is wrong by e in turn: the loop is stepped.
+    loop = dtm.ControlLoop(
+        dtm.Integrator(0.8, lag=0.1), dtm.P(1.7), delay=0.2, sample_time=0.065, limit=1.0
+    )
+    slopes = np.array([0.0, 0.0, *[1.7] * 12])
+    times = 0.065 * np.arange(slopes.size)
+
+    def commands(errors):
+        sent = np.zeros(slopes.size)
+        for k in range(slopes.size):
+            path = path_of(loop.plant, times, sent)
+            output = 0.8 * path.value(times[k : k + 1] - 0.2, {"lag": 0.1})[0]
+            sent[k] = -slopes[k] * (output + errors[k])
+        return sent
+
+    each, shared = _closed(loop, slopes)
+    sums = [commands(error).sum() for error in np.eye(slopes.size)]
+    np.testing.assert_allclose(each, np.abs(sums), atol=1e-9)
+    assert shared * 12 == pytest.approx(abs(commands(np.ones(slopes.size)).sum()))
 
 
 def test_the_reference_may_change_in_any_of_many_missing_rows():

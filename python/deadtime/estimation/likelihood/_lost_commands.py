@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import product
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -26,7 +27,7 @@ from deadtime.estimation.likelihood._profile import (
     unseen_air,
 )
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit
+from deadtime.estimation.likelihood._search import NoiseFit, changed, with_noise
 
 Array = NDArray[np.float64]
 
@@ -42,10 +43,13 @@ STEPS, MOST, ACCURACY = (1.0, 0.3), 40, 0.03
 #: about that of intervals.
 WIDER, ENDS = 4, 2.0
 
-#: Factor on standard errors for kinks of the likelihood that the curvature does not show, where at
-#: least so many samples in a row are missing: without it 90 to 93 % of intervals hold the delay of
-#: a flight with a hole of a second, with it 95 %. Rows lost one by one need none (98 %).
-KINKS, MANY = 1.2, 5
+#: Factor on standard errors where air, trim or a coloured sensor move the output across the missing
+#: rows: without it 87 to 90 % of intervals hold the delay of such flights.
+IN_AIR = 1.2
+
+#: The grid of starts: delays in sample times around that of the first
+#: fit, and factors of its gain.
+DELAYS, GAINS = np.linspace(-1.5, 1.5, 7), np.array([0.85, 1.0, 1.15])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,54 +84,93 @@ class LostCommandsProfile(LikelihoodProfile):
 
 
 def with_lost_commands(
-    fit: NoiseFit, refilled: Refilled, longest: int
+    fit: NoiseFit, refilled: Refilled, sample_time: float
 ) -> tuple[NoiseFit, Array] | None:
     """The likeliest fit with the commands of its plant, and the covariance of common numbers.
 
-    At most `longest` samples in a row are missing. None where the recording does not tell these
+    None where the recording does not tell these
     numbers apart.
     """
+    starts = [fit]
+    if not all(is_calm(fit, run) for run in range(len(fit.runs))):
+        calm = [changed(one, air=0.0, sensor=0.0) for one in fit.numbers.noise]
+        starts.append(replace(fit, trim=False, numbers=with_noise(fit.with_gain, calm)))
+    starts = [_started(one, refilled, sample_time) for one in starts]
+    sizes = np.sqrt(np.diag(common_covariance(fit)))
+    found = [_searched(one, refilled, sizes) for one in starts]
+    best = min(found, key=lambda one: one.criterion)
+    cov = _covariance(partial(_objective, best, refilled, sizes), np.zeros(sizes.size))
+    wider = 1.0 if all(is_calm(best, run) for run in range(len(best.runs))) else IN_AIR
+    return None if cov is None else (best, cov * np.outer(wider * sizes, wider * sizes))
+
+
+def is_calm(fit: NoiseFit, run: int) -> bool:
+    """Whether commands and white noise are all that moves the output of a recording."""
+    noise = fit.numbers.noise[run]
+    return not (fit.trim or noise.air > 0.0 or noise.sensor > 0.0)
+
+
+def _started(fit: NoiseFit, refilled: Refilled, sample_time: float) -> NoiseFit:
+    """The fit at the likeliest point of a grid over the delay and the gain.
+
+    The likelihood has a maximum of its own in each sample time of the delay.
+    """
+    grids = {
+        "delay": (sample_time * DELAYS, np.add),
+        "gain": (GAINS, np.multiply),
+    }
+    now = numbers_of(fit)
+    values = [
+        grids[kernel][1](now[name], grids[kernel][0]) if kernel in grids else [now[name]]
+        for name, kernel in fit.model.order
+    ]
+    points = [np.array(one) for one in product(*values)]
+    return min(
+        (_with_common(fit, one) for one in points),
+        key=lambda one: _minus_log_likelihood(one, refilled),
+    )
+
+
+def _searched(fit: NoiseFit, refilled: Refilled, sizes: Array) -> NoiseFit:
+    """The likeliest fit near this one, by steps of such sizes."""
     from scipy import optimize
 
-    start = np.array([numbers_of(fit)[name] for name, _ in fit.model.order])
-    sizes = np.sqrt(np.diag(common_covariance(fit)))
     known = replace(fit.model, names=())
-
-    def at(point: Array) -> NoiseFit:
-        return _with_common(fit, start + sizes * point)
-
-    def objective(point: Array) -> float:
-        one = at(point)
-        if min(one.numbers.delay, *one.numbers.lags, math.inf) < 0.0:
-            return math.inf
-        return known.likelihood(refilled(one), fit.trim).objective(one.with_gain)
-
-    point = np.zeros(start.size)
     for step in STEPS:
-        corners = np.vstack([point, point + step * np.eye(point.size)])
         point = optimize.minimize(
-            objective,
-            point,
+            partial(_objective, fit, refilled, sizes),
+            np.zeros(sizes.size),
             method="Nelder-Mead",
             options={
-                "initial_simplex": corners,
+                "initial_simplex": np.vstack([np.zeros(sizes.size), step * np.eye(sizes.size)]),
                 "xatol": ACCURACY,
                 "fatol": ACCURACY,
-                "maxfev": MOST * point.size,
+                "maxfev": MOST * sizes.size,
             },
         ).x
-        one = at(point)
-        found = known.likelihood(refilled(one), fit.trim).fit(one.with_gain)
-        fit = one.moved(
-            PlantNumbers(
-                one.numbers.delay, one.numbers.lags, found.noise, one.gain, one.numbers.zero
-            )
-        )
-    cov = _covariance(objective, point)
-    if cov is None:
-        return None
-    kinks = KINKS if longest >= MANY else 1.0
-    return replace(fit, runs=tuple(refilled(fit))), kinks**2 * cov * np.outer(sizes, sizes)
+        one = _moved(fit, sizes * point)
+        noise = known.likelihood(refilled(one), fit.trim).fit(one.with_gain).noise
+        fit = one.moved(with_noise(one.with_gain, noise))
+    return replace(fit, runs=tuple(refilled(fit)))
+
+
+def _moved(fit: NoiseFit, by: Array) -> NoiseFit:
+    """The fit with its common numbers changed by so much."""
+    now = numbers_of(fit)
+    return _with_common(fit, np.array([now[name] for name, _ in fit.model.order]) + by)
+
+
+def _objective(fit: NoiseFit, refilled: Refilled, sizes: Array, point: Array) -> float:
+    """-2 ln L around the fit, in these sizes of steps."""
+    return _minus_log_likelihood(_moved(fit, sizes * point), refilled)
+
+
+def _minus_log_likelihood(fit: NoiseFit, refilled: Refilled) -> float:
+    """-2 ln L with the commands of this plant."""
+    if min(fit.numbers.delay, *fit.numbers.lags, math.inf) < 0.0:
+        return math.inf
+    known = replace(fit.model, names=())
+    return known.likelihood(refilled(fit), fit.trim).objective(fit.with_gain)
 
 
 def _with_common(fit: NoiseFit, values: Array) -> NoiseFit:
@@ -149,7 +192,8 @@ def _covariance(objective: Callable[[Array], float], point: Array) -> Array | No
     found: Array | None = None
     for _ in range(WIDER):
         curvature = _curvature(objective, point, scale)
-        if np.all(np.linalg.eigvalsh(curvature) > 0.0):
+        finite = bool(np.all(np.isfinite(curvature)))
+        if finite and np.all(np.linalg.eigvalsh(curvature) > 0.0):
             cov: Array = np.linalg.inv(0.5 * curvature).astype(np.float64)
             if found is not None:
                 return cov if np.linalg.det(cov) > np.linalg.det(found) else found
@@ -157,7 +201,8 @@ def _covariance(objective: Callable[[Array], float], point: Array) -> Array | No
         elif found is not None:
             return found
         else:
-            scale = 2.0 * scale
+            # Where a step leads beyond a bound, such as a lag below zero, shorter ones do not.
+            scale = (2.0 if finite else 0.5) * scale
     return found
 
 

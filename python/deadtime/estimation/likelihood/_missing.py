@@ -116,6 +116,7 @@ def with_missing(
     predicted: Predicted | None = None,
     step: int | None = None,
     shared: float | None = None,
+    closed: bool = False,
 ) -> HeldCommands:
     """The commands of all samples of the controller, from those of the first rows.
 
@@ -173,12 +174,15 @@ def with_missing(
         commands.append(sent)
         until = np.append(at[1:], time[gap + 1])
         slopes = _slopes(loop, sent)
+        shared_by_all = float(slopes.max())
+        if count >= HOLE and closed:
+            slopes, shared_by_all = _closed(loop, slopes)
         computed += zip(at.tolist(), until.tolist(), slopes.tolist(), strict=True)
         if count >= HOLE:
             # The output that is predicted has errors too, which all these commands share.
             free = at[slopes > 0.0]
             if free.size:
-                computed.append((float(free[0]), ends[1], error * float(slopes.max())))
+                computed.append((float(free[0]), ends[1], error * shared_by_all))
         if not known or (count >= HOLE and shared is None):
             ambiguous.append((count, ends))
     ambiguous.sort(key=lambda pair: -pair[0])
@@ -197,6 +201,26 @@ def _slopes(loop: ControlLoop, sent: Array) -> Array:
     gain = abs(loop.controller.gains.get("Kp", 0.0))
     limit = math.inf if loop.limit is None else loop.limit
     return np.where(np.abs(sent) < limit, gain, 0.0)
+
+
+def _closed(loop: ControlLoop, slopes: Array) -> tuple[Array, float]:
+    """Change of the sum of the commands by an error of each output they are computed from.
+
+    The loop answers an error: with the response M of the outputs to the commands and their slopes
+    K, the commands change by (I + K M)^-1 K e. The second number is the mean change of a command
+    by an error that all outputs share.
+    """
+    from scipy import linalg
+
+    known = {"gain": 1.0, **loop.parameters}
+    sample_time = loop.sample_time or 1.0
+    pulse = path_of(loop.plant, np.array([0.0, sample_time]), np.array([1.0, 0.0]))
+    ages = sample_time * np.arange(float(slopes.size)) - known["delay"]
+    response = known["gain"] * pulse.value(np.asarray(ages, float), known)
+    M = linalg.toeplitz(response, np.zeros(slopes.size))
+    change = np.linalg.solve(np.eye(slopes.size) + slopes[:, None] * M, np.diag(slopes))
+    sums = change.sum(axis=0)
+    return np.abs(sums), abs(float(sums.sum())) / max(1, int(np.count_nonzero(slopes)))
 
 
 def smoothed(values: Array) -> tuple[Array, float]:
@@ -244,24 +268,43 @@ def predicted_commands(
     first: HeldCommands,
     step: int | None,
     unsure: bool = True,
+    calm: bool = False,
 ) -> HeldCommands:
-    """Commands between rows from the output that `loop` predicts there, starting from `first`."""
+    """Commands between rows from the output that `loop` predicts there, starting from `first`.
+
+    What moves the output beside the commands is interpolated between rows. Where it is `calm`, none
+    does, and across many missing rows the loop is predicted from those before.
+    """
     commands = first
     known = {"gain": 1.0, **loop.parameters}
     rows = slice(0, command.size)
     time, output = recording.time[rows], recording.output[rows]
-    for _ in range(ROUNDS):
+    apart = np.diff(time) / (loop.sample_time or math.inf)
+    holes = np.flatnonzero(calm & (apart > HOLE + 0.5))
+    for _ in range(ROUNDS + calm * first.longest):
         path = path_of(loop.plant, commands.time, commands.command)
 
         def modelled(times: Array, path: Path = path) -> Array:
             return np.asarray(known["gain"] * path.value(times - known["delay"], known))
 
-        left, error = smoothed(output - modelled(time))
+        beside = output - modelled(time)
+        left, error = smoothed(beside)
+        level = left.copy()
+        if holes.size:
+            pieces = np.split(beside, holes + 1)[:-1]
+            level[holes] = [one.mean() for one in pieces]
+            error = max(1.0 / math.sqrt(one.size) for one in pieces)
 
-        def predicted(times: Array, left: Array = left, modelled: Predicted = modelled) -> Array:
-            return modelled(times) + np.interp(times, time, left)
+        def predicted(
+            times: Array, left: Array = left, level: Array = level, modelled: Predicted = modelled
+        ) -> Array:
+            before = np.searchsorted(time, times, side="right") - 1
+            across = np.isin(before, holes)
+            return modelled(times) + np.where(across, level[before], np.interp(times, time, left))
 
-        again = with_missing(recording, loop, command, predicted, step, None if unsure else error)
+        again = with_missing(
+            recording, loop, command, predicted, step, None if unsure else error, calm
+        )
         moved = float(np.max(np.abs(again.command - commands.command)))
         commands = again
         if moved <= SETTLED * float(np.ptp(command)):

@@ -38,6 +38,7 @@ from deadtime.estimation.likelihood._free_numbers import (
 from deadtime.estimation.likelihood._lost_commands import (
     LostCommandsProfile,
     Refilled,
+    is_calm,
     with_lost_commands,
 )
 from deadtime.estimation.likelihood._missing import predicted_commands, with_missing
@@ -256,8 +257,9 @@ def _estimated(
         # Single rows are predicted well enough. Where most are missing, as in a log at a lower
         # rate, the likelihood has too many kinks.
         few = all(one.commands.time.size < 2 * one.logged.size for one in models)
-        if missing > 1 and few and not (numbers or is_long(rows)):
-            joint = with_lost_commands(fit, _refilling(linear, models, runs, step), missing)
+        period = fitted[0].loop.sample_time
+        if missing > 1 and few and period and not (numbers or is_long(rows)):
+            joint = with_lost_commands(fit, _refilling(linear, models, runs, step), period)
     if joint is not None:
         fit, cov = joint
         profile: LikelihoodProfile = LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
@@ -421,8 +423,9 @@ def _refilling(
             if one.commands.computed:
                 loop = run.loop.replace(**values)
                 # The next plant is near.
+                calm = not unsure and is_calm(fit, i)
                 commands[i] = predicted_commands(
-                    run.recording, loop, one.logged, commands[i], step, unsure
+                    run.recording, loop, one.logged, commands[i], step, unsure, calm
                 )
                 rows = one.refilled(rows, commands[i], abs(fit.gain))
             found.append(rows)
