@@ -105,3 +105,17 @@ def test_the_estimate_survives_a_copy():
     again = pickle.loads(pickle.dumps(fit))
     assert isinstance(again._profile, colour.ColouredProfile)
     assert again.ci(0.9) == fit.ci(0.9)
+
+
+def test_squares_of_coloured_rows_vary_more_along_a_slow_direction():
+    # Autocorrelations 0.7^k: squares have 0.49^k, and along a constant the factor is their sum.
+    random = np.random.default_rng(5)
+    rows = signal.lfilter([1.0], [1.0, -0.7], random.standard_normal((400, 3000)))[:, 2000:]
+    slow = np.cos(2.0 * np.pi * np.arange(1000) / 500.0)
+    rows /= rows.std()
+    found = np.var((rows**2) @ slow) / (2.0 * slow @ slow)
+    told = np.mean([colour.colour_of_squares(row, slow) for row in rows])
+    assert told == pytest.approx(found, rel=0.25)
+    assert found > 2.0
+    white = random.standard_normal(1000)
+    assert colour.colour_of_squares(white, slow) < 1.2

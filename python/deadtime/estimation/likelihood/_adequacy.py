@@ -31,7 +31,11 @@ from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whitenes
 from deadtime.estimation.likelihood._agreement import contradictions
 from deadtime.estimation.likelihood._air_at_rest import air_at_rest
 from deadtime.estimation.likelihood._changing_delay import NONE_SEEN, delay_change
-from deadtime.estimation.likelihood._colour_at_rest import colour_at_rest, overshoots
+from deadtime.estimation.likelihood._colour_at_rest import (
+    colour_at_rest,
+    colour_of_squares,
+    overshoots,
+)
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
@@ -141,7 +145,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
                 f"{stated(change.spread, math.nan, 's')} (standard deviation)"
             )
         mask = used[index]
-        if grows_with_speed(part.whitened[mask], part.rate[mask]) < SIGNIFICANCE:
+        if grows_with_speed(part.whitened[mask], part.rate[mask], coloured) < SIGNIFICANCE:
             reasons.append(
                 f"the noise grows with the speed of the output{where}, as where time stamps are "
                 "not the times of the samples"
@@ -249,7 +253,7 @@ def below_zero(fit: NoiseFit) -> float:
     return float(special.ndtr(-size))
 
 
-def grows_with_speed(whitened: Array, rate: Array) -> float:
+def grows_with_speed(whitened: Array, rate: Array, coloured: bool = False) -> float:
     """Probability of squares that grow so much with the squared speed, for equal variances."""
     from scipy import special
 
@@ -260,4 +264,5 @@ def grows_with_speed(whitened: Array, rate: Array) -> float:
         return 1.0
     slope = float(speed @ squares) / power
     # The variance of the square of a Gaussian of variance one is two.
-    return float(0.5 * special.erfc(slope * math.sqrt(power) / math.sqrt(2.0) / math.sqrt(2.0)))
+    wider = colour_of_squares(whitened, speed) if coloured else 1.0
+    return float(0.5 * special.erfc(slope * math.sqrt(power / wider) / 2.0))

@@ -118,6 +118,25 @@ def overshoots(fit: NoiseFit) -> tuple[PlantNumbers, float]:
     return best, 0.5 * float(special.chdtrc(1, rise) + special.chdtrc(2, rise))
 
 
+def colour_of_squares(whitened: Array, direction: Array) -> float:
+    """The variance of the squares of coloured residuals along a direction, over that of white ones.
+
+    Squares of Gaussian rows have the squared autocorrelations.
+    """
+    shares = _tapered(whitened) ** 2
+    size = direction.size
+    products = np.array([direction[lag:] @ direction[: size - lag] for lag in range(shares.size)])
+    return max(1.0, float(2.0 * shares @ products / products[0]) - 1.0)
+
+
+def _tapered(whitened: Array) -> Array:
+    """Autocorrelations up to `WINDOW`, that at zero first, in Bartlett's window."""
+    lags = np.arange(min(WINDOW, whitened.size - 1) + 1)
+    power = float(whitened @ whitened)
+    found = [float(whitened[lag:] @ whitened[: whitened.size - lag]) / power for lag in lags]
+    return np.asarray((1.0 - lags / (WINDOW + 1)) * np.array(found))
+
+
 def _autocorrelations(whitened: Array, used: Mask) -> tuple[Array, Array]:
     """Autocorrelations of these rows, and the pairs of which each is known."""
     values = np.where(used, whitened, 0.0)
@@ -134,12 +153,9 @@ def _factors(profile: LikelihoodProfile) -> dict[str, float]:
     plain, spread = np.zeros((size, size)), np.zeros((size, size))
     for run, rows in enumerate(fit.runs):
         columns = _columns(fit, run)[rows.used]
-        values = fit.parts[run].whitened[rows.used]
-        power = float(values @ values)
         plain = plain + columns.T @ columns
         spread = spread + columns.T @ columns
-        for lag in range(1, min(WINDOW, values.size - 1) + 1):
-            share = (1.0 - lag / (WINDOW + 1)) * float(values[lag:] @ values[:-lag]) / power
+        for lag, share in enumerate(_tapered(fit.parts[run].whitened[rows.used])[1:], 1):
             product = columns[lag:].T @ columns[:-lag]
             spread = spread + share * (product + product.T)
     bread = np.linalg.pinv(plain, hermitian=True)
