@@ -2,8 +2,8 @@
 
 Estimates of commands that were lost, of a delay that changes and of a plant that lacks a lag should
 be called inadequate. Here the best test does that: the likelihood ratio (Neyman & Pearson 1933) by
-one who knows the noise and how large such faults are. Delay, gain and level, which every estimate
-fits, are unknown to it too. Its power is the share of recordings with the fault in which it finds
+one who knows the noise and how large such faults are. Delay, gain and level, and a lag that is
+fitted, are unknown to it too. Its power is the share of recordings with the fault in which it finds
 it, where one in ten without is called faulty as well: more than that may not be, because nine in
 ten good recordings have to be adequate. No method finds more.
 
@@ -55,7 +55,7 @@ def power(condition: Condition, runs: int) -> float:
 
 def has_power(condition: Condition) -> bool:
     """Whether a condition is one of these faults, beside noise that is known here."""
-    lacks_lag = condition.lag and "lag" not in condition.free
+    lacks_lag = condition.second_lag or (condition.lag and "lag" not in condition.free)
     return bool(
         condition.delay_ramp or condition.delay_wander or condition.commands_lost or lacks_lag
     )
@@ -100,22 +100,30 @@ def _later(run: Run) -> Array:
 
 
 def _length_of_lag(condition: Condition, run: Run) -> float:
-    """Distance of the response with the lag from the nearest without."""
+    """Distance of the response with all lags from the nearest with one less."""
     vehicle = run.vehicle
     _, V = linearised(condition, run, ["delay", "gain", "level"])
     whitener, _ = whitener_of(V)
     truth = whitener @ response(run.times, run.arrivals, run.command, vehicle.lags)
     jumps = np.diff(run.command, prepend=0.0)
+    fitted = vehicle.lags[:-1]
 
-    def left(delay: float) -> float:
-        unit = ramp(run.times[:, None] - run.times - delay, ()) @ jumps
+    def left(point: Array) -> float:
+        if np.any(point <= 0.0):
+            return math.inf
+        unit = ramp(run.times[:, None] - run.times - point[0], point[1:].tolist()) @ jumps
         columns = whitener @ np.stack([unit, np.ones_like(unit)], axis=1)
         return float(np.linalg.norm(truth - columns @ np.linalg.lstsq(columns, truth)[0]))
 
-    delays = vehicle.delay + np.linspace(0.0, 1.5, 31) * sum(vehicle.lags)
-    best = float(delays[int(np.argmin([left(delay) for delay in delays]))])
-    width = 0.1 * sum(vehicle.lags)
-    found = optimize.minimize_scalar(left, bounds=(best - width, best + width), method="bounded")
+    # The delay, or the lags, take the place of the one that is left out, or share it.
+    more = vehicle.lags[-1] * np.linspace(0.0, 1.5, 31)
+    starts = [np.array([vehicle.delay + one, *fitted]) for one in more]
+    if fitted:
+        starts += [np.array([vehicle.delay, *(one + lag for lag in fitted)]) for one in more]
+    best = min(starts, key=left)
+    sizes = 0.1 * vehicle.lags[-1] * np.eye(best.size)
+    options = {"initial_simplex": np.vstack([best, best + sizes]), "xatol": 1e-5, "fatol": 1e-4}
+    found = optimize.minimize(left, best, method="Nelder-Mead", options=options)
     return vehicle.gain * float(found.fun)
 
 
