@@ -60,6 +60,9 @@ SENSOR, SENSOR_TIME = 1.0, 2.0
 #: the lower bound of its deviation.
 PRICE_OF_SENSOR, PRICE_OF_TRIM, PRICE_OF_SCATTER = 4.0, 9.0, 4.0
 
+#: Air with a shorter time constant, in rows, may be coloured noise of the sensor.
+FAST = 3.0
+
 #: Rise of −2 ln L without air up to which it is none.
 IDLE = 1e-3
 
@@ -261,7 +264,7 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
         found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
     best = min(found, key=_criterion)
-    best = min([best, *_with_sensor(best)], key=_criterion)
+    best = min([best, *_with_sensor(best)], key=_criterion_beside_sensor)
     best = without_idle_air(min([best, *_with_scatter(best)], key=_criterion))
     return without_idle_air(best.moved(best.likelihood.fit(best.numbers)))
 
@@ -345,6 +348,18 @@ def _objective(numbers: PlantNumbers) -> float:
 
 def _criterion(fit: NoiseFit) -> float:
     return fit.criterion
+
+
+def _criterion_beside_sensor(fit: NoiseFit) -> float:
+    """Akaike's criterion where fast air has its price too.
+
+    It moves the output as a sensor's noise of long correlation does, which may take its place.
+    """
+    fast = any(
+        noise.air > 0.0 and noise.air_time < FAST * float(np.median(np.diff(rows.time)))
+        for noise, rows in zip(fit.numbers.noise, fit.runs, strict=True)
+    )
+    return fit.criterion + PRICE_OF_SENSOR * fast
 
 
 def airs_of(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise]]:
