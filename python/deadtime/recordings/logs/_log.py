@@ -302,7 +302,7 @@ def log_of(contents: LogContents, names: AutopilotNames, source: str) -> Log:
         duration=stop - start,
         parameters=dict(contents.parameters),
         key_parameters=key,
-        modes=tuple((max(0.0, at - start), name) for at, name in contents.modes),
+        modes=tuple((max(0.0, at - start), printable(name)) for at, name in contents.modes),
         loops=FrozenDict(loops),
         gaps=tuple((low - start, high - start) for low, high in contents.gaps),
         remarks=tuple(dict.fromkeys(map(printable, remarks))),
