@@ -45,6 +45,9 @@ STEPS, SETTLED, LARGEST = 12, 0.1, 0.5
 #: Windows below which a line of times says nothing about its error.
 LEAST = 3
 
+#: Drift over the log that matters, as a share of the 95 % interval: the interval then covers 93 %.
+WORTH = 0.1
+
 #: Width of a 95 % interval in standard errors.
 TWO_SIDED = 3.92
 
@@ -86,7 +89,6 @@ def why_two_clocks(
     windows: Sequence[Window],
     command: Stamped,
     response: Stamped,
-    worth: float,
 ) -> str:
     """Why the clocks of a log make its estimate doubtful; empty where they do not.
 
@@ -98,18 +100,17 @@ def why_two_clocks(
         All windows of the log that tell something.
     command, response : (str, ndarray)
         Name and stamps of each signal.
-    worth : float
-        An error of the time from command to response that matters, s.
     """
     start, stop = response[1][[0, -1]].tolist()
     length = stop - start
+    low, high = fit.ci(0.95, "delay+lag")
+    worth = WORTH * (high - low)
     names = f"{command[0]} and {response[0]}"
     stamps = rates_apart(command[1], response[1])
     apart = 0.0 if stamps is None or abs(stamps.value) <= stamps.most else stamps.value
     grows = growth_of(fit, windows, start)
     if grows is not None and not grows.may_be(0.0) and abs(grows.value) * length > worth:
         by = stated(grows.value, grows.error, "s")
-        low, high = fit.ci(0.95, "delay+lag")
         error = math.hypot(grows.start_error, (high - low) / TWO_SIDED)
         first = stated(fit.delay_plus_lag + grows.start, error, "s")
         also = f", whose stamps do so by {1e6 * abs(apart):.0f} ppm" if apart else ""

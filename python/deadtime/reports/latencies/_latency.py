@@ -248,7 +248,7 @@ def latency(
     proportional controller. From the setpoint the plant follows its command;
     from what the controller commands it integrates.
 
-    Where command and response are stamped by clocks that drift apart, by more than a quarter of the
+    Where command and response are stamped by clocks that drift apart, by more than a tenth of the
     interval over the log, the estimate is not adequate. The time of each window over the log tells
     that, and stamps that are regular.
 

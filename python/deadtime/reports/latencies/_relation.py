@@ -191,8 +191,7 @@ def doubted_by_clocks(
     """
     if found.estimate is None:
         return found
-    low, high = found.estimate.ci(0.95, "delay+lag")
-    why = why_two_clocks(found.estimate, seen, command, response, WORTH * (high - low))
+    why = why_two_clocks(found.estimate, seen, command, response)
     return replace(found, estimate=_doubted(found.estimate, why)) if why else found
 
 
