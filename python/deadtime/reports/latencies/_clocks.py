@@ -113,7 +113,7 @@ def why_two_clocks(
         by = stated(grows.value, grows.error, "s")
         error = math.hypot(grows.start_error, (high - low) / TWO_SIDED)
         first = stated(fit.delay_plus_lag + grows.start, error, "s")
-        also = f", whose stamps do so by {1e6 * abs(apart):.0f} ppm" if apart else ""
+        also = f", whose stamps do so by {1e6 * abs(apart):.3g} ppm" if apart else ""
         return (
             f"the time from command to response grows by {by} each second, as where {names} are "
             f"stamped by clocks that drift apart{also}, or where the vehicle changes; when the log "
@@ -122,7 +122,7 @@ def why_two_clocks(
     if abs(apart) * length <= worth or not (grows is None or grows.may_be(apart)):
         return ""
     return (
-        f"the stamps of {names} drift apart by {1e6 * abs(apart):.0f} ppm: if they are those of "
+        f"the stamps of {names} drift apart by {1e6 * abs(apart):.3g} ppm: if they are those of "
         f"two clocks, the time is wrong by {stated(abs(apart), 0.0, 's')} for each second since "
         "both agreed"
     )
