@@ -11,6 +11,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
+from deadtime._base.digits import between, stated
 from deadtime._cli.fly import _print_study
 from deadtime.flights import FlightPlan, FlownSteps, fly_experiment
 from deadtime.flights import _learn as learn_module
@@ -273,7 +274,11 @@ def test_the_paper_s_experiment_is_reproduced(tmp_path):
     assert 0.0 < high - low < 0.03
     assert learned.split.transport.delay == pytest.approx(0.26, abs=0.006)
     assert learned.split.vehicle_delay == pytest.approx(0.142, abs=0.015)
-    assert f"between {fit.ci(0.95, 'delay+lag')[0]:.3f}" in found.verdict()
+    ends = between(*fit.ci(0.95, "delay+lag"), fit.stderr["delay+lag"], "s")
+    assert (
+        f"{stated(fit.delay_plus_lag, fit.stderr['delay+lag'], 's')}, {ends} with"
+        in found.verdict()
+    )
     best, after = found.checked
     assert isinstance(after.controller, dtm.PV)
     assert after.overshoot < 5.0

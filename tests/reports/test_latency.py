@@ -5,7 +5,7 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime._base.digits import between, rounded, stated
+from deadtime._base.digits import between, rounded, shown, stated
 from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
 from flights import flight_path
 from hypothesis import given
@@ -244,6 +244,14 @@ def test_poles_in_a_row_have_their_corner_together(number):
 )
 def test_numbers_have_the_digits_of_their_error(value, error, unit, text):
     assert stated(value, error, unit) == text
+
+
+def test_errors_of_rounding_are_not_shown():
+    assert stated(0.1, 1e-16, "s") == "100 ms"
+    assert shown(0.1, 1e-16, "s") == "100 ms"
+    assert shown(0.10012, 3e-4, "s") == "100.1 ms"
+    assert between(0.1, 0.1 + 1e-16, 1e-16, "s") == "100 to 100 ms"
+    assert stated(0.1, 1e-9, "s") == "100.0000000 ± 0.0000010 ms"
 
 
 def test_ends_of_an_interval_have_them_too():

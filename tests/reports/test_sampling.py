@@ -2,13 +2,17 @@
 
 import os
 from dataclasses import replace
+from types import SimpleNamespace
 
+import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation.likelihood._missing import with_lost
 from deadtime.estimation.likelihood._rows import on_same_step, rounding_of
-from deadtime.reports.latencies._controller import period_of, smeared
+from deadtime.reports.latencies._clocks import growth_of, rates_apart
+from deadtime.reports.latencies._controller import between_rows, period_of, smeared
 from deadtime.reports.latencies._latency import _told
+from deadtime.reports.latencies._windows import seen_windows
 from sampled_loops import LOGGERS, fly, made
 from scipy import stats
 
@@ -22,6 +26,9 @@ DOUBTED = {
     ("rate", "scattered stamps"),
     ("rate", "steps of 1 deg/s, little noise"),
     ("height", "steps of 0.1 hPa"),
+    ("rate", "clocks drift by 100 ppm"),
+    ("height", "clocks drift by 100 ppm"),
+    ("long height", "clocks drift by 100 ppm, scattered stamps"),
 }
 
 #: Logs of the survey (`benches/README.md` has what came out of more), and the probability of a
@@ -112,3 +119,94 @@ def test_lines_between_rare_rows_of_a_command_are_known_to_what_their_changes_te
     assert smeared(log, "rate", steps, 0.0, 2.0) == pytest.approx(expected)
     # Intervals of 2 ms did not know of it: of 28 such answers 18 held the truth.
     assert answered("rate", "commands: every fifth row", 1007)[1] is None
+
+
+def test_clocks_that_drift_apart_are_named_with_their_rate():
+    # Over a short log the stamps alone tell.
+    flight, log = made("rate", "clocks drift by 100 ppm", 1001)
+    message = _told(log, log.loop(flight.kind.loop), "actuator").estimate.message
+    assert (
+        "the stamps of vehicle_torque_setpoint.xyz[0] and vehicle_angular_velocity.xyz[0] drift "
+        "apart by 100 ppm: if they are those of two clocks, the time is wrong by 100 µs for each"
+    ) in message
+    # Over a long one the time from command to response, whatever the stamps look like.
+    flight, log = made("long height", "clocks drift by 100 ppm, scattered stamps", 1000)
+    one = _told(log, log.loop(flight.kind.loop), "actuator")
+    assert "the time from command to response grows by " in one.estimate.message
+
+
+def growths(logger, seeds):
+    """Growths of the time, less its true value, in their errors; and of the first time."""
+    for seed in seeds:
+        flight, log = made("long height", logger, seed)
+        loop = log.loop(flight.kind.loop)
+        between = between_rows(log, "position", loop.actuator)
+        seen = seen_windows(loop, "actuator", integrates=True, between=between)
+        vehicle = dtm.FactoredPlant([flight.lag], gain=flight.gain, integrator=True)
+        truth = SimpleNamespace(
+            delay=flight.delay,
+            delay_plus_lag=flight.delay_plus_lag,
+            loop=dtm.ControlLoop(vehicle, dtm.P(1.0), delay=flight.delay),
+        )
+        found = growth_of(truth, [one for one in seen if one.tells], 0.0)
+        true = 1e-4 * ("drift" in logger)
+        assert found.may_be(true)
+        yield (found.value - true) / found.error, found.start / found.start_error
+        assert found.may_be(0.0) != ("drift" in logger)
+
+
+@pytest.mark.parametrize(
+    "logger", ["an oscillator of its own", "clocks drift by 100 ppm, scattered stamps"]
+)
+def test_the_time_grows_with_the_drift_of_the_clocks(logger):
+    off = np.array(list(growths(logger, range(2000, 2012))))
+    assert np.all(np.abs(np.mean(off, axis=0)) < 3.0 / np.sqrt(len(off)))
+    assert np.all(np.std(off, axis=0) < 2.0)
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+def test_stamps_tell_how_fast_their_clocks_are(gaps):
+    random = np.random.default_rng(1)
+    sent = np.round(0.0025 * np.arange(4000), 6)
+    received = np.round((1.0 + 7e-5) * (0.001 * np.arange(10_000) + 0.0003), 6)
+    if gaps:
+        sent, received = (one[random.uniform(size=one.size) < 0.7] for one in (sent, received))
+    found = rates_apart(sent, received)
+    assert abs(found.value - 7e-5) < found.most < 1e-6
+    # Stamps that scatter tell less, and say so.
+    found = rates_apart(sent, received + random.uniform(-2e-4, 2e-4, received.size))
+    assert abs(found.value - 7e-5) < found.most
+
+
+def test_stamps_that_are_not_regular_tell_no_rate():
+    random = np.random.default_rng(1)
+    regular = 0.0025 * np.arange(2000)
+    assert rates_apart(regular, np.sort(random.uniform(0.0, 5.0, 2000))) is None
+    assert rates_apart(regular[:40], regular) is None
+    # Periods in no ratio of small whole numbers, as of tasks that have nothing to do with another.
+    assert rates_apart(regular, 0.00207 * np.arange(2000)) is None
+
+
+def test_a_recording_with_commands_of_another_clock_is_doubted():
+    flight, _ = made("long height", "every row", 1000)
+    found = {}
+    for apart in (0.0, 1e-4):
+        recording = dtm.Recording(
+            flight.time * (1.0 + apart),
+            flight.setpoint,
+            flight.read,
+            sent=(flight.time, flight.sent),
+        )
+        (found[apart],) = dtm.latency(recording).loops
+    assert found[0.0].estimate.adequate
+    assert (
+        "the commands and the rows are stamped by clocks that drift" in found[1e-4].estimate.message
+    )
+    # A short one has no parts; its stamps tell.
+    rows = slice(1000)
+    short = dtm.Recording(
+        flight.time[rows] * (1.0 + apart), flight.setpoint[rows], flight.read[rows],
+        sent=(flight.time[rows], flight.sent[rows]),
+    )  # fmt: skip
+    message = dtm.latency(short).loops[0].estimate.message
+    assert "the stamps of the commands and the rows drift apart by 100 ppm" in message

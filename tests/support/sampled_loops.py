@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from deadtime.recordings.logs._autopilots import names_of
@@ -254,6 +254,29 @@ def uneven(random: np.random.Generator, flight: Flight) -> Array:
     return np.asarray(flight.time[:-1] + late)
 
 
+def own_oscillator(apart: float) -> Logger:
+    """The response read by a task whose period is longer by this share, and stamped rightly."""
+
+    def times(random: np.random.Generator, flight: Flight) -> Array:
+        period = (1.0 + apart) * flight.kind.period
+        return np.arange(random.uniform() * period, flight.time[-1] - 1e-6, period)
+
+    return _read_at(times)
+
+
+def drifting(apart: float, scatter: float = 0.0) -> Logger:
+    """Stamps of the response by a clock that is faster by this share since the log began.
+
+    They scatter by a share of a period, too.
+    """
+
+    def change(rows: Rows, random: np.random.Generator, flight: Flight) -> Rows:
+        way = random.uniform(-1.0, 1.0, rows.time.size)
+        return rows.stamped(apart * rows.time + scatter * flight.kind.period * way)
+
+    return _logged(change, "response")
+
+
 def every(number: int, name: str) -> Logger:
     """Only every so-many-th row of a signal."""
     return _logged(lambda rows, random, _: rows.every(number, int(random.integers(number))), name)
@@ -323,6 +346,7 @@ COMMON: dict[str, Logger] = {
     "30 % of the response repeated": repeated(0.3),
     "uneven rows": _read_at(uneven),
     "scattered stamps": scattered(0.4),
+    "clocks drift by 100 ppm": drifting(1e-4),
 }
 LOGGERS: dict[str, tuple[Kind, dict[str, Logger]]] = {
     "rate": (
@@ -344,6 +368,14 @@ LOGGERS: dict[str, tuple[Kind, dict[str, Logger]]] = {
             "steps of 1 cm": rounded(0.01, 1.0),
             "steps of 1 cm, little noise": rounded(0.01, 0.2),
             "steps of 0.1 hPa": rounded(0.84, 1.0),
+        },
+    ),
+    "long height": (
+        replace(HEIGHT, seconds=120.0),
+        {
+            "every row": COMMON["every row"],
+            "an oscillator of its own": own_oscillator(1e-4),
+            "clocks drift by 100 ppm, scattered stamps": drifting(1e-4, 0.1),
         },
     ),
 }

@@ -1,5 +1,8 @@
 """Small logs of autopilots, of at most 4 kB each: a corpus to damage."""
 
+import numpy as np
+from blackbox_logs import END, rate_log, rate_rows
+from crazyflie_logs import definitions, record, sealed
 from made_logs import Tlog, ULogFile, as_text, copter
 
 
@@ -47,9 +50,27 @@ def small_tlog():
     return log.data
 
 
+def small_blackbox():
+    log = rate_log()
+    armed, *rest = rate_rows(40, np.random.default_rng(0))
+    frames = [log.main(armed), log.slow_frame([1, 0, 0, 1, 1]), *map(log.main, rest)]
+    return log.head() + b"".join(frames) + END
+
+
+def small_crazyflie():
+    names = ("controller.rollRate", "gyro.x", "controller.cmd_roll", "stabilizer.thrust")
+    events = {1: ("fixedFrequency", list(zip(names, "ffhf", strict=True))), 2: ("mark", [])}
+    rows = [(k % 5, (k - 1) % 5, 100 * (k % 7), 4e4) for k in range(120)]
+    frames = [record(events, 1, 1_000_000 + 2000 * k, row) for k, row in enumerate(rows)]
+    frames.insert(60, record(events, 2, 1_119_000, ()))
+    return sealed(definitions(events) + b"".join(frames))
+
+
 SMALL = {
     "ULog": ("pyulog", small_ulog),
     "DataFlash": ("numpy", lambda: copter(60).data),
     "DataFlash text": ("numpy", small_text),
     "tlog": ("pymavlink", small_tlog),
+    "Blackbox": ("numpy", small_blackbox),
+    "Crazyflie uSD": ("numpy", small_crazyflie),
 }

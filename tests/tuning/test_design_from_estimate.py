@@ -9,6 +9,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime._base.digits import between
 from deadtime.tuning._region import region_of
 from scipy import special
 
@@ -93,7 +94,8 @@ def test_margins_hold_in_the_whole_region(fit):
         margin = best.loop.replace(**one).margin().gain_margin
         assert margin >= best.margins.gain_margin * (1.0 - 1e-3)
     told = best.summary()
-    assert "worst over the joint 95 % region of the estimate (delay 0." in told
+    delays = between(*best.region.intervals["delay"], np.nan, "s")
+    assert f"worst over the joint 95 % region of the estimate (delay {delays}, gain 0." in told
     assert "the true loop has these margins with a probability of 95 %" in told
     assert "were the estimate exact" in told
     alone = dtm.design(fit.loop, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))

@@ -10,6 +10,9 @@ TIMES = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6))
 #: Share of its error below which a value is shown as zero.
 NEXT_TO_NOTHING = 0.02
 
+#: Share of a value below which its error is that of rounding, and is not shown.
+ROUNDING = 1e-9
+
 #: Most digits behind the point, and digits of a number without an error.
 MOST, PLAIN = 12, 4
 
@@ -49,6 +52,8 @@ def stated(value: float, error: float, unit: str = "") -> str:
     >>> stated(0.0121, 0.48, "s")
     '12 ± 500 ms'
     """
+    if error < ROUNDING * abs(value):
+        error = 0.0
     unit, factor = time_unit(value, error) if unit == "s" else (unit, 1.0)
     behind = f" {unit}" if unit else ""
     value, error = value / factor, error / factor
@@ -61,12 +66,22 @@ def stated(value: float, error: float, unit: str = "") -> str:
     return f"{rounded(value, least)} ± {rounded(error, error)}{behind}"
 
 
+def shown(value: float, error: float, unit: str = "") -> str:
+    """The value with as many digits as `stated` gives it, without the error: "3.42 ms"."""
+    if error < ROUNDING * abs(value):
+        error = 0.0
+    unit, factor = time_unit(value, error) if unit == "s" else (unit, 1.0)
+    return f"{rounded(value / factor, error / factor)} {unit}".rstrip()
+
+
 def between(low: float, high: float, error: float, unit: str = "") -> str:
     """Both ends of an interval, to the digits of the standard error: "3.31 to 3.53 ms"."""
     unit, factor = time_unit(max(abs(low), abs(high)), error) if unit == "s" else (unit, 1.0)
     if not (math.isfinite(error) and error > 0.0):
         error = 0.1 * (high - low)
     error = min(error, 0.5 * (high - low) or error)
+    if error < ROUNDING * max(abs(low), abs(high)):
+        error = 0.0
     ends = " to ".join(rounded(end / factor, error / factor) for end in (low, high))
     return f"{ends} {unit}".rstrip()
 

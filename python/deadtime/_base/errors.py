@@ -96,6 +96,9 @@ class NotIdentifiableError(DeadtimeError):
 class RecordingError(DeadtimeError, ValueError):
     """A recording cannot be used as it is; the message says what is wrong and where."""
 
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
+
 
 class MissingExtraError(DeadtimeError, ImportError):
     """An optional package is not installed; the message holds the line that installs it."""
@@ -125,3 +128,12 @@ class FlightAbortedError(LinkError):
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
+
+
+def printable(text: str) -> str:
+    r"""Text that may come from a file, in one line: escapes stand for what cannot be printed.
+
+    >>> print(printable("Quad\nrotor \x1b[2J"))
+    Quad\nrotor \x1b[2J
+    """
+    return "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from deadtime._base.digits import shown, stated
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
@@ -129,7 +130,7 @@ def command(
         return
     rows = [_row(run, printed) for run in found.runs]
     print_table(results_table(HEADS, rows, "Times in ms"))
-    print_text("means, 95 % intervals, and what was measured, in ms", "dim")
+    print_text("means, 95 % intervals, and what was measured", "dim")
     for method, (label, *_) in LABELS.items():
         print_text(f"{label:<20}{_spread_text(found.spread(method), found.expected(method))}")
     print_points(found.explanation())
@@ -161,7 +162,11 @@ def _row(run: InternetRun, printed: dict[float, float]) -> list[str]:
 
 def _estimate(run: InternetRun, method: str) -> str:
     fit = run.estimates.get(method)
-    return "refused" if fit is None else _ms(fit.delay)
+    if fit is None:
+        return "refused"
+    error = fit.stderr.get("delay", math.nan)
+    told = stated(1e3 * fit.delay, 1e3 * error)
+    return told if fit.adequate and "±" in told else _ms(fit.delay)
 
 
 def _ms(value: float | None) -> str:
@@ -170,8 +175,6 @@ def _ms(value: float | None) -> str:
 
 def _spread_text(spread: Spread, expected: float) -> str:
     """The mean of a method over the runs, its interval, and the measured delay."""
-    interval = ""
-    if math.isfinite(spread.low):
-        how = "corrected by replaying" if spread.replayed else "by the spread of the runs"
-        interval = f"; {how} {_ms(spread.low)} to {_ms(spread.high)}"
-    return f"mean {_ms(spread.mean)}{interval}; measured {_ms(expected)}"
+    interval = f"; {spread.interval}" if spread.interval else ""
+    mean = shown(spread.mean, spread.error, "s") if spread.count else "–"
+    return f"mean {mean}{interval}; measured {stated(expected, math.nan, 's')}"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from deadtime._base.digits import between, stated
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation import DelayEstimate, estimate_delay
 from deadtime.flights._runs import FlownSteps, read_telemetry
@@ -108,17 +109,22 @@ class FlightStudy:
     def verdict(self) -> str:
         """The outcome in a few sentences."""
         fit = self.learned.fit
-        low, high = fit.ci(0.95, "delay+lag")
+        ends = fit.ci(0.95, "delay+lag")
+        whole = fit.stderr["delay+lag"]
         sentences = [
-            f"The delay of the loop, lag included, is {fit.delay_plus_lag:.3f} s, between "
-            f"{low:.3f} and {high:.3f} s with 95 % confidence: a delay of {fit.delay:.3f} s and a "
-            f"lag of {fit.lag or 0.0:.3f} s, at a gain of {fit.gain or 0.0:.3f}."
+            f"The delay of the loop, lag included, is {stated(fit.delay_plus_lag, whole, 's')}, "
+            f"{between(*ends, whole, 's')} with 95 % confidence: a delay of "
+            f"{stated(fit.delay, fit.stderr['delay'], 's')} and a lag of "
+            f"{stated(fit.lag or 0.0, fit.stderr['lag'], 's')}, at a gain of "
+            f"{stated(fit.gain or 0.0, fit.stderr['gain'])}."
         ]
         split = self.learned.split
         if split is not None:
+            link = stated(split.transport.delay, split.transport.stderr["delay"], "s")
+            own = stated(split.vehicle_delay, split.vehicle.stderr[split.late], "s")
             sentences.append(
-                f"According to the vehicle's reports, {split.transport.delay:.3f} s of it is the "
-                f"link and {split.vehicle_delay:.3f} s the vehicle."
+                f"According to the vehicle's reports, {link} of it is the link and {own} the "
+                "vehicle."
             )
         before, after = self.before, self.after
         sentences.append(
@@ -148,7 +154,7 @@ class FlightStudy:
         return found
 
     def parts(self) -> list[tuple[str, ...]]:
-        """The parts of the delay: a name, a value and a 95 % interval, s, for each row."""
+        """The parts of the delay: a name, a value and a 95 % interval for each row."""
         fit, split = self.learned.fit, self.learned.split
         lines: list[tuple[str, ...]] = [
             _part(fit, "delay", "delay, from command and height"),
@@ -157,8 +163,7 @@ class FlightStudy:
         ]
         if split is not None:
             lines.append(_part(split.transport, "delay", "link, from the setpoint it echoes"))
-            late = "delay+time_constant" if "delay" in split.vehicle.free else "time_constant"
-            lines.append(_part(split.vehicle, late, "vehicle, from setpoint to climb"))
+            lines.append(_part(split.vehicle, split.late, "vehicle, from setpoint to climb"))
         return lines
 
     def to_dict(self) -> dict[str, Any]:
@@ -194,10 +199,8 @@ class FlightStudy:
 
 
 def _part(fit: DelayEstimate, name: str, words: str) -> tuple[str, str, str]:
-    low, high = fit.ci(0.95, name)
-    known = {**fit.loop.parameters}
-    value = sum(known[part] for part in name.split("+"))
-    return words, f"{value:.3f}", f"{low:.3f} to {high:.3f}"
+    value, error = fit._value(name), fit.stderr[name]
+    return words, stated(value, error, "s"), between(*fit.ci(0.95, name), error, "s")
 
 
 def _did(flight: FlownSteps) -> str:

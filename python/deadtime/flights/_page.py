@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from deadtime._base.digits import stated
 from deadtime._base.drawing import new_figure
 from deadtime._base.page import escaped, page, picture, table, table_row, write_page
 from deadtime.flights._learn import COLUMNS, FlightStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 
-PARTS = ("what", "s", "95 % interval")
+PARTS = ("what", "time", "95 % interval")
 
 
 def write_flight_page(study: FlightStudy, path: Path, vehicle: str) -> Path:
@@ -65,7 +66,7 @@ def _fitted(study: FlightStudy) -> str:
     fit = learned.fit
     words = (
         f"The residuals of the fit of all flights together are {1e3 * fit.rms:.1f} mm (gain "
-        f"{fit.gain:.3f}); "
+        f"{stated(fit.gain or 0.0, fit.stderr['gain'])}); "
         + (
             "they are white noise."
             if fit.adequate

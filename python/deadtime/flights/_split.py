@@ -52,6 +52,11 @@ class DelaySplit:
     vehicle: DelayEstimate
 
     @property
+    def late(self) -> str:
+        """The name of what the vehicle takes, in its estimate."""
+        return "delay+time_constant" if "delay" in self.vehicle.free else "time_constant"
+
+    @property
     def vehicle_delay(self) -> float:
         """Delay and time constant of the vehicle together, s."""
         return self.vehicle.delay + self.vehicle.loop.parameters["time_constant"]

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.digits import between, shown
 from deadtime.estimation import DelayEstimate
 from deadtime.internet._replay import MAPS, interval_of_mean
 from deadtime.links.udp import Trial
@@ -40,6 +41,9 @@ METHODS = {
 
 #: Names of two of them at the beginning of a sentence.
 IN_WORDS = {"dominant": "The paper's overshoot method", "waveform": "The fit of the waveform"}
+
+#: Width of a 95 % interval in standard errors.
+TWO_SIDED = 3.92
 
 #: Largest spread of ages from processes that wake up late, as a share of the sample time.
 UNSTEADY = 0.3
@@ -67,6 +71,19 @@ class Spread:
     low: float
     high: float
     replayed: bool = False
+
+    @property
+    def error(self) -> float:
+        """The standard error that the interval amounts to, s; NaN without one."""
+        return (self.high - self.low) / TWO_SIDED
+
+    @property
+    def interval(self) -> str:
+        """The interval in words, with how it was found; empty without one."""
+        if not math.isfinite(self.low):
+            return ""
+        how = "corrected by replaying" if self.replayed else "by the spread of the runs"
+        return f"{how} {between(self.low, self.high, self.error, 's')}"
 
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
@@ -228,12 +245,9 @@ class InternetLoop:
                 continue
             expected = self.expected(method)
             hold = "with the hold" if METHODS[method] else "without the hold"
-            interval = ""
-            if math.isfinite(found.low):
-                how = "corrected by replaying" if found.replayed else "by the spread of the runs"
-                interval = f" ({how} {1e3 * found.low:.1f} to {1e3 * found.high:.1f})"
+            interval = f" ({found.interval})" if found.interval else ""
             sentences.append(
-                f"{label} finds {1e3 * found.mean:.1f} ms{interval}, where "
+                f"{label} finds {shown(found.mean, found.error, 's')}{interval}, where "
                 f"{1e3 * expected:.1f} ms was measured, {hold}."
             )
         return sentences

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from typing import TYPE_CHECKING, NamedTuple
 
+from deadtime._base.digits import between
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import ControlLoop
 from deadtime.stability import StabilityMap
@@ -197,7 +198,7 @@ class Design(ReadOnlyArrays):
 def _in_words(region: ConfidenceRegion) -> str:
     """The region with the range of each number."""
     ranges = [
-        f"{name.replace('_', ' ')} {low:.4g} to {high:.4g}{'' if name == 'gain' else ' s'}"
+        f"{name.replace('_', ' ')} {between(low, high, nan, '' if name == 'gain' else 's')}"
         for name, (low, high) in region.intervals.items()
         if low < high
     ]

@@ -13,7 +13,7 @@ import pytest
 from flights import flight_path
 from made_logs import DataFlash, ULogFile, copter
 from mutations import mutated
-from small_logs import SMALL, small_tlog
+from small_logs import SMALL, small_blackbox, small_crazyflie, small_text, small_tlog
 
 MEGABYTE = 1 << 20
 
@@ -227,3 +227,20 @@ def test_without_its_library_a_format_names_the_line_that_installs_it(name, libr
     )
     assert "pip install 'deadtime[logs]'" in done.stdout
     assert library in done.stdout
+
+
+def test_text_of_a_log_does_not_reach_a_terminal_as_controls(tmp_path):
+    path = tmp_path / "flight"
+    hostile = b"gy\x1b[2J\nro"
+    path.write_bytes(small_crazyflie().replace(b"gyro.x(f)", hostile))
+    with pytest.raises(dtm.RecordingError, match=r'"gy\\x1b\[2J\\nro" has no known type') as caught:
+        dtm.open_log(path)
+    assert str(caught.value).isprintable()
+    path.write_bytes(small_blackbox().replace(b"Betaflight 4.5.1", b"Beta\x1b[2J\r"))
+    found = dtm.open_log(path)
+    assert "Beta\\x1b[2J\\r" in found.firmware
+    assert all(line.isprintable() for line in found.summary().split("\n"))
+    path.write_bytes(small_text().replace(b"ALT_HOLD, 2", b"ALT_HOLD, A\x1bB"))
+    found = dtm.open_log(path)
+    assert [name for _, name in found.modes] == ["A\\x1bB"]
+    assert all(line.isprintable() for line in found.summary().split("\n"))

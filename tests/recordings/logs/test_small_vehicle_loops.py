@@ -1,11 +1,14 @@
 """Loops in logs of Betaflight, INAV and a Crazyflie, opened by their first bytes."""
 
+from dataclasses import replace
+
 import deadtime as dtm
 import numpy as np
 import pytest
 from blackbox_logs import END, SIGNED, UNSIGNED, Log, rate_log, rate_rows
 from crazyflie_logs import definitions, record, sealed
 from flights import flight_path
+from sampled_loops import RATE, fly
 
 DEGREE = np.pi / 180.0
 STATES = [
@@ -104,6 +107,82 @@ def test_loops_of_a_crazyflie(tmp_path):
     height = found.loops["altitude"]
     np.testing.assert_allclose(height.response.values, 1e-3 * truth[:, 5], rtol=1e-12)
     assert all(loop.segments for loop in found.loops.values())
+
+
+def crazyflie_log(columns):
+    """A log with these columns, at 500 rows a second."""
+    events = {1: ("fixedFrequency", [(name, "f") for name in columns])}
+    rows = zip(*columns.values(), strict=True)
+    frames = (record(events, 1, 1_000_000 + 2000 * k, row) for k, row in enumerate(rows))
+    return sealed(definitions(events) + b"".join(frames))
+
+
+def motors(thrust, roll, pitch, yaw):
+    """The mixer of the firmware: motors 1 and 2 are on the right, 1 and 4 in front."""
+    right, front = 0.5 * np.array(roll), 0.5 * np.array(pitch)
+    return {
+        "motor.m1": thrust - right + front + yaw,
+        "motor.m2": thrust - right - front - yaw,
+        "motor.m3": thrust + right - front + yaw,
+        "motor.m4": thrust + right + front - yaw,
+    }
+
+
+@pytest.mark.parametrize("logged", ["commands", "motors"])
+def test_what_the_controllers_of_a_crazyflie_command(tmp_path, logged):
+    random = np.random.default_rng(0)
+    commands = {name: random.integers(-900, 900, 300) * 2.0 for name in ("roll", "pitch", "yaw")}
+    thrust = 40_000.0 + random.integers(-900, 900, 300)
+    columns = {f"controller.{axis}Rate": random.normal(0, 20, 300) for axis in commands}
+    columns |= {f"gyro.{letter}": random.normal(0, 20, 300) for letter in "xyz"}
+    names = ["posCtl.targetVX", "posCtl.bodyVX", "controller.pitch", "posCtl.targetVY"]
+    names += ["posCtl.bodyVY", "controller.roll", "posCtl.targetVZ", "stateEstimate.vz"]
+    names += ["ctrltarget.z", "stateEstimate.z", "stateEstimateZ.ratePitch"]
+    columns |= {name: random.normal(0, 1, 300) for name in names}
+    if logged == "motors":
+        columns |= motors(thrust, **commands)
+    else:
+        columns |= {f"controller.cmd_{axis}": values for axis, values in commands.items()}
+        columns |= {"stabilizer.thrust": thrust}
+    loops = opened(tmp_path, crazyflie_log(columns)).loops
+    for axis, values in commands.items():
+        # The firmware turns the sign of the yaw command behind its controller.
+        told = -values if axis == "yaw" else values
+        np.testing.assert_allclose(loops[f"{axis} rate"].actuator.values, told, rtol=1e-6)
+    np.testing.assert_allclose(loops["vertical speed"].actuator.values, thrust, rtol=1e-6)
+    # The controller tilts against the velocity that it wants.
+    for axis, tilt in (("x", "pitch"), ("y", "roll")):
+        told = -DEGREE * np.float32(columns[f"controller.{tilt}"])
+        np.testing.assert_allclose(loops[f"{axis} velocity"].actuator.values, told, rtol=1e-6)
+    altitude = loops["altitude"]
+    np.testing.assert_allclose(altitude.setpoint.values, columns["ctrltarget.z"], rtol=1e-6)
+    assert altitude.actuator.source == "fixedFrequency.posCtl.targetVZ"
+
+
+def test_the_estimator_of_a_crazyflie_counts_pitch_as_its_controller(tmp_path):
+    rate = np.random.default_rng(0).normal(0, 20, 300)
+    columns = {"controller.pitchRate": rate, "stateEstimateZ.ratePitch": 1e3 * DEGREE * rate}
+    loop = opened(tmp_path, crazyflie_log(columns)).loops["pitch rate"]
+    np.testing.assert_allclose(loop.response.values, loop.setpoint.values, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("axis", ["roll", "yaw"])
+def test_the_time_from_the_motors_of_a_crazyflie_to_its_rate(tmp_path, axis):
+    flight = fly(replace(RATE, period=0.002), np.random.default_rng(4))
+    sent = dict.fromkeys(("roll", "pitch", "yaw"), np.zeros(flight.time.size))
+    sent[axis] = 2000.0 * flight.sent / np.max(np.abs(flight.sent))
+    if axis == "yaw":
+        sent[axis] = -sent[axis]
+    columns = {
+        f"controller.{axis}Rate": flight.setpoint / DEGREE,
+        {"roll": "gyro.x", "yaw": "gyro.z"}[axis]: flight.read / DEGREE,
+        **motors(40_000.0, **sent),
+    }
+    log = opened(tmp_path, crazyflie_log(columns))
+    one = dtm.latency(log).loop(f"{axis} rate", "actuator")
+    low, high = one.sum_of()[2]
+    assert one.estimate.adequate, one.estimate.message
+    assert low < flight.delay_plus_lag < high
 
 
 def test_a_real_log_of_betaflight_has_its_rate_loops():

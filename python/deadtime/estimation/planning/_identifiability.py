@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from deadtime._base.digits import stated
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress
@@ -21,7 +22,7 @@ from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._waveform import Waveform
-from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, run_many_times
+from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, run_many_times, with_sums
 from deadtime.estimation.planning._planned_bound import (
     PlannedBound,
     bound_of,
@@ -187,15 +188,16 @@ class Identifiability(ReadOnlyArrays):
             f"{self.experiment.name}: {len(self.experiment)} samples, "
             f"{self.experiment.time[0]:g} to {self.experiment.time[-1]:g} s, {self.noise}; "
             f"free: {', '.join(self.bound.free)}",
-            "  smallest standard errors",
-            f"  {'':<12}{'command logged':>16}{'reference only':>16}",
+            "  assumed values with their smallest standard errors",
+            f"  {'':<20}{'command logged':>20}{'reference only':>20}",
         ]
+        known = with_sums(self.loop)
         for name in self.stderr:
             cells = [
-                f"{'-' if bound is None else format(bound.stderr[name], '.3g'):>16}"
+                "-" if bound is None else stated(known[name], bound.stderr[name], unit_of(name))
                 for bound in (self.command_logged, self.reference_only)
             ]
-            lines.append(f"  {f'{name} {unit_of(name)}':<12}{''.join(cells)}")
+            lines.append(f"  {name:<20}{''.join(f'{cell:>20}' for cell in cells)}")
         if self.correlation is not None:
             lines.append(f"  correlation of delay and lag: {self.correlation:.3f}")
         lines += [f"  {remark}" for remark in self.remarks]
@@ -226,7 +228,11 @@ class Identifiability(ReadOnlyArrays):
         return plot_identifiability(self, ax)
 
     def __repr__(self) -> str:
-        errors = ", ".join(f"{name} ± {error:.3g}" for name, error in self.stderr.items())
+        known = with_sums(self.loop)
+        errors = ", ".join(
+            f"{name} {stated(known[name], error, unit_of(name))}"
+            for name, error in self.stderr.items()
+        )
         return f"<Identifiability of {self.experiment.name}: {errors}>"
 
 

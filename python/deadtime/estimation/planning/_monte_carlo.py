@@ -5,6 +5,7 @@ Each run has a seed of its own, so results do not depend on how runs are divided
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -15,12 +16,14 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.digits import shown, stated
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.processes import shared_out
 from deadtime._base.progress import Progress
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.fit._profile import unit_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -73,19 +76,37 @@ class MonteCarlo(ReadOnlyArrays):
         refused = sum(self.failures.values())
         lines = [
             f"{self.method}: {self.runs} runs, {refused} refused",
-            f"  {'':<12}{'rmse':>11}{'bias':>11}{'mean bound':>12}{'coverage':>10}",
+            f"  {'':<20}{'rmse':>20}{'bias':>20}{'mean bound':>12}{'coverage':>14}",
         ]
-        for name in self.rmse:
-            bound = f"{self.mean_bound[name]:.3g}" if name in self.mean_bound else "-"
-            held = f"{100.0 * self.coverage[name]:.1f} %" if name in self.coverage else "-"
+        for name, rmse in self.rmse.items():
+            unit, count = unit_of(name), self.estimates[name].size
+            error = self._error(name)
+            bias = stated(
+                self.bias[name], float(np.std(self.estimates[name])) / math.sqrt(count), unit
+            )
+            bound = held = "-"
+            if name in self.mean_bound:
+                bound = shown(self.mean_bound[name], error, unit)
+            if name in self.coverage:
+                # Two successes and failures more: no deviation is none (Agresti & Coull 1998).
+                share = (self.coverage[name] * count + 2.0) / (count + 4.0)
+                deviation = math.sqrt(share * (1.0 - share) / count)
+                held = stated(100.0 * self.coverage[name], 100.0 * deviation, "%")
             lines.append(
-                f"  {name:<12}{self.rmse[name]:>11.3g}{self.bias[name]:>11.2g}{bound:>12}{held:>10}"
+                f"  {name:<20}{stated(rmse, error, unit):>20}{bias:>20}{bound:>12}{held:>14}"
             )
         lines += [f"  refused {count}: {reason}" for reason, count in self.failures.items()]
         return "\n".join(lines)
 
+    def _error(self, name: str) -> float:
+        """Standard error of a root mean square of Gaussian errors."""
+        return self.rmse[name] / math.sqrt(2.0 * self.estimates[name].size)
+
     def __repr__(self) -> str:
-        errors = ", ".join(f"{name} {error:.3g}" for name, error in self.rmse.items())
+        errors = ", ".join(
+            f"{name} {shown(rmse, self._error(name), unit_of(name))}"
+            for name, rmse in self.rmse.items()
+        )
         return f"<MonteCarlo of {self.method}: {self.runs} runs, rmse {errors}>"
 
 
@@ -120,7 +141,7 @@ def run_many_times(
     count = whole_number("runs", runs)
     if not 0.0 < level < 1.0:
         raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
-    truth = _with_sum(loop)
+    truth = with_sums(loop)
     some = partial(_outcomes, truth, simulate, estimate, level, seed)
     return _summed_up(method, truth, level, shared_out(some, count, processes, progress))
 
@@ -139,7 +160,7 @@ def _outcomes(
         recording = simulate(np.random.SeedSequence(seed, spawn_key=(i,)))
         try:
             fit = estimate(recording)
-            fitted = _with_sum(fit.loop)
+            fitted = with_sums(fit.loop)
             values = {name: fitted[name] for name in fit.stderr}
             bounds = {} if fit.crb is None else {name: fit.crb.stderr[name] for name in values}
             held = {}
@@ -166,7 +187,7 @@ def _holds(fit: DelayEstimate, name: str, truth: float, level: float) -> bool:
     return low <= truth <= high
 
 
-def _with_sum(loop: ControlLoop) -> dict[str, float]:
+def with_sums(loop: ControlLoop) -> dict[str, float]:
     """The parameters of a loop, and the sum of its delay and its lag or time constant."""
     values = loop.parameters
     lag = float(getattr(loop.plant, "lag", 0.0))

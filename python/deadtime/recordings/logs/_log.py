@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any, Literal
 
-from deadtime._base.errors import RecordingError
+from deadtime._base.errors import RecordingError, printable
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.plain import plain
 from deadtime.recordings._recording import Recording
@@ -287,7 +287,7 @@ def log_of(contents: LogContents, names: AutopilotNames, source: str) -> Log:
         if loop is not None and loop.name not in loops:
             loops[loop.name] = loop
     key = {
-        name: value
+        printable(name): value
         for pattern in names.key_parameters
         for name, value in sorted(contents.parameters.items())
         if fnmatchcase(name, pattern)
@@ -296,16 +296,16 @@ def log_of(contents: LogContents, names: AutopilotNames, source: str) -> Log:
         source=source,
         format=contents.format,
         autopilot=contents.autopilot,
-        vehicle=contents.vehicle,
-        firmware=contents.firmware,
+        vehicle=printable(contents.vehicle),
+        firmware=printable(contents.firmware),
         start=start,
         duration=stop - start,
         parameters=dict(contents.parameters),
         key_parameters=key,
-        modes=tuple((max(0.0, at - start), name) for at, name in contents.modes),
+        modes=tuple((max(0.0, at - start), printable(name)) for at, name in contents.modes),
         loops=FrozenDict(loops),
         gaps=tuple((low - start, high - start) for low, high in contents.gaps),
-        remarks=tuple(dict.fromkeys(remarks)),
+        remarks=tuple(dict.fromkeys(map(printable, remarks))),
         link=contents.link,
         contents=contents,
     )

@@ -27,6 +27,9 @@ EACH = 1.5
 #: settles after commands that are unknown.
 LENGTHS, SETTLES = {"rate": 4.0, "attitude": 8.0, "velocity": 12.0, "position": 20.0}, 0.05
 
+#: Rates of a Crazyflie's loops by their kind, Hz, which its firmware fixes.
+CRAZYFLIE = {"rate": 500.0, "attitude": 500.0, "velocity": 100.0, "position": 100.0}
+
 #: Least rate of PX4's loops of velocity and position, Hz: that of its estimates.
 PX4_OUTER = 50.0
 
@@ -44,6 +47,8 @@ def period_of(log: Log, kind: Kind) -> Period | None:
     told = log.parameters
     if log.autopilot == "PX4" and kind in ("velocity", "position"):
         return Period(1.0 / PX4_OUTER, f"at least {PX4_OUTER:g} Hz", True)
+    if log.autopilot == "Crazyflie":
+        return Period(1.0 / CRAZYFLIE[kind], f"{CRAZYFLIE[kind]:g} Hz of the firmware")
     for name in ("SCHED_LOOP_RATE", "IMU_GYRO_RATEMAX"):
         if told.get(name, 0.0) > 0.0:
             return Period(1.0 / told[name], f"{name} {told[name]:g}")

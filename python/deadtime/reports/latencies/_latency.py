@@ -27,11 +27,13 @@ from deadtime.reports.latencies._controller import (
     smeared,
 )
 from deadtime.reports.latencies._filters import FilterDelay, filters_of
-from deadtime.reports.latencies._relation import LoopLatency, relation_of
+from deadtime.reports.latencies._relation import LoopLatency, doubted_by_clocks, relation_of
 from deadtime.reports.latencies._windows import (
     Window,
-    best_windows,
+    best_of,
+    parts_of,
     rows_of_a_window,
+    seen_windows,
     window_of,
 )
 from deadtime.reports.latencies._words import cost_in_words, numbers_of, why_inadequate
@@ -246,6 +248,10 @@ def latency(
     proportional controller. From the setpoint the plant follows its command;
     from what the controller commands it integrates.
 
+    Where command and response are stamped by clocks that drift apart, by more than a tenth of the
+    interval over the log, the estimate is not adequate. The time of each window over the log tells
+    that, and stamps that are regular.
+
     Examples
     --------
     >>> import numpy as np
@@ -357,7 +363,8 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     between = between_rows(log, loop.kind, told)
     loop = known_commands(log, loop, command, between)
     told = loop.signals[command]
-    windows = best_windows(loop, command, integrates, between)
+    seen = seen_windows(loop, command, integrates, between)
+    windows = best_of(seen)
 
     def held(window: Window) -> Recording:
         return loop.recording(window.start, window.stop, command=command, between="held")
@@ -369,10 +376,12 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
         hidden = hidden_between_rows(told, between, *first)
         if between == "lines":
             unsure = math.hypot(unsure, smeared(log, loop.kind, told, *first))
-    return relation_of(
+    found = relation_of(
         loop.name, loop.axis, loop.kind, command, integrates, windows, between,
         held if between is None else None, hidden, unsure,
     )  # fmt: skip
+    named = ((one.source, one.time) for one in (told, loop.response))
+    return doubted_by_clocks(found, [one for one in seen if one.tells], *named)
 
 
 def _of_recording(recording: Recording) -> Latency:
@@ -387,4 +396,9 @@ def _of_recording(recording: Recording) -> Latency:
         )  # fmt: skip
     window = window_of(told, not follows)
     one = relation_of(recording.source or "recording", "", "", command, not follows, [window])
+    if recording.sent is not None:
+        one = doubted_by_clocks(
+            one, parts_of(told, not follows),
+            ("the commands", recording.sent.time), ("the rows", recording.time),
+        )  # fmt: skip
     return Latency(recording.source or "recording", "a recording", (one,))

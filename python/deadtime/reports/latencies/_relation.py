@@ -16,6 +16,7 @@ from deadtime.estimation import DelayEstimate, OutputError, estimate_delay
 from deadtime.estimation._choose import bic, likeliest, with_pair
 from deadtime.loops import ControlLoop, FactoredPlant, P
 from deadtime.recordings import Recording
+from deadtime.reports.latencies._clocks import Stamped, why_two_clocks
 from deadtime.reports.latencies._controller import Between, Command
 from deadtime.reports.latencies._cost import GainCost, cost_of
 from deadtime.reports.latencies._windows import LONGEST, OF_A_ROW, Window
@@ -179,6 +180,19 @@ def relation_of(
         cost = cost_of(fit, told[0].recording)
     ends = _ends_of(told[: len(fit.runs)])
     return LoopLatency(loop, axis, kind, command, ends, promise, fit, "", cost, between)
+
+
+def doubted_by_clocks(
+    found: LoopLatency, seen: list[Window], command: Stamped, response: Stamped
+) -> LoopLatency:
+    """The time as one that is not adequate, where both signals are stamped by clocks of their own.
+
+    `seen` are all windows that tell something, `command` and `response` names and stamps, s.
+    """
+    if found.estimate is None:
+        return found
+    why = why_two_clocks(found.estimate, seen, command, response)
+    return replace(found, estimate=_doubted(found.estimate, why)) if why else found
 
 
 def _ends_of(windows: list[Window]) -> tuple[tuple[float, float], ...]:

@@ -12,7 +12,8 @@ c = (1 + rho)/(1 - rho) for residuals of lag-1 autocorrelation rho, which are wo
 
 from __future__ import annotations
 
-from itertools import product
+from collections.abc import Sequence
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,9 @@ SIZES, SHIFT = (1.0, 0.5), 0.5
 
 #: Parts that are looked at, those whose command moves the most.
 LOOKED_AT = 64
+
+#: Parts of a recording in which its time is compared.
+PARTS = 8
 
 #: Delays and lags that are tried, in rows.
 TRIED = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
@@ -93,14 +97,18 @@ class _Shape(NamedTuple):
     turn: Array
 
 
-def best_windows(
+def seen_windows(
     loop: LogLoop, command: Command, integrates: bool, between: Between | None
 ) -> list[Window]:
-    """The windows to fit, the one that promises most first; none where no row is left."""
+    """The windows with most movement, the one that promises most first; none without rows."""
     parts = sorted(_parts(loop, command, between), key=_movement, reverse=True)
     found = [_seen(part, integrates) for part in parts[:LOOKED_AT]]
-    found.sort(key=lambda one: one.promise if one.tells else np.inf)
-    chosen: list[Window] = found[:1]
+    return sorted(found, key=lambda one: one.promise if one.tells else np.inf)
+
+
+def best_of(found: Sequence[Window]) -> list[Window]:
+    """The windows to fit."""
+    chosen = list(found[:1])
     for one in found[1:]:
         apart = all(one.stop <= other.start or one.start >= other.stop for other in chosen)
         if apart and one.tells and one.promise < LESS * chosen[0].promise:
@@ -113,6 +121,17 @@ def best_windows(
 def window_of(recording: Recording, integrates: bool) -> Window:
     """A whole recording as a window."""
     return _seen(recording, integrates)
+
+
+def parts_of(recording: Recording, integrates: bool) -> list[Window]:
+    """Equal parts of a recording that tell something; none of a short one."""
+    start, stop = float(recording.time[0]), float(recording.time[-1])
+    edges = np.linspace(start, stop, PARTS + 1).tolist()
+    rows = np.searchsorted(recording.time, edges)
+    if np.min(np.diff(rows)) < FEWEST:
+        return []
+    found = [_seen(recording.window(*ends), integrates) for ends in pairwise(edges)]
+    return [one for one in found if one.tells]
 
 
 def rows_of_a_window(loop: LogLoop) -> float:
@@ -155,8 +174,7 @@ def _seen(part: Recording, integrates: bool) -> Window:
         told = part.reference if part.command is None else part.command
         response = HeldResponse(time, told)
     row = part.sample_time
-    trend = np.stack([np.ones(time.size), time - time.mean()], axis=1)
-    trend, _ = np.linalg.qr(trend)
+    trend = trend_of(time)
 
     def without(basis: Array, values: Array) -> Array:
         return np.asarray(values - basis @ (basis.T @ values))
@@ -189,8 +207,20 @@ def _seen(part: Recording, integrates: bool) -> Window:
     if best.gain == 0.0 or power == 0.0:
         return Window(*ends, part, np.inf, 0.0, 0.0)
     left, turn = best.left, best.turn
-    rho = float(np.clip((left[1:] @ left[:-1]) / max(best.square, 1e-300), 0.0, 0.999))
-    variance = best.square / time.size * (1.0 + rho) / (1.0 - rho)
+    variance = variance_of(left)
     information = float(turn @ turn)
     promise = np.sqrt(variance / information) if information > 0.0 else np.inf
     return Window(*ends, part, float(promise), best.time, 1.0 - best.square / power)
+
+
+def trend_of(time: Array) -> Array:
+    """Orthonormal columns of a constant and a line, shape (n, 2)."""
+    columns = np.stack([np.ones(time.size), time - time.mean()], axis=1)
+    return np.asarray(np.linalg.qr(columns)[0])
+
+
+def variance_of(left: Array) -> float:
+    """Variance of residuals, times the rows that are worth one because they are correlated."""
+    square = float(left @ left)
+    rho = float(np.clip((left[1:] @ left[:-1]) / max(square, 1e-300), 0.0, 0.999))
+    return square / left.size * (1.0 + rho) / (1.0 - rho)
