@@ -55,6 +55,16 @@ class Response(NamedTuple):
     by_lag: Array
 
 
+class Places(NamedTuple):
+    """Times among commands: the last command before each, and what it says."""
+
+    row: NDArray[np.intp]
+    before: NDArray[np.bool_]
+    since: Array
+    command: Array
+    integral: Array
+
+
 class HeldResponse:
     """The response of an integrator to one record of commands.
 
@@ -77,12 +87,20 @@ class HeldResponse:
 
     def at(self, times: Array, lag: float = 0.0) -> Response:
         """F and its derivatives at `times` for a lag in s."""
+        return self.at_places(self.places(times), lag)
+
+    def places(self, times: Array) -> Places:
+        """Where `times`, of any shape, lie among the commands."""
         row = np.searchsorted(self.time, times, side="right") - 1
         before = row < 0
         row = np.maximum(row, 0)
         since = np.where(before, 0.0, times - self.time[row])
         command = np.where(before, 0.0, self.command[row])
-        integral = self._integral[row] + command * since
+        return Places(row, before, since, command, self._integral[row] + command * since)
+
+    def at_places(self, places: Places, lag: float) -> Response:
+        """F and its derivatives at `places` for a lag in s."""
+        row, before, since, command, integral = places
         if lag <= self._shortest:
             # To first order a lag is a delay: dF/dlag = -v at no lag.
             return Response(integral - lag * command, command, -command)
@@ -122,16 +140,22 @@ def _even(command: Array, decays: Array, rates: Array) -> tuple[Array, Array]:
 
 
 def _uneven(command: Array, decays: Array, rates: Array) -> tuple[Array, Array]:
-    """The recursion of v and dv/dlag, step by step."""
-    v, p = np.zeros_like(command), np.zeros_like(command)
-    now, slope = 0.0, 0.0
-    for k, (u, decay, rate) in enumerate(
-        zip(command[:-1].tolist(), decays.tolist(), rates.tolist(), strict=True), 1
-    ):
-        slope = decay * (slope + (now - u) * rate)
-        now = u + (now - u) * decay
-        v[k], p[k] = now, slope
+    """The recursion of v and dv/dlag, for steps of any length."""
+    before = command[:-1]
+    v = _recursion(decays, (1.0 - decays) * before)
+    p = _recursion(decays, decays * rates * (v[:-1] - before))
     return v, p
+
+
+def _recursion(factors: Array, added: Array) -> Array:
+    """x[k + 1] = factors[k] x[k] + added[k] from zero, in ever longer steps (Blelloch 1990)."""
+    factors, found = factors.copy(), np.concatenate([[0.0], added])
+    own, step = found[1:], 1
+    while step < own.size:
+        own[step:] += factors[step:] * own[:-step]
+        factors[step:] *= factors[:-step]
+        step *= 2
+    return found
 
 
 @overload

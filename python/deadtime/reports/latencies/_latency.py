@@ -334,9 +334,14 @@ def loops_asked_for(
 def _all_told(
     log: Log, wanted: list[tuple[LogLoop, Command]], report: Callable[[str], object]
 ) -> list[LoopLatency]:
-    """Each in a thread, those of few rows first: the kernel computes beside the interpreter."""
+    """Each in a thread: the kernel computes beside the interpreter.
+
+    One of few rows comes first, for an early answer, then those of many: no core waits long for the
+    last.
+    """
     pool = ThreadPoolExecutor(min(len(wanted), os.cpu_count() or 1) or 1)
     order = sorted(range(len(wanted)), key=lambda k: rows_of_a_window(wanted[k][0]))
+    order = [*order[:1], *order[:0:-1]]
     try:
         begun = {pool.submit(_told, log, *wanted[k]): k for k in order}
         found = {}

@@ -160,9 +160,13 @@ def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Rec
 
 def _movement(part: Recording) -> float:
     """Deviation of the command of a part from a straight line."""
-    from scipy.signal import detrend
+    told = part.reference if part.command is None else part.command
+    return float(np.std(_without(trend_of(part.time), told)))
 
-    return float(np.std(detrend(part.reference if part.command is None else part.command)))
+
+def _without(basis: Array, values: Array) -> Array:
+    """What a basis leaves of values, along their last axis."""
+    return np.asarray(values - (values @ basis) @ basis.T)
 
 
 def _seen(part: Recording, integrates: bool) -> Window:
@@ -175,32 +179,35 @@ def _seen(part: Recording, integrates: bool) -> Window:
         response = HeldResponse(time, told)
     row = part.sample_time
     trend = trend_of(time)
-
-    def without(basis: Array, values: Array) -> Array:
-        return np.asarray(values - basis @ (basis.T @ values))
-
-    moved = without(trend, output)
+    moved = _without(trend, output)
     power = float(moved @ moved)
     best = _Shape(np.inf, 0.0, 0.0, moved, moved)
-    for lag, delay in product(TRIED, TRIED):  # the path of a lag serves every delay
-        if not 0.0 < (delay + lag) * row < LONGEST * (time[-1] - time[0]):
+    delays = np.array(TRIED)
+    places = response.places(time - delays[:, None] * row)
+    for lag in TRIED:
+        path = response.at_places(places, lag * row)
+        shapes = _without(trend, path.value if integrates else path.rate)
+        sizes = np.linalg.norm(shapes, axis=1)
+        within = (delays + lag > 0.0) & ((delays + lag) * row < LONGEST * (time[-1] - time[0]))
+        moves = sizes > TINY * (1.0 + np.max(np.abs(path.rate), axis=1))
+        tried = np.flatnonzero(within & moves)
+        if tried.size == 0:
             continue
-        path = response.at(time - delay * row, lag * row)
-        shape = without(trend, path.value if integrates else path.rate)
-        size = float(np.linalg.norm(shape))
-        if size <= TINY * (1.0 + float(np.max(np.abs(path.rate)))):
-            continue
-        unit = shape / size
+        gains = shapes[tried] @ moved / sizes[tried]
+        squares = power - gains**2
+        least = tried[np.argmin(squares)]
+        delay, size = float(delays[least]), float(sizes[least])
+        unit = shapes[least] / size
         gain = float(unit @ moved)
         left = moved - gain * unit
         if float(left @ left) < best.square:
-            slope = path.rate
+            slope = path.rate[least]
             if not integrates:
                 ahead, behind = (
                     response.at(time - (delay + half) * row, lag * row).rate for half in (0.5, -0.5)
                 )
                 slope = (behind - ahead) / row
-            turn = without(trend, slope) * (gain / size)
+            turn = _without(trend, slope) * (gain / size)
             turn -= unit * float(unit @ turn)
             best = _Shape(float(left @ left), (delay + lag) * row, gain / size, left, turn)
     ends = float(time[0]), float(time[-1])
