@@ -65,6 +65,7 @@ ORDER = {
         "path",
         "orthogonal",
         "whiten",
+        "noises",
         "kicks",
         "mean",
         "likelihood",
