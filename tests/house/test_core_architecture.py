@@ -65,7 +65,6 @@ ORDER = {
         "path",
         "orthogonal",
         "whiten",
-        "noises",
         "kicks",
         "mean",
         "likelihood",
