@@ -1,4 +1,4 @@
-"""Is the model adequate? Tests of a fit under the noise of a flight, each at the 1 % level.
+"""Is the model adequate? Tests of a fit under the noise of a flight, at the 1 % level by default.
 
 White residuals are not enough: the air can take the place of a lag that the plant lacks, and the
 whitened residuals stay white. Beside their whiteness, these are tested:
@@ -113,7 +113,8 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
     further = richer.lags[-1]
     total = richer.delay + sum(richer.lags) - richer.zero + fit.model.own_lag
     plain = len(reasons)
-    if p_value < _level_of_lag(fit):
+    level_of_lag = _level_of_lag(fit)
+    if p_value < level_of_lag:
         reasons.append(
             f"a further lag of {further:.3g} s makes the recording likelier: the plant lacks it"
         )
@@ -133,7 +134,7 @@ def adequacy_of(profile: LikelihoodProfile, numbers: int, level: float = 0.95) -
             "more than the vehicle, or lacks something"
         )
     # Between the levels there is doubt, and the fit is the best there is all the same.
-    doubted = SIGNIFICANCE <= p_value < _level_of_lag(fit)
+    doubted = SIGNIFICANCE <= p_value < level_of_lag
     lacks = len(reasons) > plain + doubted
     for index, part in enumerate(fit.parts):
         where = f" in recording {index + 1}" if len(fit.parts) > 1 else ""

@@ -47,8 +47,7 @@ WIDER, ENDS = 4, 2.0
 #: rows: without it 87 to 90 % of intervals hold the delay of such flights.
 IN_AIR = 1.2
 
-#: The grid of starts: delays in sample times around that of the first
-#: fit, and factors of its gain.
+#: The grid of starts: delays in sample times around that of the first fit, and factors of its gain.
 DELAYS, GAINS = np.linspace(-1.5, 1.5, 7), np.array([0.85, 1.0, 1.15])
 
 
@@ -88,11 +87,10 @@ def with_lost_commands(
 ) -> tuple[NoiseFit, Array] | None:
     """The likeliest fit with the commands of its plant, and the covariance of common numbers.
 
-    None where the recording does not tell these
-    numbers apart.
+    None where the recording does not tell these numbers apart.
     """
     starts = [fit]
-    if not all(is_calm(fit, run) for run in range(len(fit.runs))):
+    if not _all_calm(fit):
         calm = [changed(one, air=0.0, sensor=0.0) for one in fit.numbers.noise]
         starts.append(replace(fit, trim=False, numbers=with_noise(fit.with_gain, calm)))
     starts = [_started(one, refilled, sample_time) for one in starts]
@@ -100,8 +98,8 @@ def with_lost_commands(
     found = [_searched(one, refilled, sizes) for one in starts]
     best = min(found, key=lambda one: one.criterion)
     cov = _covariance(partial(_objective, best, refilled, sizes), np.zeros(sizes.size))
-    wider = 1.0 if all(is_calm(best, run) for run in range(len(best.runs))) else IN_AIR
-    return None if cov is None else (best, cov * np.outer(wider * sizes, wider * sizes))
+    sizes = sizes * (1.0 if _all_calm(best) else IN_AIR)
+    return None if cov is None else (best, cov * np.outer(sizes, sizes))
 
 
 def is_calm(fit: NoiseFit, run: int) -> bool:
@@ -110,20 +108,21 @@ def is_calm(fit: NoiseFit, run: int) -> bool:
     return not (fit.trim or noise.air > 0.0 or noise.sensor > 0.0)
 
 
+def _all_calm(fit: NoiseFit) -> bool:
+    return all(is_calm(fit, run) for run in range(len(fit.runs)))
+
+
 def _started(fit: NoiseFit, refilled: Refilled, sample_time: float) -> NoiseFit:
     """The fit at the likeliest point of a grid over the delay and the gain.
 
     The likelihood has a maximum of its own in each sample time of the delay.
     """
-    grids = {
-        "delay": (sample_time * DELAYS, np.add),
-        "gain": (GAINS, np.multiply),
-    }
     now = numbers_of(fit)
-    values = [
-        grids[kernel][1](now[name], grids[kernel][0]) if kernel in grids else [now[name]]
-        for name, kernel in fit.model.order
-    ]
+    values: list[Array] = []
+    for name, kernel in fit.model.order:
+        alone = np.array([now[name]])
+        tried = {"delay": alone + sample_time * DELAYS, "gain": alone * GAINS}
+        values.append(tried.get(kernel, alone))
     points = [np.array(one) for one in product(*values)]
     return min(
         (_with_common(fit, one) for one in points),

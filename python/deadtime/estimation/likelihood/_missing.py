@@ -133,6 +133,8 @@ def with_missing(
     shared : float, optional
         Error of the predicted output that many missing rows share, in deviations of the white
         noise. If not given, their mean command is unknown besides.
+    closed : bool
+        Whether the loop answers the errors of the outputs across many missing rows.
     """
     time = recording.time[: command.size]
     plain = HeldCommands(time, command)
@@ -215,8 +217,8 @@ def _closed(loop: ControlLoop, slopes: Array) -> tuple[Array, float]:
     known = {"gain": 1.0, **loop.parameters}
     sample_time = loop.sample_time or 1.0
     pulse = path_of(loop.plant, np.array([0.0, sample_time]), np.array([1.0, 0.0]))
-    ages = sample_time * np.arange(float(slopes.size)) - known["delay"]
-    response = known["gain"] * pulse.value(np.asarray(ages, float), known)
+    ages = np.asarray(sample_time * np.arange(slopes.size) - known["delay"], dtype=np.float64)
+    response = known["gain"] * pulse.value(ages, known)
     M = linalg.toeplitz(response, np.zeros(slopes.size))
     change = np.linalg.solve(np.eye(slopes.size) + slopes[:, None] * M, np.diag(slopes))
     sums = change.sum(axis=0)
@@ -289,18 +291,18 @@ def predicted_commands(
 
         beside = output - modelled(time)
         left, error = smoothed(beside)
-        level = left.copy()
+        held = left.copy()
         if holes.size:
             pieces = np.split(beside, holes + 1)[:-1]
-            level[holes] = [one.mean() for one in pieces]
+            held[holes] = [one.mean() for one in pieces]
             error = max(1.0 / math.sqrt(one.size) for one in pieces)
 
         def predicted(
-            times: Array, left: Array = left, level: Array = level, modelled: Predicted = modelled
+            times: Array, left: Array = left, held: Array = held, modelled: Predicted = modelled
         ) -> Array:
             before = np.searchsorted(time, times, side="right") - 1
             across = np.isin(before, holes)
-            return modelled(times) + np.where(across, level[before], np.interp(times, time, left))
+            return modelled(times) + np.where(across, held[before], np.interp(times, time, left))
 
         again = with_missing(
             recording, loop, command, predicted, step, None if unsure else error, calm

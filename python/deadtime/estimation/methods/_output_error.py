@@ -257,7 +257,7 @@ def _estimated(
         # Single rows are predicted well enough. Where most are missing, as in a log at a lower
         # rate, the likelihood has too many kinks.
         few = all(one.commands.time.size < 2 * one.logged.size for one in models)
-        period = fitted[0].loop.sample_time
+        period = max(run.loop.sample_time or 0.0 for run in fitted)
         if missing > 1 and few and period and not (numbers or is_long(rows)):
             joint = with_lost_commands(fit, _refilling(linear, models, runs, step), period)
     if joint is not None:
