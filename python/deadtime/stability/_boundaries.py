@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._deadtime import MapBoundary
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.stability._arguments import Floats
 
@@ -65,6 +67,13 @@ def boundaries_of(
             f"the family is affine in neither {' nor '.join(axes)}, and a root of all its "
             "members stays at 0: cancel the factor s to see where the others cross"
         )
+    return boundaries_along(found, axes)
+
+
+def boundaries_along(
+    found: Sequence[MapBoundary], axes: Mapping[str, Floats]
+) -> tuple[Boundary, ...]:
+    """Curves with the values of both parameters, longest first."""
     return tuple(
         Boundary(
             {

@@ -20,11 +20,11 @@ from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop
 from deadtime.loops._characteristic import numbers_of
-from deadtime.loops._stability import SampledCells, sampled_grid
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._arguments import Floats, damping_demand, map_axes, sides
-from deadtime.stability._boundaries import Boundary, boundaries_of
+from deadtime.stability._boundaries import Boundary, boundaries_along, boundaries_of
+from deadtime.stability._held import HeldFamily, Question
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,6 +83,7 @@ class StabilityMap(ReadOnlyArrays):
     decay: float = 0.0
     damping: tuple[float, float] | None = None
     family: ParametricQuasiPolynomial | None = None
+    _held: HeldFamily | None = None
 
     @cached_property
     def boundaries(self) -> tuple[Boundary, ...]:
@@ -91,8 +92,8 @@ class StabilityMap(ReadOnlyArrays):
         Raises
         ------
         ValueError
-            If the map is that of a sampled loop, or the family is affine in neither parameter and
-            a root stays at 0 whatever they are.
+            If the family is affine in neither parameter and a root stays at 0 whatever they are, or
+            the loop is sampled and neither is a gain.
 
         Examples
         --------
@@ -107,11 +108,11 @@ class StabilityMap(ReadOnlyArrays):
         >>> bool(np.allclose(curve.values["Kv"], -np.cos(0.36 * curve.omega)))
         True
         """
+        held = self._held
+        if held is not None:
+            return boundaries_along(held.boundaries(self.decay, self.damping), self.axes)
         if self.family is None:
-            raise ValueError(
-                "the map of a sampled loop has no crossing curves: its boundary is where the "
-                "abscissa changes sign"
-            )
+            raise ValueError("the map was made without what it judges: it has no boundaries")
         return boundaries_of(self.family, self.axes, self.decay, self.damping)
 
     @cached_property
@@ -302,8 +303,7 @@ def stability_map(
     at : mapping of str to float, optional
         Values of the other parameters; those of a loop have values, which these replace.
     abscissa : bool
-        Compute the spectral abscissa too, at several times the cost of the counts. (For a sampled
-        loop it comes with the counts and is always given.)
+        Compute the spectral abscissa too, at several times the cost of the counts.
     decay : float
         Stable means that every root has a real part below ``-decay``, in 1/s.
     damping : (ratio, horizon), optional
@@ -341,9 +341,10 @@ def stability_map(
     roots of neutral equations are judged robustly, as under arbitrarily small changes of the
     delays [1]_.
 
-    Sampled: the poles are the eigenvalues of the transition matrix of the loop, hold and delay
+    Sampled: the poles are s = ln(z)/Ts, z the zeros of a polynomial of the loop, hold and delay
     included; unstable is outside the circle of radius exp(-decay Ts), and the abscissa is
-    ln(rho)/Ts with rho the spectral radius.
+    ln(rho)/Ts with rho the largest modulus. Their number is proved by the same principle on the
+    circle.
 
     References
     ----------
@@ -364,58 +365,30 @@ def stability_map(
     threads = thread_number(threads)
     if proof not in ("curves", "cells"):
         raise ValueError(f"proof={proof!r}: give 'curves' or 'cells'")
-    question = _Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
+    question = Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
     size = len(axes[first]), len(axes[second])
     judged: ParametricQuasiPolynomial | None = None
-    alpha: Floats
     with nullcontext() if progress is False else reported(progress, math.prod(size)) as report:
+        held: HeldFamily | None = None
         if isinstance(family, ControlLoop) and family.is_sampled:
-            if question.damping is not None:
-                raise ValueError(
-                    f"damping={question.damping}: a sampled loop is judged by a circle; ask for "
-                    "decay="
-                )
             numbers = numbers_of(family.parameters, (*names, *fixed)) | fixed
-            found = _sampled(family, numbers, axes, question.decay, threads, report)
-            unsure = (found.status == MapStatus.BOUNDARY) | (found.status == MapStatus.UNDECIDED)
-            unstable = np.where(unsure, np.int32(-2), found.unstable).reshape(size)
-            alpha, status = found.abscissa.reshape(size), found.status.reshape(size)
+            held = HeldFamily(family.plant, family.controller, numbers, axes)
+            cells = held.cells(question, threads, report)
         else:
             judged = family_of(family, names, fixed)
             cells = judged._family.map(axes, question, threads=threads, progress=report)
-            unstable, status = cells.unstable, cells.status
-            missing = np.broadcast_to(np.float64(np.nan), size)
-            alpha = missing if cells.abscissa is None else cells.abscissa
+        missing = np.broadcast_to(np.float64(np.nan), size)
+        alpha = missing if cells.abscissa is None else cells.abscissa
         if report is not None:
             report(math.prod(size))
     return StabilityMap(
-        (first, second), axes, unstable, alpha, status, question.decay, question.damping, judged
+        (first, second),
+        axes,
+        cells.unstable,
+        alpha,
+        cells.status,
+        question.decay,
+        question.damping,
+        judged,
+        held,
     )
-
-
-@dataclass(frozen=True)
-class _Question:
-    """What is asked of every cell."""
-
-    abscissa: bool
-    decay: float
-    damping: tuple[float, float] | None
-    proof: str
-
-
-def _sampled(
-    loop: ControlLoop,
-    values: dict[str, float],
-    axes: dict[str, Floats],
-    decay: float,
-    threads: int | None,
-    report: Report | None,
-) -> SampledCells:
-    """Eigenvalues of the transition matrix in every cell."""
-    grids = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
-    for name in ("delay", "sample_time"):
-        low = float(np.min(grids.get(name, values.get(name, 0.0))))
-        if low < 0.0 or (name == "sample_time" and low == 0.0):
-            raise ValueError(f"{name}={low}: delays are zero or more, sample times above zero")
-    cells = values | {name: np.ravel(grid) for name, grid in grids.items()}
-    return sampled_grid(loop.plant, loop.controller, cells, decay, threads, report)

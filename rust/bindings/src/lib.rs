@@ -9,6 +9,7 @@ mod errors;
 mod estimation;
 mod fixed_step;
 mod frequency;
+mod held;
 mod matrix;
 mod pointers;
 mod quasipoly;
@@ -49,6 +50,8 @@ mod _deadtime {
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
     };
+    #[pymodule_export]
+    use super::held::{held_boundaries, held_map};
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]

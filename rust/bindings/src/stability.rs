@@ -1,7 +1,8 @@
 //! Bindings of `deadtime::stability`: families and maps.
 
 use deadtime::stability::{
-    self, Affine, Axis, Boundaries, Damping, Family, Proof, Question, Specification, Term, Vertex,
+    self, Affine, Axis, Boundaries, Chart, Damping, Family, Proof, Question, Specification, Term,
+    Vertex,
 };
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::conversion::FromPyObjectOwned;
@@ -32,11 +33,24 @@ struct FamilyTerm {
 
 /// What is asked of each cell of a map.
 #[derive(FromPyObject)]
-struct MapQuestion {
+pub(crate) struct MapQuestion {
     decay: f64,
     damping: Option<(f64, f64)>,
     abscissa: bool,
     proof: String,
+}
+
+impl From<MapQuestion> for Question {
+    fn from(question: MapQuestion) -> Self {
+        Self {
+            specification: specification(question.decay, question.damping),
+            abscissa: question.abscissa,
+            proof: match question.proof.as_str() {
+                "cells" => Proof::Cells,
+                _ => Proof::Curves,
+            },
+        }
+    }
 }
 
 /// The cells of a map.
@@ -100,30 +114,14 @@ impl PyFamily {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<MapCells> {
-        let question = Question {
-            specification: specification(question.decay, question.damping),
-            abscissa: question.abscissa,
-            proof: match question.proof.as_str() {
-                "cells" => Proof::Cells,
-                _ => Proof::Curves,
-            },
-        };
+        let question = Question::from(question);
         with_axes(&self.inner, &axes, |axes| {
             let values = vec![0.0; self.inner.names().len()];
             let cells = run(py, threads, progress.as_ref(), |task| {
                 stability::map(&self.inner, &values, axes, question, task)
             })?;
             let shape = axes.map(|axis| axis.points.len());
-            let status = column(&cells.status, |status| *status as u8)?;
-            let abscissa = question.abscissa.then_some(cells.abscissa);
-            Ok(MapCells {
-                unstable: cells.unstable.into_pyarray(py).reshape(shape)?.unbind(),
-                abscissa: abscissa
-                    .map(|values| values.into_pyarray(py).reshape(shape))
-                    .transpose()?
-                    .map(Bound::unbind),
-                status: status.into_pyarray(py).reshape(shape)?.unbind(),
-            })
+            cells_of(py, cells, question.abscissa, shape)
         })
     }
 
@@ -205,6 +203,34 @@ fn map_boundaries(
 ) -> PyResult<Vec<MapBoundary>> {
     let along = axes.get(found.along).map_or(0, |axis| axis.parameter);
     let along = family.names().get(along).cloned().unwrap_or_default();
+    curves_of(py, &along, &found.curves)
+}
+
+/// The arrays of a map of this shape.
+pub(crate) fn cells_of(
+    py: Python<'_>,
+    cells: Chart,
+    with_abscissa: bool,
+    shape: [usize; 2],
+) -> PyResult<MapCells> {
+    let status = column(&cells.status, |status| *status as u8)?;
+    let abscissa = with_abscissa.then_some(cells.abscissa);
+    Ok(MapCells {
+        unstable: cells.unstable.into_pyarray(py).reshape(shape)?.unbind(),
+        abscissa: abscissa
+            .map(|values| values.into_pyarray(py).reshape(shape))
+            .transpose()?
+            .map(Bound::unbind),
+        status: status.into_pyarray(py).reshape(shape)?.unbind(),
+    })
+}
+
+/// The curves of a map along whose rows this parameter varies.
+pub(crate) fn curves_of(
+    py: Python<'_>,
+    along: &str,
+    curves: &[Vec<Vertex>],
+) -> PyResult<Vec<MapBoundary>> {
     let boundary = |curve: &Vec<Vertex>| {
         Ok(MapBoundary {
             gain: column(curve, |vertex| vertex.gain)?
@@ -219,14 +245,14 @@ fn map_boundaries(
             crossing: column(curve, |vertex| vertex.jump)?
                 .into_pyarray(py)
                 .unbind(),
-            along: along.clone(),
+            along: along.to_owned(),
         })
     };
-    found.curves.iter().map(boundary).collect()
+    curves.iter().map(boundary).collect()
 }
 
 /// Decay, and (damping ratio, horizon).
-fn specification(decay: f64, damping: Option<(f64, f64)>) -> Specification {
+pub(crate) fn specification(decay: f64, damping: Option<(f64, f64)>) -> Specification {
     Specification {
         decay,
         damping: damping.map(|(ratio, horizon)| Damping { ratio, horizon }),

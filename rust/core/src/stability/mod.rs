@@ -12,6 +12,8 @@ mod branches;
 mod cell;
 mod crossings;
 mod family;
+mod held;
+mod hold;
 mod map;
 mod specification;
 
@@ -20,6 +22,7 @@ pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub(crate) use crossings::radius_of_members;
 pub use crossings::{Crossing, crossings_along};
 pub use family::{Affine, Family, Term};
+pub use held::{LoopRows, held_boundaries, held_map};
 pub use map::{
     Axis, Boundaries, Chart, Proof, Question, Vertex, boundaries, chains, map, robust_map,
 };

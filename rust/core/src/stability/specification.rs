@@ -49,6 +49,17 @@ pub(super) struct Piece {
     pub(super) length: f64,
 }
 
+/// A part of the edge below the imaginary part at which h is real again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Part {
+    pub(super) piece: Piece,
+    /// Is h real where it begins?
+    pub(super) from_axis: bool,
+    /// −1 where it is followed downwards: roots that cross to its right then cross to the left of
+    /// the edge.
+    pub(super) sign: i32,
+}
+
 impl Piece {
     /// The t up to which |s| is at most `radius`, or slightly more: |s| grows along the edge.
     pub(super) fn within(&self, radius: f64) -> f64 {
@@ -123,6 +134,44 @@ impl Specification {
         } else {
             vec![up(start, first.im), slant, last]
         }
+    }
+
+    /// The edge up to Im s = `top`, where h is real again as on the real axis. The piece that ends
+    /// there is followed from both of its ends, so that each end is the start of a part.
+    pub(super) fn pieces_below(&self, top: f64) -> Vec<Part> {
+        let mut parts = Vec::new();
+        for piece in self.pieces() {
+            let from_axis = parts.is_empty();
+            let whole = (top - piece.from.im) / piece.along.im;
+            if piece.length < whole {
+                parts.push(Part {
+                    piece,
+                    from_axis,
+                    sign: 1,
+                });
+                continue;
+            }
+            if whole > 0.0 {
+                let length = 0.5 * whole;
+                let end = Complex64::new(piece.from.re + whole * piece.along.re, top);
+                parts.push(Part {
+                    piece: Piece { length, ..piece },
+                    from_axis,
+                    sign: 1,
+                });
+                parts.push(Part {
+                    piece: Piece {
+                        from: end,
+                        along: -piece.along,
+                        length,
+                    },
+                    from_axis: true,
+                    sign: -1,
+                });
+            }
+            break;
+        }
+        parts
     }
 
     /// Number of violating roots among those right of [`leftmost`](Self::leftmost); `None` where a

@@ -32,12 +32,13 @@ pub(crate) struct Root {
 }
 
 impl Root {
-    /// Does it stand for its mirror image as well? `None` where this cannot be decided.
-    pub(crate) fn weight(&self) -> Option<i32> {
-        if self.s.im == 0.0 {
+    /// Does it stand for its mirror image as well? h is real where Im s is 0 or `top`. `None` where
+    /// this cannot be decided.
+    pub(crate) fn weight(&self, top: f64) -> Option<i32> {
+        if self.s.im == 0.0 || self.s.im == top {
             Some(1)
         } else {
-            (self.s.im.abs() > self.radius).then_some(2)
+            (self.s.im.abs() > self.radius && top - self.s.im > self.radius).then_some(2)
         }
     }
 }
@@ -156,6 +157,16 @@ impl Branches {
         }
     }
 
+    /// The roots that were found at the start.
+    pub(crate) fn started(&self) -> Vec<Root> {
+        let [re, im, radius, ..] = &self.values;
+        let root = |place: usize| Root {
+            s: Complex64::new(re[place], im[place]),
+            radius: radius[place],
+        };
+        (0..self.all.len()).map(root).collect()
+    }
+
     /// Store the roots at the first of the remaining values of k. Returns false where one of them
     /// is lost, or would be the mirror image of another one that is followed.
     pub(crate) fn advance(&mut self, plane: &Plane, points: &[f64], roots: &mut Vec<Root>) -> bool {
@@ -243,6 +254,7 @@ impl Branches {
         let filled = elements.next_multiple_of(SHORT).min(ELEMENTS);
         within[elements..filled].fill(-1.0);
         sweep(&Certify(plane), &self.arguments, &mut self.values, elements);
+        self.put_on_top(plane.top());
         let found = (0..self.all.len()).fold(points.len(), |found, place| {
             self.proved(plane, place, found)
         });
@@ -261,19 +273,39 @@ impl Branches {
         }
     }
 
+    /// Where h is real at Im s = `top`, a simple root there stays there: its mirror image would lie
+    /// in the same disc.
+    fn put_on_top(&mut self, top: f64) {
+        let [_, im, radius, _, slope_im] = &mut self.values;
+        for (place, branch) in self.all.iter().enumerate() {
+            if branch.now.s.im != top {
+                continue;
+            }
+            for column in place * self.width..(place + 1) * self.width {
+                let off = (im[column] - top).abs();
+                if off <= radius[column] {
+                    im[column] = top;
+                    slope_im[column] = 0.0;
+                    radius[column] += off;
+                }
+            }
+        }
+    }
+
     /// How many of the first `limit` roots of a branch are proved.
     fn proved(&self, plane: &Plane, place: usize, limit: usize) -> usize {
         let mut last = self
             .all
             .get(place)
             .map_or(Complex64::ZERO, |branch| branch.now.s);
+        let top = plane.top();
         let [re, im, radius, ..] = &self.values;
         for index in 0..limit {
             let column = place * self.width + index;
             let s = Complex64::new(re[column], im[column]);
             // Newton's step from a point next to a multiple root is unreliable.
             let near = modulus(s - last) <= plane.unit(modulus(last));
-            if !(radius[column].is_finite() && s.im >= 0.0 && near) {
+            if !(radius[column].is_finite() && s.im >= 0.0 && s.im <= top && near) {
                 return index;
             }
             last = s;
@@ -290,7 +322,11 @@ mod tests {
 
     #[test]
     fn branches_of_lambert_w_are_followed() {
-        let plane = Plane::new(&make(&[&[0.0, 1.0]], &[0.0]), &make(&[&[1.0]], &[1.0]));
+        let plane = Plane::new(
+            &make(&[&[0.0, 1.0]], &[0.0]),
+            &make(&[&[1.0]], &[1.0]),
+            None,
+        );
         for cells in [100, 1000] {
             let points: Vec<f64> = (0..=cells)
                 .map(|index| 0.5 + 9.5 * f64::from(index) / f64::from(cells))
@@ -314,7 +350,11 @@ mod tests {
     #[test]
     fn a_double_root_is_not_passed() {
         // At k = 1/e the first two roots of s + k e^(−s) meet.
-        let plane = Plane::new(&make(&[&[0.0, 1.0]], &[0.0]), &make(&[&[1.0]], &[1.0]));
+        let plane = Plane::new(
+            &make(&[&[0.0, 1.0]], &[0.0]),
+            &make(&[&[1.0]], &[1.0]),
+            None,
+        );
         let points: Vec<f64> = (0..100)
             .map(|index| 0.3 + 0.002 * f64::from(index))
             .collect();

@@ -116,7 +116,11 @@ mod tests {
 
     /// s + k e^(−s), whose roots are W_j(−k).
     fn plane() -> Plane {
-        Plane::new(&make(&[&[0.0, 1.0]], &[0.0]), &make(&[&[1.0]], &[1.0]))
+        Plane::new(
+            &make(&[&[0.0, 1.0]], &[0.0]),
+            &make(&[&[1.0]], &[1.0]),
+            None,
+        )
     }
 
     #[test]

@@ -18,6 +18,8 @@ use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
 use crate::stability::cell::{Cell, judge, with_abscissa};
 use crate::stability::crossings::{Members, Row};
+use crate::stability::held;
+use crate::stability::hold::Hold;
 use crate::{Error, Task};
 
 /// Distance behind the first root, in units of one over the longest delay, up to which roots are
@@ -103,9 +105,10 @@ impl Members<'_> {
             cells.push(match known {
                 Known::Isolated(abscissa) => with_abscissa(cell, abscissa, chain),
                 Known::Chains => with_abscissa(cell, f64::NEG_INFINITY, chain),
-                Known::Nothing => match (self.member)(index) {
-                    Some(h) => judge(&h, self.specification, true, task)?,
-                    None => Cell::UNDECIDED,
+                Known::Nothing => match ((self.member)(index), self.hold) {
+                    (Some(h), None) => judge(&h, self.specification, true, task)?,
+                    (Some(h), Some(hold)) => held::with_abscissa(cell, &h, hold, task)?,
+                    (None, _) => Cell::UNDECIDED,
                 },
             });
         }
@@ -121,7 +124,11 @@ impl<'a> Leading<'a> {
         b: &QuasiPolynomial,
         task: &'a Task,
     ) -> Option<Self> {
-        let hull = members.hull(a, b)?;
+        // A loop with a hold has no chains.
+        let hull = match members.hold {
+            None => Some(members.hull(a, b)?),
+            Some(_) => None,
+        };
         let span = |h: &QuasiPolynomial| h.delays().last().copied().unwrap_or(0.0);
         let longest = span(a).max(span(b))
             - a.delays()
@@ -129,15 +136,15 @@ impl<'a> Leading<'a> {
                 .chain(b.delays())
                 .copied()
                 .fold(f64::INFINITY, f64::min);
-        if hull.degree() == 0 || b.is_zero() {
+        if hull.as_ref().is_some_and(|hull| hull.degree() == 0) || b.is_zero() {
             return None;
         }
         let scale = if longest > 0.0 { 1.0 / longest } else { 1.0 };
         Some(Self {
             members,
             task,
-            plane: Plane::new(a, b),
-            chain: chain_abscissa(&hull),
+            plane: Plane::new(a, b, members.hold),
+            chain: hull.map_or(f64::NEG_INFINITY, |hull| chain_abscissa(&hull)),
             margin: chain_margin(scale),
             scale,
             lines: Vec::new(),
@@ -248,7 +255,7 @@ impl<'a> Leading<'a> {
         let mut weight = 0;
         for root in roots {
             if root.s.re - root.radius > sigma {
-                match root.weight() {
+                match root.weight(self.plane.top()) {
                     Some(own) => weight += own,
                     None => return false,
                 }
@@ -294,6 +301,9 @@ impl<'a> Leading<'a> {
         let Some(h) = (self.members.member)(index) else {
             return Ok(Known::Nothing);
         };
+        if let Some(hold) = self.members.hold {
+            return self.search_held(&h, hold, k);
+        }
         let found = match rightmost(&h, 1, self.task) {
             Ok(found) => found,
             Err(error) if error.ends_all() => return Err(error),
@@ -322,8 +332,22 @@ impl<'a> Leading<'a> {
     }
 }
 
+impl Leading<'_> {
+    /// The same for a loop with a hold.
+    fn search_held(&mut self, h: &QuasiPolynomial, hold: Hold, k: f64) -> Result<Known, Error> {
+        let found = held::rightmost(h, hold, self.task)?;
+        let Some(first) = found.abscissa.filter(|_| found.is_proved) else {
+            return Ok(Known::Nothing);
+        };
+        let behind = first - NEARBY * self.scale;
+        let near = found.roots.iter().take_while(|root| root.re >= behind);
+        self.branches.start(&self.plane, near.copied(), k);
+        Ok(Known::Isolated(first))
+    }
+}
+
 /// Are all discs disjoint?
-fn are_apart(roots: &[Root]) -> bool {
+pub(crate) fn are_apart(roots: &[Root]) -> bool {
     roots.iter().enumerate().all(|(place, one)| {
         roots
             .iter()

@@ -8,3 +8,7 @@ mod branch;
 mod certify;
 mod leading;
 mod plane;
+
+pub(crate) use branch::{Branches, Root};
+pub(crate) use leading::are_apart;
+pub(crate) use plane::Plane;

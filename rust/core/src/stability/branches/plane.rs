@@ -12,6 +12,7 @@ use crate::elementary::{exp, simd};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::simd::{Complex, Simd};
 use crate::stability::crossings::{sizes, united};
+use crate::stability::hold::{Hold, ROUNDINGS};
 
 /// Least radius of bounds around a point, in units of one over the longest delay and of |s|. Larger
 /// bounds hold for longer and are wider.
@@ -32,6 +33,7 @@ pub(crate) struct Plane {
     rows: Vec<(f64, Vec<f64>, Vec<f64>)>,
     degree: f64,
     longest: f64,
+    hold: Option<Hold>,
 }
 
 /// Bounds within `radius` of `center`: on A, A′, A″ and those of B, and ε.
@@ -45,7 +47,7 @@ pub(crate) struct Around {
 }
 
 impl Plane {
-    pub(crate) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial) -> Self {
+    pub(crate) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial, hold: Option<Hold>) -> Self {
         let rows = united(a, b);
         let first = rows.first().map_or(0.0, |row| row.0);
         let rows: Vec<_> = rows
@@ -56,6 +58,7 @@ impl Plane {
             degree: a.degree().max(b.degree()) as f64,
             longest: rows.last().map_or(0.0, |row| row.0),
             rows,
+            hold,
         }
     }
 
@@ -65,12 +68,24 @@ impl Plane {
         let zero = s.re.constant(0.0);
         let zero = Complex::new(zero, zero);
         let (mut a, mut b) = ([zero; 2], [zero; 2]);
+        let (variable, z) = match &self.hold {
+            None => (s, None),
+            Some(hold) => {
+                let (sigma, z) = hold.lanes(s);
+                (sigma, Some(z))
+            }
+        };
         for (delay, of_a, of_b) in &self.rows {
             let turn = (*delay != 0.0).then(|| turned(s, *delay));
-            add_term(&mut a, of_a, s, *delay, turn);
-            add_term(&mut b, of_b, s, *delay, turn);
+            add_term(&mut a, of_a, (variable, z), *delay, turn);
+            add_term(&mut b, of_b, (variable, z), *delay, turn);
         }
         [a[0], a[1], b[0], b[1]]
+    }
+
+    /// The imaginary part at which h is real again; infinite without a hold.
+    pub(crate) fn top(&self) -> f64 {
+        self.hold.map_or(f64::INFINITY, |hold| hold.top())
     }
 
     /// One over the longest delay, or zero where there is none.
@@ -99,25 +114,35 @@ impl Plane {
         let radius = needed.min(FARTHEST * unit).max(least);
         let (mut a, mut b) = ([0.0; 3], [0.0; 3]);
         let far = (size + radius) * ROOM;
+        let held = self
+            .hold
+            .map(|hold| (hold, hold.sizes_around(center, radius)));
+        let derivatives = |row: &[f64]| match held {
+            None => sizes(row, far),
+            Some((hold, (sigma, z))) => hold.chain(sizes(row, sigma), z),
+        };
         for (delay, of_a, of_b) in &self.rows {
             let weight = exp(-delay * (center.re - radius)) * ROOM;
             if !USABLE.contains(&weight) {
                 return None;
             }
             for (sums, row) in [(&mut a, of_a), (&mut b, of_b)] {
-                let [p, p1, p2, _] = sizes(row, far);
+                let [p, p1, p2, _] = derivatives(row);
                 sums[0] += weight * p * ROOM;
                 sums[1] += weight * (p1 + delay * p) * ROOM;
                 sums[2] += weight * (p2 + delay * (2.0 * p1 + delay * p)) * ROOM;
             }
         }
         let units = 12.0 * self.degree + self.rows.len() as f64 + 24.0 + 16.0 * self.longest * far;
+        let held = self.hold.map_or(0.0, |hold| {
+            hold.coefficients + 0.51 * f64::EPSILON * ROUNDINGS * (self.degree + 1.0)
+        });
         Some(Around {
             center,
             radius,
             a,
             b,
-            rounding: 0.51 * f64::EPSILON * units,
+            rounding: 0.51 * f64::EPSILON * units + held,
         })
     }
 }
@@ -139,24 +164,27 @@ fn turned<S: Simd>(s: Complex<S>, delay: f64) -> Complex<S> {
     Complex::new(weight * cosine, -(weight * sine))
 }
 
-/// Add p(s) `turn` and its derivative by s.
+/// Add p `turn` and its derivative by s; p is a polynomial in `variable`, which is s, or σ with z.
 #[inline(always)]
 fn add_term<S: Simd>(
     sum: &mut [Complex<S>; 2],
     row: &[f64],
-    s: Complex<S>,
+    (variable, z): (Complex<S>, Option<Complex<S>>),
     delay: f64,
     turn: Option<Complex<S>>,
 ) {
     let Some((leading, others)) = row.split_last() else {
         return;
     };
-    let zero = s.re.constant(0.0);
-    let mut p = Complex::new(s.re.constant(*leading), zero);
+    let zero = variable.re.constant(0.0);
+    let mut p = Complex::new(variable.re.constant(*leading), zero);
     let mut slope = Complex::new(zero, zero);
     for c in others.iter().rev() {
-        slope = slope * s + p;
-        p = p.mul_add(s, *c);
+        slope = slope * variable + p;
+        p = p.mul_add(variable, *c);
+    }
+    if let Some(z) = z {
+        slope = slope * z;
     }
     let (p, slope) = match turn {
         Some(turn) => (p * turn, (slope - p.scaled(delay)) * turn),

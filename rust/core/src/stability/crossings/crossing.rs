@@ -41,9 +41,6 @@ const STRIDE: f64 = 2.5;
 /// First points tried off the real axis, as shares of a step.
 const STARTS: [f64; 5] = [1.0, 0.7, 0.4, 0.2, 0.1];
 
-/// Bounds are computed at least this factor ahead.
-const AHEAD: f64 = 1.05;
-
 /// Length of a step, in reaches of its first point.
 const STRETCH: f64 = 1.9;
 
@@ -250,7 +247,7 @@ impl<'a> Search<'a> {
     /// be resolved.
     fn advance(&mut self, here: &Point, stride: f64) -> Option<Point> {
         let rest = self.top - here.t;
-        let bounds = self.bounds_to(here.t, AHEAD * here.t + 0.5 * self.step)?;
+        let bounds = self.bounds_to(here.t, self.pencil.horizon(here.t, self.step))?;
         let most = rest.min(stride).min(bounds.reach - here.t);
         let own = self.reach(here, 1.0, most, &bounds);
         let mut length = (STRETCH * own.length).min(most);

@@ -9,7 +9,8 @@ mod pencil;
 mod row;
 
 pub use crossing::Crossing;
+pub(crate) use crossing::crossings;
 pub use one_gain::crossings_along;
 pub(crate) use one_gain::radius_of_members;
-pub(crate) use pencil::{sizes, united};
+pub(crate) use pencil::{Pencil, sizes, united};
 pub(crate) use row::{Members, Row};

@@ -88,7 +88,7 @@ pub fn crossings_along(
         along: Complex64::I,
         length: top,
     };
-    let found = match Pencil::new(&a, &b, axis) {
+    let found = match Pencil::new(&a, &b, axis, None) {
         Some(pencil) => crossings(&pencil, true, top, range, task)?,
         None => None,
     };

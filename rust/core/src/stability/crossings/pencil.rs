@@ -10,16 +10,18 @@
 //! A_i, ε = u (12n + m + 16 + 4 d (|x| + |y|)), d the largest delay. Coefficients and delays that
 //! are themselves sums of a few rounded products change A by u (8 + 8 d (|x| + |y|)) A₀ at most,
 //! which ε includes, so that the proofs hold for both. Then F⁽ⁱ⁾ is within 2.25 ε times the product
-//! of bounds that bounds it: 2 ε + ε² from the factors, 3 u from their product.
+//! of bounds that bounds it: 2 ε + ε² from the factors, 3 u from their product. With a `hold` the
+//! polynomials are those in σ, and ε is larger by what `hold` adds.
 
 use num_complex::Complex64;
 
 use crate::elementary::{exp, sin_cos};
 use crate::quasipoly::{QuasiPolynomial, modulus};
+use crate::stability::hold::{Hold, ROUNDINGS};
 use crate::stability::specification::Piece;
 
-/// Bounds are computed for this factor more than requested, plus one step, so that they need not be
-/// renewed at every step.
+/// Bounds are computed up to this factor further than needed now, plus a step, so that they need
+/// not be renewed at every step.
 const AHEAD: f64 = 1.1;
 
 /// Covers the rounding errors of the bounds themselves and of inequalities with them.
@@ -44,6 +46,7 @@ pub(crate) struct Pencil {
     line: Piece,
     degree: f64,
     longest: f64,
+    hold: Option<Hold>,
 }
 
 /// Value and first two derivatives.
@@ -80,7 +83,12 @@ pub(crate) struct Bounds {
 
 impl Pencil {
     /// `None` where B is zero, or numbers would leave the range of double precision.
-    pub(crate) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial, line: Piece) -> Option<Self> {
+    pub(crate) fn new(
+        a: &QuasiPolynomial,
+        b: &QuasiPolynomial,
+        line: Piece,
+        hold: Option<Hold>,
+    ) -> Option<Self> {
         let origin = b.delays().first().copied().filter(|_| !b.is_zero())?;
         let rows: Vec<Row> = united(a, b)
             .into_iter()
@@ -104,6 +112,7 @@ impl Pencil {
             degree: a.degree().max(b.degree()) as f64,
             longest,
             rows,
+            hold,
         })
     }
 
@@ -113,10 +122,23 @@ impl Pencil {
         1.0 / self.longest
     }
 
+    /// How far bounds are needed from t on. On a slanted line, along which the exponentials grow,
+    /// bounds from further ahead would be wide.
+    pub(crate) fn horizon(&self, t: f64, step: f64) -> f64 {
+        if self.line.along.re == 0.0 {
+            (0.5 + 0.5 * AHEAD) * t + 0.5 * step
+        } else {
+            t + 0.5 * step
+        }
+    }
+
     /// A, B and F at one t.
     pub(crate) fn at(&self, t: f64) -> Point {
         let s = self.line.from + self.line.along * t;
         let (mut a, mut b) = ([Complex64::ZERO; 3], [Complex64::ZERO; 3]);
+        let held = self.hold.map(|hold| (hold.at(s), hold.sample_time));
+        let variable = held.map_or(s, |((sigma, _), _)| sigma);
+        let inner = held.map(|((_, z), sample_time)| (z, sample_time));
         for row in &self.rows {
             let weight = row.weight.unwrap_or_else(|| exp(-row.delay * s.re));
             let turn = if row.delay == 0.0 {
@@ -125,8 +147,8 @@ impl Pencil {
                 let (sine, cosine) = sin_cos(row.delay * s.im);
                 Complex64::new(weight * cosine, -weight * sine)
             };
-            add_term(&mut a, &row.a, s, row.delay, turn);
-            add_term(&mut b, &row.b, s, row.delay, turn);
+            add_term(&mut a, &row.a, (variable, inner), row.delay, turn);
+            add_term(&mut b, &row.b, (variable, inner), row.delay, turn);
         }
         // d/dt = c d/ds.
         let c = self.line.along;
@@ -149,10 +171,19 @@ impl Pencil {
     /// Bounds from `low` to slightly more than `high`, about one `step`; `None` where they leave
     /// the range of double precision.
     pub(crate) fn bounds(&self, low: f64, high: f64, step: f64) -> Option<Bounds> {
-        let reach = AHEAD * high + step;
+        let reach = if self.line.along.re == 0.0 {
+            AHEAD * high + step
+        } else {
+            high + step
+        };
         let ends = [low, reach].map(|t| self.line.from + self.line.along * t);
         // A modulus is largest at one of the ends, and so is an exponential of the real part.
         let size = modulus(ends[0]).max(modulus(ends[1])) * ROOM;
+        let held = self.hold.map(|hold| (hold, hold.sizes(ends)));
+        let derivatives = |coefficients: &[f64]| match held {
+            None => sizes(coefficients, size),
+            Some((hold, (sigma, z))) => hold.chain(sizes(coefficients, sigma), z),
+        };
         let heaviest = |row: &Row| {
             let [first, last] = ends.map(|s| exp(-row.delay * s.re));
             row.weight.unwrap_or(first.max(last) * ROOM)
@@ -165,7 +196,7 @@ impl Pencil {
         for (row, weight) in self.rows.iter().zip(&weights) {
             let d = row.delay.abs();
             for (sums, coefficients) in [(&mut a, &row.a), (&mut b, &row.b)] {
-                let [p, p1, p2, p3] = sizes(coefficients, size);
+                let [p, p1, p2, p3] = derivatives(coefficients);
                 let terms = [
                     p,
                     p1 + d * p,
@@ -185,7 +216,7 @@ impl Pencil {
                     .iter()
                     .zip(&weights)
                     .fold(0.0, |sum, (row, weight)| {
-                        let [p, p1, ..] = sizes(if which == 0 { &row.a } else { &row.b }, size);
+                        let [p, p1, ..] = derivatives(if which == 0 { &row.a } else { &row.b });
                         sum + weight * (p1 + (row.delay - origin).abs() * p) * ROOM
                     })
             };
@@ -196,7 +227,10 @@ impl Pencil {
             all.fold(f64::INFINITY, f64::min)
         });
         let units = 12.0 * self.degree + self.rows.len() as f64 + 24.0 + 32.0 * self.longest * size;
-        let rounding = 0.51 * f64::EPSILON * units;
+        let held = self.hold.map_or(0.0, |hold| {
+            hold.coefficients + 0.51 * f64::EPSILON * ROUNDINGS * (self.degree + 1.0)
+        });
+        let rounding = 0.51 * f64::EPSILON * units + held;
         let first = a[1] * b[0] + a[0] * b[1];
         let second = a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2];
         let third = a[3] * b[0] + 3.0 * (a[2] * b[1] + a[1] * b[2]) + a[0] * b[3];
@@ -229,17 +263,28 @@ pub(crate) fn united(a: &QuasiPolynomial, b: &QuasiPolynomial) -> Vec<(f64, Vec<
         .collect()
 }
 
-/// Add p(s) `turn` and its derivatives by s.
+/// Add p `turn` and its derivatives by s; p is a polynomial in `variable`, which is s, or σ with
+/// z and the sample time of a hold.
 #[inline(always)]
-fn add_term(sum: &mut Jet, row: &[f64], s: Complex64, delay: f64, turn: Complex64) {
+fn add_term(
+    sum: &mut Jet,
+    row: &[f64],
+    (variable, inner): (Complex64, Option<(Complex64, f64)>),
+    delay: f64,
+    turn: Complex64,
+) {
     if row.is_empty() {
         return;
     }
     let (mut p, mut p1, mut p2) = (Complex64::ZERO, Complex64::ZERO, Complex64::ZERO);
     for c in row.iter().rev() {
-        p2 = p2 * s + p1;
-        p1 = p1 * s + p;
-        p = p * s + c;
+        p2 = p2 * variable + p1;
+        p1 = p1 * variable + p;
+        p = p * variable + c;
+    }
+    if let Some((z, sample_time)) = inner {
+        p2 = z * (z * p2 + 0.5 * sample_time * p1);
+        p1 *= z;
     }
     sum[0] += p * turn;
     sum[1] += (p1 - p * delay) * turn;

@@ -13,6 +13,8 @@ use super::pencil::{Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
 use crate::stability::cell::{Cell, UNKNOWN, by_chain, judge};
+use crate::stability::held;
+use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
 use crate::status::CellStatus;
 use crate::{Error, Task, memory};
@@ -87,6 +89,8 @@ pub(crate) struct Members<'a> {
     pub(crate) specification: Specification,
     /// The index of a cell whose count is already known, and that cell.
     pub(crate) anchor: Option<(usize, Cell)>,
+    /// The hold whose variable the polynomials are in, if there is one.
+    pub(crate) hold: Option<Hold>,
 }
 
 impl Members<'_> {
@@ -103,7 +107,8 @@ impl Members<'_> {
             let cell = self.judge(0, task)?;
             return Ok(self.uniform(cell));
         }
-        if let Some(cell) = self.hull(a, b).and_then(|hull| self.led_by_chains(&hull)) {
+        let chains = self.hull(a, b).filter(|_| self.hold.is_none());
+        if let Some(cell) = chains.and_then(|hull| self.led_by_chains(&hull)) {
             return Ok(self.uniform(cell));
         }
         match self.crossings(a, b, task)? {
@@ -170,7 +175,7 @@ impl Members<'_> {
     }
 
     /// Every cell judged alone.
-    fn alone(&self, task: &Task) -> Result<Row, Error> {
+    pub(crate) fn alone(&self, task: &Task) -> Result<Row, Error> {
         let mut row = Row::default();
         self.judge_all(0..self.points.len(), &mut row.spans, task)?;
         Ok(row)
@@ -194,6 +199,9 @@ impl Members<'_> {
         b: &QuasiPolynomial,
         task: &Task,
     ) -> Result<Option<Vec<Crossing>>, Error> {
+        if let Some((range, hold)) = self.range().zip(self.hold) {
+            return held::crossings(a, b, self.specification, hold, range, task);
+        }
         let Some((range, hull)) = self.range().zip(self.hull(a, b)) else {
             return Ok(None);
         };
@@ -211,7 +219,7 @@ impl Members<'_> {
             if length <= 0.0 {
                 break;
             }
-            let Some(pencil) = Pencil::new(a, b, piece) else {
+            let Some(pencil) = Pencil::new(a, b, piece, None) else {
                 return Ok(None);
             };
             match crossings(&pencil, index == 0, length, range, task)? {
@@ -367,7 +375,10 @@ impl Members<'_> {
 
     fn judge(&self, index: usize, task: &Task) -> Result<Cell, Error> {
         match (self.member)(index) {
-            Some(h) => judge(&h, self.specification, false, task),
+            Some(h) => match self.hold {
+                None => judge(&h, self.specification, false, task),
+                Some(hold) => held::count(&h, self.specification, hold, task),
+            },
             None => Ok(Cell::UNDECIDED),
         }
     }

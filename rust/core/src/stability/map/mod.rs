@@ -18,5 +18,6 @@ mod rows;
 pub use axes::{Axis, Proof, Question};
 pub use chart::Chart;
 pub use curves::Vertex;
+pub(crate) use curves::join;
 pub use grid::{Boundaries, boundaries, chains, map};
 pub use robust::robust_map;

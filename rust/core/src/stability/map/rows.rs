@@ -108,6 +108,7 @@ impl<'a> Rows<'a> {
             member: &member,
             specification: self.map.question.specification,
             anchor: None,
+            hold: None,
         };
         let sorted = across.points.is_sorted();
         let row = if sorted {
@@ -147,6 +148,7 @@ impl<'a> Rows<'a> {
                     member: &member,
                     specification: self.map.question.specification,
                     anchor: None,
+                    hold: None,
                 };
                 work(index, members)
             },

@@ -200,7 +200,7 @@ impl AllRows<'_> {
                 status: CellStatus::Undecided,
             });
         }
-        let sizes: Vec<f64> = eigenvalues(matrix, sample)?
+        let sizes: Vec<f64> = eigenvalues(matrix, sample.states(), sample.size())?
             .iter()
             .map(|z| z.norm())
             .collect();

@@ -15,4 +15,5 @@ mod window;
 pub use grid::{CellPoles, LoopCells, abscissa_grid};
 pub(crate) use run::run;
 pub use timing::Timing;
+pub(crate) use transition::eigenvalues;
 pub use transition::{balanced_matrix, poles, transition_matrix};

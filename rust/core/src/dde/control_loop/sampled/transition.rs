@@ -137,7 +137,7 @@ fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
 /// As [`transition_matrix`]; [`Error::Convergence`] where the QR algorithm fails.
 pub fn poles(plant: &LinearLoop) -> Result<Vec<Complex64>, Error> {
     let (matrix, sample, sample_time) = closed(plant)?;
-    let mut poles: Vec<_> = eigenvalues(matrix, &sample)?
+    let mut poles: Vec<_> = eigenvalues(matrix, sample.states(), sample.size())?
         .into_iter()
         .map(|z| Complex64::new(z.norm().ln() / sample_time, z.arg() / sample_time))
         .collect();
@@ -184,10 +184,13 @@ pub(super) fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), E
     Ok(())
 }
 
-/// Eigenvalues of a transition matrix of `sample`.
-pub(super) fn eigenvalues(mut matrix: Vec<f64>, sample: &Sample) -> Result<Vec<Complex64>, Error> {
-    let size = sample.size();
-    balance(&mut matrix, sample.states(), size);
+/// Eigenvalues of a transition matrix, row-major, with `states` before the commands.
+pub(crate) fn eigenvalues(
+    mut matrix: Vec<f64>,
+    states: usize,
+    size: usize,
+) -> Result<Vec<Complex64>, Error> {
+    balance(&mut matrix, states, size);
     MatRef::from_row_major_slice(&matrix, size, size)
         .eigenvalues()
         .map_err(|_| Error::Convergence {

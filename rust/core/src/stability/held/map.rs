@@ -1,0 +1,323 @@
+//! Stability of loops with a hold over two parameters.
+//!
+//! Along a row a gain varies in which the feedback is affine; everything else may vary from row to
+//! row. Where it does not, as in a map over two gains, the model is shared by all rows, and the
+//! counts of all rows start from those of one column. Rows are counted as those of any map
+//! (`crossings`). A row of one cell is judged alone.
+
+use super::model::{LoopPolynomials, Polynomial};
+use crate::quasipoly::QuasiPolynomial;
+use crate::stability::crossings::{Crossing, Members, sizes};
+use crate::stability::hold::Hold;
+use crate::stability::map::{Chart, Proof, Question, Vertex, join};
+use crate::stability::specification::Specification;
+use crate::{Error, Task, memory};
+
+/// Upper limit on the number of cells (bounds memory and time).
+const MAX_CELLS: usize = 50_000_000;
+
+/// Least |σ| at which bounds are compared, in units of one over the delay; and the largest, in
+/// units of one over the sample time, for |z| ≤ 1.
+const LEAST: f64 = 1.0 / 64.0;
+const LARGEST: f64 = 4.0;
+
+/// Loops x′ = A x + B w, u = (K + k K₁) x + (L + k L₁) w, w the command a delay later. Every array
+/// holds one entry for all rows, or one a row.
+#[derive(Debug, Clone, Copy)]
+pub struct LoopRows<'a> {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of states.
+    pub states: usize,
+    /// A, n × n an entry.
+    pub a: &'a [f64],
+    /// B, n an entry.
+    pub b: &'a [f64],
+    /// K, n an entry.
+    pub k: &'a [f64],
+    /// L.
+    pub l: &'a [f64],
+    /// K₁, n an entry.
+    pub k_slope: &'a [f64],
+    /// L₁.
+    pub l_slope: &'a [f64],
+    /// Delay, s.
+    pub delay: &'a [f64],
+    /// Sample time, s.
+    pub sample_time: &'a [f64],
+    /// The values of k in every row.
+    pub points: &'a [f64],
+}
+
+/// A row with numbers: everything that its members follow from.
+struct Numbers {
+    hold: Hold,
+    delay: f64,
+    a: Vec<f64>,
+    constant: Vec<f64>,
+    slope: Vec<f64>,
+    /// A and B of A + k B.
+    parts: Option<(QuasiPolynomial, QuasiPolynomial)>,
+}
+
+/// Counts (and abscissas) of every row; row-major, or with the rows as columns. `column` is the
+/// column of the map at the middle of its points: one row, with a value of k for each row of the map.
+///
+/// # Errors
+/// [`Error::Argument`] for arrays of other lengths or models without sense; [`Error::TooMuch`]
+/// beyond 50 million cells; [`Error::Interrupted`].
+pub fn held_map(
+    rows: &LoopRows<'_>,
+    column: Option<&LoopRows<'_>>,
+    question: Question,
+    as_columns: bool,
+    task: &Task,
+) -> Result<Chart, Error> {
+    question.specification.check()?;
+    let cells = rows.rows.saturating_mul(rows.points.len());
+    if cells > MAX_CELLS {
+        return Err(Error::TooMuch {
+            what: "the map",
+            limit: MAX_CELLS as u64,
+            unit: "cells",
+            advice: format!(
+                "{} by {} points were requested: take fewer points, or several maps of smaller \
+                 ranges",
+                rows.rows,
+                rows.points.len()
+            ),
+        });
+    }
+    if cells == 0 {
+        return Ok(Chart::default());
+    }
+    let shared = rows.shared_model()?;
+    let anchors = match column.filter(|column| column.points.is_sorted()) {
+        None => None,
+        Some(column) => {
+            let numbers = column.numbers(0, None)?;
+            let counted = numbers.members(column.points, question.specification, |members| {
+                members.crossed(task)
+            })?;
+            Some((rows.points.len() / 2, counted))
+        }
+    };
+    let counted = rows.each(task, |index| {
+        let numbers = rows.numbers(index, shared.as_ref())?;
+        let row = numbers.members(rows.points, question.specification, |members| {
+            let members = Members {
+                anchor: anchors
+                    .as_ref()
+                    .and_then(|(place, row)| Some((*place, row.cell(index)?))),
+                ..*members
+            };
+            let counts = if question.proof == Proof::Cells || !rows.points.is_sorted() {
+                members.alone(task)?
+            } else {
+                members.count(task)?
+            };
+            if question.abscissa {
+                members.abscissas(&counts, task)
+            } else {
+                Ok(counts)
+            }
+        })?;
+        task.advance(rows.points.len() as u64);
+        Ok(row)
+    })?;
+    let mut chart = Chart::stable(cells)?;
+    let width = if as_columns {
+        rows.rows
+    } else {
+        rows.points.len()
+    };
+    chart.fill(&counted, width, as_columns)?;
+    Ok(chart)
+}
+
+/// The curves on which roots lie on the edge of the specification.
+///
+/// # Errors
+/// As for [`held_map`].
+pub fn held_boundaries(
+    rows: &LoopRows<'_>,
+    specification: Specification,
+    task: &Task,
+) -> Result<Vec<Vec<Vertex>>, Error> {
+    specification.check()?;
+    let (Some(low), Some(high)) = (rows.points.first(), rows.points.last()) else {
+        return Ok(Vec::new());
+    };
+    let shared = rows.shared_model()?;
+    let crossings: Vec<Vec<Crossing>> = rows.each(task, |index| {
+        let numbers = rows.numbers(index, shared.as_ref())?;
+        numbers.members(rows.points, specification, |members| {
+            Ok(members.found(task)?.unwrap_or_default())
+        })
+    })?;
+    Ok(join(&crossings, (*low, *high)))
+}
+
+impl<'a> LoopRows<'a> {
+    /// An entry of an array for a row.
+    fn entry(
+        &self,
+        name: &str,
+        data: &'a [f64],
+        width: usize,
+        row: usize,
+    ) -> Result<&'a [f64], Error> {
+        let start = if data.len() == width { 0 } else { row * width };
+        let fits = data.len() == width || data.len() == width * self.rows;
+        match data.get(start..start + width).filter(|_| fits) {
+            Some(entry) => Ok(entry),
+            None => refuse!(
+                "{name} has {} elements: give {width} for all rows or {} for {} rows",
+                data.len(),
+                width * self.rows,
+                self.rows
+            ),
+        }
+    }
+
+    fn number(&self, name: &str, data: &'a [f64], row: usize) -> Result<f64, Error> {
+        let entry = self.entry(name, data, 1, row)?;
+        Ok(entry.first().copied().unwrap_or(f64::NAN))
+    }
+
+    fn model(&self, row: usize) -> Result<LoopPolynomials, Error> {
+        let n = self.states;
+        LoopPolynomials::new(
+            self.entry("A", self.a, n * n, row)?,
+            self.entry("B", self.b, n, row)?,
+            self.number("delay", self.delay, row)?,
+            self.number("sample_time", self.sample_time, row)?,
+        )
+    }
+
+    /// The model of all rows, where they have the same.
+    fn shared_model(&self) -> Result<Option<LoopPolynomials>, Error> {
+        let n = self.states;
+        let is_shared = self.a.len() == n * n
+            && self.b.len() == n
+            && self.delay.len() == 1
+            && self.sample_time.len() == 1;
+        is_shared.then(|| self.model(0)).transpose()
+    }
+
+    fn numbers(&self, row: usize, shared: Option<&LoopPolynomials>) -> Result<Numbers, Error> {
+        let own;
+        let model = match shared {
+            Some(model) => model,
+            None => {
+                own = self.model(row)?;
+                &own
+            }
+        };
+        let n = self.states;
+        let constant = model.feedback(
+            self.entry("K", self.k, n, row)?,
+            self.number("L", self.l, row)?,
+        );
+        let slope = model.feedback(
+            self.entry("the slope of K", self.k_slope, n, row)?,
+            self.number("the slope of L", self.l_slope, row)?,
+        );
+        let sample_time = self.number("sample_time", self.sample_time, row)?;
+        Ok(Numbers::new(model, constant, slope, sample_time))
+    }
+
+    /// Apply `work` to all rows, in parallel.
+    fn each<T: Default + Send>(
+        &self,
+        task: &Task,
+        work: impl Fn(usize) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        memory::in_parallel(
+            "the list of rows of the map",
+            self.rows,
+            || (),
+            |(), index| {
+                task.check()?;
+                work(index)
+            },
+        )
+    }
+}
+
+impl Numbers {
+    fn new(
+        model: &LoopPolynomials,
+        constant: Polynomial,
+        slope: Polynomial,
+        sample_time: f64,
+    ) -> Self {
+        let share = |polynomial: &Polynomial| share_of_errors(polynomial, model.delay, sample_time);
+        let coefficients = share(&model.a).max(share(&constant)).max(share(&slope));
+        let negative = |row: &[f64]| row.iter().map(|c| -c).collect::<Vec<f64>>();
+        let a = model.a.coefficients.clone();
+        let rows = vec![a.clone(), negative(&constant.coefficients)];
+        let with = QuasiPolynomial::new(rows, vec![0.0, model.delay]);
+        let by = QuasiPolynomial::new(vec![negative(&slope.coefficients)], vec![model.delay]);
+        Self {
+            hold: Hold {
+                sample_time,
+                coefficients,
+            },
+            delay: model.delay,
+            a,
+            constant: constant.coefficients,
+            slope: slope.coefficients,
+            parts: with.ok().zip(by.ok()).filter(|_| coefficients.is_finite()),
+        }
+    }
+
+    /// h at one k; `None` where a coefficient overflows or is not known.
+    fn member(&self, k: f64) -> Option<QuasiPolynomial> {
+        let row = self.constant.iter().zip(&self.slope);
+        let row = row
+            .map(|(constant, slope)| -(constant + k * slope))
+            .collect();
+        let rows = vec![self.a.clone(), row];
+        self.parts.as_ref()?;
+        QuasiPolynomial::new(rows, vec![0.0, self.delay]).ok()
+    }
+
+    fn members<T>(
+        &self,
+        points: &[f64],
+        specification: Specification,
+        work: impl FnOnce(&Members<'_>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let member = |index: usize| self.member(points.get(index).copied()?);
+        work(&Members {
+            parts: self.parts.as_ref(),
+            points,
+            member: &member,
+            specification,
+            anchor: None,
+            hold: Some(self.hold),
+        })
+    }
+}
+
+/// The largest ratio of the polynomial with the errors of the coefficients to that with their
+/// moduli, and of their derivatives, wherever a bound is taken.
+fn share_of_errors(polynomial: &Polynomial, delay: f64, sample_time: f64) -> f64 {
+    if polynomial.errors.iter().all(|error| *error == 0.0) {
+        return 0.0;
+    }
+    let mut most = 0.0f64;
+    let mut x = LEAST / delay;
+    while x < LARGEST / sample_time {
+        let bounds = sizes(&polynomial.coefficients, x);
+        let errors = sizes(&polynomial.errors, 2.0 * x);
+        for (size, error) in bounds.into_iter().zip(errors) {
+            if error > 0.0 {
+                most = most.max(error / size);
+            }
+        }
+        x *= 2.0;
+    }
+    most
+}

@@ -1,0 +1,202 @@
+//! Maps against the eigenvalues of transition matrices.
+
+use super::*;
+use crate::Task;
+use crate::dde::control_loop::sampled;
+use crate::dde::{Equations, LinearLoop};
+use crate::stability::{Chart, Damping, Question, Specification};
+use crate::status::CellStatus;
+
+/// A P or PV loop around an integrator with n − 1 lags.
+struct Plant {
+    a: Vec<f64>,
+    b: Vec<f64>,
+    p: Vec<f64>,
+    v: Vec<f64>,
+}
+
+fn plant(lags: &[f64]) -> Plant {
+    let n = lags.len() + 1;
+    let mut a = vec![0.0; n * n];
+    let mut b = vec![0.0; n];
+    for (i, lag) in lags.iter().enumerate() {
+        // A chain: x_i′ = x_{i+1} − 0, the lags from the command on.
+        a[i * n + i + 1] = if i == 0 { 1.0 } else { 1.0 / lags[i - 1] };
+        if i > 0 {
+            a[i * n + i] = -1.0 / lags[i - 1];
+        }
+        if i + 1 == n - 1 {
+            a[(n - 1) * n + n - 1] = -1.0 / lag;
+        }
+    }
+    b[n - 1] = lags.last().map_or(1.0, |lag| 1.0 / lag);
+    let mut p = vec![0.0; n];
+    p[0] = -1.0;
+    let mut v = vec![0.0; n];
+    v[1.min(n - 1)] = if n > 1 { -1.0 } else { 0.0 };
+    Plant { a, b, p, v }
+}
+
+/// Poles s of the loop with Kp and Kv.
+fn poles(
+    plant: &Plant,
+    gains: (f64, f64),
+    delay: f64,
+    sample_time: f64,
+) -> Vec<num_complex::Complex64> {
+    let k = plant
+        .p
+        .iter()
+        .zip(&plant.v)
+        .map(|(p, v)| gains.0 * p + gains.1 * v)
+        .collect();
+    let direct = if plant.b.len() == 1 { -gains.1 } else { 0.0 };
+    let n = plant.b.len();
+    let equations = Equations {
+        a: plant.a.clone(),
+        b: plant.b.clone(),
+        e: vec![0.0; n],
+        k,
+        l: direct,
+        c: vec![0.0; n],
+        ..Equations::default()
+    };
+    sampled::poles(&LinearLoop::new(equations, delay, Some(sample_time), None).unwrap()).unwrap()
+}
+
+fn mapped(
+    plant: &Plant,
+    kp: &[f64],
+    kv: &[f64],
+    delay: f64,
+    sample_time: f64,
+    question: Question,
+) -> Chart {
+    let n = plant.b.len();
+    let k: Vec<f64> = kv
+        .iter()
+        .flat_map(|kv| plant.v.iter().map(move |v| kv * v))
+        .collect();
+    let l: Vec<f64> = kv.iter().map(|kv| if n == 1 { -kv } else { 0.0 }).collect();
+    let rows = LoopRows {
+        rows: kv.len(),
+        states: n,
+        a: &plant.a,
+        b: &plant.b,
+        k: &k,
+        l: &l,
+        k_slope: &plant.p,
+        l_slope: &[0.0],
+        delay: &[delay],
+        sample_time: &[sample_time],
+        points: kp,
+    };
+    let middle = kp[kp.len() / 2];
+    let column_k: Vec<f64> = plant.p.iter().map(|p| middle * p).collect();
+    let column = LoopRows {
+        rows: 1,
+        k: &column_k,
+        l: &[0.0],
+        k_slope: &plant.v,
+        l_slope: &[if n == 1 { -1.0 } else { 0.0 }],
+        points: kv,
+        ..rows
+    };
+    held_map(&rows, Some(&column), question, false, &Task::new()).unwrap()
+}
+
+fn violates(s: num_complex::Complex64, specification: Specification) -> (bool, bool) {
+    let slow = s.re + specification.decay;
+    let margin = 1e-6;
+    let mut violated = slow > 0.0;
+    let mut near = slow.abs() < margin;
+    if let Some(Damping { ratio, horizon }) = specification.damping {
+        let weak = -s.re / s.norm() - ratio;
+        violated |= s.re > -horizon && weak < 0.0;
+        near |= (s.re + horizon).abs() < margin || weak.abs() < margin;
+    }
+    (violated, near)
+}
+
+#[test]
+fn maps_agree_with_eigenvalues() {
+    let kp: Vec<f64> = (0..23).map(|i| -1.0 + 0.37 * f64::from(i)).collect();
+    let kv: Vec<f64> = (0..11).map(|i| -0.83 + 0.19 * f64::from(i)).collect();
+    let specifications = [
+        Specification::default(),
+        Specification {
+            decay: 0.7,
+            damping: None,
+        },
+        Specification {
+            decay: -0.4,
+            damping: None,
+        },
+        Specification {
+            decay: 0.2,
+            damping: Some(Damping {
+                ratio: 0.3,
+                horizon: 6.0,
+            }),
+        },
+        Specification {
+            decay: 0.0,
+            damping: Some(Damping {
+                ratio: 0.5,
+                horizon: 400.0,
+            }),
+        },
+    ];
+    let mut compared = 0;
+    for lags in [&[][..], &[0.15], &[0.15, 0.03], &[0.4, 0.1, 0.02, 0.01]] {
+        let plant = plant(lags);
+        for (delay, sample_time) in [
+            (0.0, 0.1),
+            (0.36, 0.065),
+            (0.325, 0.065),
+            (0.1, 0.3),
+            (0.2, 0.004),
+        ] {
+            for specification in specifications {
+                let question = Question {
+                    specification,
+                    abscissa: true,
+                    ..Question::default()
+                };
+                let chart = mapped(&plant, &kp, &kv, delay, sample_time, question);
+                for (row, kv) in kv.iter().enumerate() {
+                    for (column, kp) in kp.iter().enumerate() {
+                        let at = row * 23 + column;
+                        let found = poles(&plant, (*kp, *kv), delay, sample_time);
+                        let judged: Vec<_> = found
+                            .iter()
+                            .filter(|s| s.re.is_finite())
+                            .map(|s| violates(*s, specification))
+                            .collect();
+                        if judged.iter().any(|(_, near)| *near) {
+                            continue;
+                        }
+                        let truth = judged.iter().filter(|(violated, _)| *violated).count();
+                        assert_eq!(
+                            chart.status[at],
+                            CellStatus::Ok,
+                            "{lags:?} {delay} {sample_time} {specification:?} {kp} {kv} truth {truth}"
+                        );
+                        assert_eq!(
+                            chart.unstable[at] as usize, truth,
+                            "{lags:?} {delay} {sample_time} {specification:?} {kp} {kv}"
+                        );
+                        let abscissa = found[0].re;
+                        assert!(
+                            (chart.abscissa[at] - abscissa).abs() < 1e-6 * (1.0 + abscissa.abs()),
+                            "{lags:?} {delay} {sample_time} {kp} {kv}: {} {abscissa}",
+                            chart.abscissa[at]
+                        );
+                        compared += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 20_000, "{compared}");
+}
