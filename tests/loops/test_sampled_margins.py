@@ -6,7 +6,6 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.loops._sampled_margins import _crossings, sampled_margins
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -134,8 +133,7 @@ def test_fast_samples_have_the_margins_of_the_continuous_loop(controller):
 def test_no_gain_below_the_margin_is_unstable(Kp, Kv, delay, period, lag):
     loop = sampled(dtm.Integrator(0.85, lag), dtm.PV(Kp, Kv, SMOOTH), delay, period)
     assume(loop.spectral_abscissa() < -1e-3)
-    # Without the delay margin, which takes matrices of up to a thousand samples.
-    found = sampled_margins(loop._sampled_gain, True, (math.nan, math.nan))
+    found = loop.margin()
     assert radius(loop, found.gain_margin) == pytest.approx(1.0, abs=1e-7)
     for factor in np.linspace(1.0, found.gain_margin, 15)[:-1]:
         assert radius(loop, factor) < 1.0
@@ -165,16 +163,6 @@ def test_a_pole_among_the_frequencies_leaves_the_others_as_they_are():
     found = LOOPS[0].frequency_response([0.0, 1.0])
     assert np.isinf(found[0])
     assert found[1] == pytest.approx(LOOPS[0].frequency_response(1.0), rel=1e-12)
-
-
-def test_a_pair_of_crossings_between_two_angles_is_found():
-    def f(angle):
-        return (angle - 1.03) ** 2 - 1e-4
-
-    angles = np.linspace(0.5, 2.0, 7)
-    assert (f(angles) > 0.0).all()
-    np.testing.assert_allclose(_crossings(f, angles), [1.02, 1.04], rtol=1e-12)
-    np.testing.assert_allclose(_crossings(lambda a: -f(a), angles), [1.02, 1.04], rtol=1e-12)
 
 
 def test_frequencies_beyond_half_the_sampling_rate_are_refused():

@@ -250,15 +250,6 @@ def test_invalid_requirements_are_refused(options, error, word):
         dtm.stability_map(family, ranges, (3, 3), **options)
 
 
-def test_families_without_curves():
-    loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1), delay=LAG, sample_time=0.065)
-    sampled = dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, (4, 3))
-    with pytest.raises(ValueError, match="sampled"):
-        _ = sampled.boundaries
-    with pytest.raises(ValueError, match="by a circle"):
-        dtm.stability_map(loop, {"Kp": (0, 4), "Kv": (0, 0.5)}, damping=(0.4, 2.0))
-
-
 def test_decay_of_sampled_loops_is_that_of_their_abscissa():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1), delay=LAG, sample_time=0.065)
     chart = dtm.stability_map(loop, {"Kp": (0.1, 4), "Kv": (0, 0.5)}, (14, 13), decay=0.5)

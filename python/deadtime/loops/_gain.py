@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
@@ -13,11 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.validation import real_array
 from deadtime.loops._characteristic import closed_loop, open_loop
 from deadtime.loops._sampled_gain import SampledLoopGain
-from deadtime.loops._sampled_margins import sampled_margins
-from deadtime.loops._sampled_ranges import SampledNumber, further_delay
 from deadtime.loops._specification import LoopSpecification
-from deadtime.loops._stability import sampled_abscissa, sampled_is_stable
+from deadtime.loops._stability import sampled_is_stable
 from deadtime.systems import Margins, TransferFunction
+from deadtime.systems._margins import margins_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,9 +117,8 @@ class LoopGain:
         loop = self.specification
         if loop.sample_time is None:
             return self.open_loop().margin()
-        stable = sampled_abscissa(loop.model, loop.known_delay, loop.sample_time) < 0.0
-        late = self._further_delay() if stable and delay_margin else (math.nan, math.nan)
-        return sampled_margins(self._sampled_gain, stable, late)
+        _ = loop.known_delay
+        return margins_of(loop.native.held_margins(delay_margin))
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Return the loop gain, cut at the command, at frequencies; its limit left out.
@@ -220,14 +217,9 @@ class LoopGain:
             return self.margin()._delay_margin()
         if not sampled_is_stable(loop.model, loop.known_delay, loop.sample_time):
             raise ValueError("the loop is not stable as it is: it has no delay margin")
-        return self._further_delay()[0]
+        return loop.native.further_delay()[0]
 
     @cached_property
     def _sampled_gain(self) -> SampledLoopGain:
         loop = self.specification
         return SampledLoopGain.of(loop.model, loop.known_delay, cast(float, loop.sample_time))
-
-    def _further_delay(self) -> tuple[float, float]:
-        """Delay margin in s of a stable sampled loop, and the frequency of its crossing."""
-        loop = self.specification
-        return further_delay(SampledNumber(loop.model_at, loop.parameters, "delay"))

@@ -1,8 +1,7 @@
-"""Stable ranges of the numbers of a sampled loop, and its delay margin.
+"""Stable ranges of the numbers of a sampled loop other than gains and further delay.
 
 Each end is the first loss of stability that `_sampled_march` finds. An end is infinite only if
-stability cannot be lost: the loop gain does not depend on the number, or stays below one on the
-unit circle for every fraction of a sample, so that it is not -1 for any delay.
+the loop gain does not depend on the number.
 """
 
 from __future__ import annotations
@@ -19,16 +18,6 @@ from deadtime.loops._sampled_march import Loss, first_loss
 
 #: First step of a march, relative to the value: a larger one starts faster, but is refused sooner.
 _FIRST_STEP = 1.0 / 16.0
-
-#: Number of delays, in equal fractions of a sample, for which the loop gain is evaluated to find
-#: whether the loop is stable for any delay; and of further ones just below a whole sample, at
-#: distances in equal ratios between these two. More miss fewer peaks between them.
-_FRACTIONS = 33
-_LATE_FRACTIONS = 9
-_LATEST, _LATE = 1e-9, 0.1
-
-#: Largest difference from one at which rounding leaves open whether a gain is above or below one.
-_ROUNDING = 1e-12
 
 #: Changes of a number, relative to it, for which the loop is compared to find whether it depends on
 #: the number: any two that are not special values.
@@ -89,32 +78,6 @@ class SampledNumber:
         )
 
     @property
-    def bears_any_delay(self) -> bool:
-        """Whether the loop gain stays below one on the unit circle for every delay.
-
-        Raises
-        ------
-        ValueError
-            If double precision is not enough to decide it.
-        """
-        period = self._values["sample_time"]
-        model = self._here
-        parts = np.unique(
-            np.append(
-                np.linspace(0.0, 1.0, _FRACTIONS),
-                1.0 - np.geomspace(_LATEST, _LATE, _LATE_FRACTIONS),
-            )
-        )
-        gains = (SampledLoopGain.of(model, part * period, period) for part in parts)
-        largest = max(float(np.abs(gain.at(gain.corners)).max()) for gain in gains)
-        if abs(largest - 1.0) <= _ROUNDING:
-            raise ValueError(
-                "the largest loop gain over all frequencies is one, to rounding: whether a delay "
-                "makes this loop unstable is beyond double precision; change a gain by a little"
-            )
-        return largest < 1.0
-
-    @property
     def _scale(self) -> float:
         return self._values["sample_time"] if self.name == "delay" else 1.0
 
@@ -141,12 +104,3 @@ class SampledNumber:
         fastest = float(np.abs(np.linalg.eigvals(self._here.A).imag).max(initial=0.0))
         period = self._values["sample_time"]
         return _STEP_OF_MODE / fastest if fastest * period > _SLOW else math.inf
-
-
-def further_delay(number: SampledNumber) -> tuple[float, float]:
-    """Delay margin of a stable loop in s, and the frequency in rad/s of its oscillation there."""
-    if number.bears_any_delay:
-        return math.inf, math.nan
-    found = number.loss(math.inf)
-    assert found is not None  # only a finite end can be reached
-    return found.value - number.value, found.angle / number.gain(found.value).sample_time

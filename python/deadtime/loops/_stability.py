@@ -17,10 +17,11 @@ from deadtime._deadtime import sampled_abscissa_grid
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
 from deadtime.loops._factored_plant import PAIR
+from deadtime.loops._held import HeldFamily
 from deadtime.loops._model import LoopModel, refuse_discretised
 from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import Plant
-from deadtime.loops._sampled_ranges import SampledNumber, further_delay
+from deadtime.loops._sampled_ranges import SampledNumber
 from deadtime.roots import Parameter, QuasiPolynomial, RootSet
 
 #: Numbers of a loop that cannot be negative.
@@ -34,6 +35,9 @@ _OF_FILTER = frozenset({"omega", "damping"})
 
 #: Relative value below which a number counts as zero on the way down.
 _NEARLY_ZERO = 1e-6
+#: Largest gain at which crossings are looked for, relative to the largest one of the loop.
+_LARGEST_GAIN = 1e12
+
 #: Relative value up to which a sampled loop is followed where it may be stable for any value.
 _FARTHEST = 1e6
 
@@ -44,7 +48,7 @@ def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> floa
 
 
 def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> bool:
-    """Whether all poles of a sampled loop are inside the unit circle.
+    """Whether all poles of a sampled loop are inside the unit circle, by a proved count.
 
     Raises
     ------
@@ -52,16 +56,10 @@ def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> boo
         If a pole is nearer to the circle than the rounding of the transition matrix.
     """
     native = model.native(delay, sample_time)
-    matrix = native.balanced_matrix()
-    largest = np.exp(native.poles()[0].real * sample_time)
-    # Rounding moves a triple pole by the third root of itself.
-    if abs(largest - 1.0) > 10.0 * np.cbrt(_rounding(matrix)):
-        return bool(largest < 1.0)
-    matrix = _balanced(matrix)
-    largest = np.abs(np.linalg.eigvals(matrix)).max()
-    if abs(largest - 1.0) > 10.0 * np.cbrt(_rounding(matrix)):
-        return bool(largest < 1.0)
-    z, errors = _eigenvalues(matrix)
+    number = native.unstable_poles()
+    if number is not None:
+        return number == 0
+    z, errors = _eigenvalues(_balanced(native.balanced_matrix()))
     sizes = np.abs(z)
     if (sizes + errors < 1.0).all():
         return True
@@ -171,9 +169,34 @@ def sampled_range(
         return low, high
     if name == "delay":
         before = number.loss(0.0)
-        return 0.0 if before is None else before.value, number.value + further_delay(number)[0]
+        native = LoopModel.build(plant, controller, values).native(
+            values["delay"], values["sample_time"]
+        )
+        return 0.0 if before is None else before.value, number.value + native.further_delay()[0]
+    if name == "gain" or name in controller._gains():
+        return _gain_range(plant, controller, values, name, (low, high))
     endless = name in _NON_NEGATIVE or _keeps_sign(plant, name)
     return _sampled_end(number, low, -1.0, endless), _sampled_end(number, high, 1.0, endless)
+
+
+def _gain_range(
+    plant: Plant,
+    controller: Controller,
+    values: Mapping[str, float],
+    name: str,
+    within: tuple[float, float],
+) -> tuple[float, float]:
+    """Between the crossings of the circle next to the present value of a gain."""
+    value = values[name]
+    family = HeldFamily(plant, controller, dict(values), {name: np.array([value])})
+    gains = (value, *(values[gain] for gain in controller._gains()))
+    far = _LARGEST_GAIN * max(abs(gain) for gain in gains)
+    found = family.crossings(-far, far)
+    low, high = within
+    return (
+        float(max(found[found <= value], default=low)) if low < value else low,
+        float(min(found[found >= value], default=high)),
+    )
 
 
 def _sampled_end(number: SampledNumber, end: float, sign: float, endless: bool) -> float:

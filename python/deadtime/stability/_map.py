@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from deadtime._base.extras import library
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.page import table, table_row
-from deadtime._base.progress import Progress, Report, reported
+from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop
 from deadtime.loops._characteristic import numbers_of
+from deadtime.loops._held import HeldFamily, Question
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.stability._arguments import Floats, damping_demand, map_axes, sides
 from deadtime.stability._boundaries import Boundary, boundaries_along, boundaries_of
-from deadtime.stability._held import HeldFamily, Question
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.page import table, table_row
 from deadtime._deadtime import loop_margins
@@ -119,5 +120,9 @@ class Margins(ReadOnlyArrays):
 
 def margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins:
     """Margins of the loop gain n/d."""
-    found = loop_margins(n._native, d._native)
+    return margins_of(loop_margins(n._native, d._native))
+
+
+def margins_of(found: _deadtime.Margins) -> Margins:
+    """Margins as the kernel returns them."""
     return Margins(**{field.name: getattr(found, field.name) for field in fields(Margins)})

@@ -4,11 +4,15 @@ use deadtime::dde::sampled;
 use deadtime::dde::{
     Equations, LinearLoop, RateLimits, Reference, Request, Start, Update, on_sample,
 };
+use deadtime::frequency;
+use deadtime::stability::{HeldLoop, Specification};
+use deadtime::status::CellStatus;
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{column, converted, in_order, owned};
+use crate::frequency::PyMargins;
 use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -209,6 +213,40 @@ impl PyLinearLoop {
     /// Poles s = ln(z)/Ts of a sampled loop, limit left out, rightmost first.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
         Ok(run_here(py, |_| sampled::poles(&self.inner))?.into_pyarray(py))
+    }
+
+    /// Number of poles of a sampled loop outside the unit circle, proved; None where a pole is on it
+    /// to working precision, or the count is beyond that.
+    fn unstable_poles(&self, py: Python<'_>) -> PyResult<Option<i32>> {
+        let cell = run_here(py, |task| {
+            let held = HeldLoop::new(&self.inner)?;
+            held.at(held.delay())?.count(Specification::default(), task)
+        })?;
+        Ok((cell.status == CellStatus::Ok).then_some(cell.unstable))
+    }
+
+    /// ln(ρ)/Ts of a sampled loop, ρ its spectral radius; None where it is not found.
+    fn abscissa(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        let found = run_here(py, |task| {
+            let held = HeldLoop::new(&self.inner)?;
+            held.at(held.delay())?.abscissa(task)
+        })?;
+        Ok(found.map(|(abscissa, _)| abscissa))
+    }
+
+    /// Margins of a sampled loop; the delay margin is NaN where it is not asked for.
+    fn held_margins(&self, py: Python<'_>, delay_margin: bool) -> PyResult<PyMargins> {
+        let found = run_here(py, |task| {
+            frequency::held_margins(HeldLoop::new(&self.inner)?, delay_margin, task)
+        })?;
+        Ok(PyMargins::new(py, found))
+    }
+
+    /// The further delay in s with which a stable sampled loop loses stability, and the frequency.
+    fn further_delay(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
+        run_here(py, |task| {
+            frequency::further_delay(HeldLoop::new(&self.inner)?, task)
+        })
     }
 }
 

@@ -34,7 +34,7 @@ pub(crate) struct PyMargins {
 }
 
 impl PyMargins {
-    fn new(py: Python<'_>, found: Margins) -> Self {
+    pub(crate) fn new(py: Python<'_>, found: Margins) -> Self {
         let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
         Self {
             stable: found.stable,

@@ -142,7 +142,11 @@ pub fn margins(n: &QuasiPolynomial, d: &QuasiPolynomial, task: &Task) -> Result<
 }
 
 /// The smallest of the sizes of `values` and its place; infinite and NaN where there is none.
-fn least(values: &[f64], places: &[f64], size: impl Fn(f64) -> Option<f64>) -> (f64, f64) {
+pub(super) fn least(
+    values: &[f64],
+    places: &[f64],
+    size: impl Fn(f64) -> Option<f64>,
+) -> (f64, f64) {
     let sized = values.iter().zip(places);
     sized
         .filter_map(|(value, place)| size(*value).map(|size| (size, *place)))

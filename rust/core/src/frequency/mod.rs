@@ -4,7 +4,7 @@
 //! frequency made of them, `squares` the difference of two moduli; `zeros` finds all their zeros up
 //! to the frequencies of `bounds`. From these are `margins` of a loop, and of an `equation` in which
 //! one number varies the `crossings`, those of `delays` and `multiples` of one, and stable `ranges`.
-//! `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
+//! `held` has the margins of loops with a hold. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
 //! their phases; `polynomial` finds roots of small polynomials.
 
 mod argument;
@@ -13,6 +13,7 @@ mod chains;
 mod crossings;
 mod delays;
 mod equation;
+mod held;
 mod margins;
 mod multiples;
 mod passage;
@@ -28,6 +29,7 @@ pub use argument::argument;
 pub use bounds::end_of_gain;
 pub use crossings::{Crossings, crossings};
 pub use delays::{delay_margin, delay_range};
+pub use held::{further_delay, held_margins};
 pub use margins::{Margins, margins};
 pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};

@@ -22,7 +22,7 @@ pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub(crate) use crossings::radius_of_members;
 pub use crossings::{Crossing, crossings_along};
 pub use family::{Affine, Family, Term};
-pub use held::{LoopRows, held_boundaries, held_map};
+pub use held::{HeldLoop, HeldNumbers, LoopRows, held_boundaries, held_crossings, held_map};
 pub use map::{
     Axis, Boundaries, Chart, Proof, Question, Vertex, boundaries, chains, map, robust_map,
 };

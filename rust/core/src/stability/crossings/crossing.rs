@@ -44,6 +44,9 @@ const STARTS: [f64; 5] = [1.0, 0.7, 0.4, 0.2, 0.1];
 /// Length of a step, in reaches of its first point.
 const STRETCH: f64 = 1.9;
 
+/// Factor on t up to which bounds are taken next to a zero of higher order at t = 0.
+const FLAT: f64 = 3.0;
+
 /// Factors on the reach and on the length of a step that could not be proved.
 const SHORTENED: (f64, f64) = (0.999, 0.6);
 
@@ -138,6 +141,9 @@ struct Search<'a> {
     /// A length over which the pencil changes little.
     step: f64,
     bounds: Bounds,
+    /// Does F vanish to a higher order where the piece begins? Bounds are then taken for short
+    /// stretches there.
+    is_flat: bool,
     range: (f64, f64),
     top: f64,
     found: Vec<Crossing>,
@@ -150,6 +156,7 @@ impl<'a> Search<'a> {
             pencil,
             step,
             bounds: pencil.bounds(0.0, step, step)?,
+            is_flat: false,
             range,
             top,
             found: Vec::new(),
@@ -159,9 +166,24 @@ impl<'a> Search<'a> {
     /// Bounds that hold from `low`, up to which everything is known, to `high`.
     fn bounds_to(&mut self, low: f64, high: f64) -> Option<Bounds> {
         if high > self.bounds.reach {
-            self.bounds = self.pencil.bounds(low, high, self.step)?;
+            let step = if self.is_flat {
+                self.step.min(high)
+            } else {
+                self.step
+            };
+            self.bounds = self.pencil.bounds(low, high, step)?;
         }
         Some(self.bounds)
+    }
+
+    /// How far bounds are needed from t on.
+    fn horizon(&self, t: f64) -> f64 {
+        let usual = self.pencil.horizon(t, self.step);
+        if self.is_flat {
+            usual.min(FLAT * t)
+        } else {
+            usual
+        }
     }
 
     /// The first point of a piece that begins off the real axis, or one beyond it where the sign of
@@ -193,6 +215,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
+        self.is_flat = true;
         self.skip(&zero)
     }
 
@@ -247,7 +270,7 @@ impl<'a> Search<'a> {
     /// be resolved.
     fn advance(&mut self, here: &Point, stride: f64) -> Option<Point> {
         let rest = self.top - here.t;
-        let bounds = self.bounds_to(here.t, self.pencil.horizon(here.t, self.step))?;
+        let bounds = self.bounds_to(here.t, self.horizon(here.t))?;
         let most = rest.min(stride).min(bounds.reach - here.t);
         let own = self.reach(here, 1.0, most, &bounds);
         let mut length = (STRETCH * own.length).min(most);
@@ -285,6 +308,9 @@ impl<'a> Search<'a> {
         let mut step = LEAST_STEP * here.t.max(self.step);
         for _ in 0..MAX_DOUBLINGS {
             let end = (here.t + step).min(self.top);
+            if self.is_flat {
+                self.bounds = self.pencil.bounds(here.t, FLAT * end, self.step.min(end))?;
+            }
             let bounds = self.bounds_to(here.t, end)?;
             let next = self.pencil.at(end);
             let ahead = self.reach(&next, 1.0, step, &bounds);

@@ -279,7 +279,9 @@ impl Members<'_> {
     /// A cell next to a crossing of s = 0, by the sign of h(0): as h(0)/B(0) = k − k₀ grows past
     /// zero, the count changes by the jump. `below` is the cell before.
     fn beside_zero(&self, window: &Window, below: Cell, index: usize) -> Option<Cell> {
-        let jump = window.jump.filter(|_| window.rises_at_zero.is_some())?;
+        // With a hold the constants are sums that carry rounding.
+        let exact = window.rises_at_zero.is_some() && self.hold.is_none();
+        let jump = window.jump.filter(|_| exact)?;
         let h = (self.member)(index)?;
         let constants = h.coefficients().iter().filter_map(|row| row.first());
         let mut constants = constants.filter(|c| **c != 0.0);

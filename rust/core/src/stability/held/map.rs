@@ -5,9 +5,10 @@
 //! counts of all rows start from those of one column. Rows are counted as those of any map
 //! (`crossings`). A row of one cell is judged alone.
 
-use super::model::{LoopPolynomials, Polynomial};
+use super::count::crossings;
+use super::model::{LoopPolynomials, Polynomial, share_of_errors};
 use crate::quasipoly::QuasiPolynomial;
-use crate::stability::crossings::{Crossing, Members, sizes};
+use crate::stability::crossings::{Crossing, Members};
 use crate::stability::hold::Hold;
 use crate::stability::map::{Chart, Proof, Question, Vertex, join};
 use crate::stability::specification::Specification;
@@ -16,19 +17,16 @@ use crate::{Error, Task, memory};
 /// Upper limit on the number of cells (bounds memory and time).
 const MAX_CELLS: usize = 50_000_000;
 
-/// Least |σ| at which bounds are compared, in units of one over the delay; and the largest, in
-/// units of one over the sample time, for |z| ≤ 1.
-const LEAST: f64 = 1.0 / 64.0;
-const LARGEST: f64 = 4.0;
-
 /// Loops x′ = A x + B w, u = (K + k K₁) x + (L + k L₁) w, w the command a delay later. Every array
 /// holds one entry for all rows, or one a row.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopRows<'a> {
     /// Number of rows.
     pub rows: usize,
-    /// Number of states.
+    /// Number of states in the arrays.
     pub states: usize,
+    /// Number of states that are used, from the first on.
+    pub used: &'a [f64],
     /// A, n × n an entry.
     pub a: &'a [f64],
     /// B, n an entry.
@@ -149,13 +147,30 @@ pub fn held_boundaries(
         return Ok(Vec::new());
     };
     let shared = rows.shared_model()?;
-    let crossings: Vec<Vec<Crossing>> = rows.each(task, |index| {
+    let found: Vec<Vec<Crossing>> = rows.each(task, |index| {
         let numbers = rows.numbers(index, shared.as_ref())?;
         numbers.members(rows.points, specification, |members| {
             Ok(members.found(task)?.unwrap_or_default())
         })
     })?;
-    Ok(join(&crossings, (*low, *high)))
+    Ok(join(&found, (*low, *high)))
+}
+
+/// All crossings of the first row with k in `range`; `None` where they are beyond double precision.
+///
+/// # Errors
+/// As for [`held_map`].
+pub fn held_crossings(
+    rows: &LoopRows<'_>,
+    range: (f64, f64),
+    task: &Task,
+) -> Result<Option<Vec<Crossing>>, Error> {
+    let numbers = rows.numbers(0, None)?;
+    match &numbers.parts {
+        None => Ok(None),
+        Some((_, b)) if b.is_zero() => Ok(Some(Vec::new())),
+        Some((a, b)) => crossings(a, b, Specification::default(), numbers.hold, range, task),
+    }
 }
 
 impl<'a> LoopRows<'a> {
@@ -185,11 +200,25 @@ impl<'a> LoopRows<'a> {
         Ok(entry.first().copied().unwrap_or(f64::NAN))
     }
 
+    fn used(&self, row: usize) -> Result<usize, Error> {
+        let used = self.number("the number of states", self.used, row)?;
+        refuse_if!(
+            !(used >= 0.0 && used <= self.states as f64),
+            "{used} states are used of {}",
+            self.states
+        );
+        Ok(used as usize)
+    }
+
     fn model(&self, row: usize) -> Result<LoopPolynomials, Error> {
-        let n = self.states;
+        let (n, used) = (self.states, self.used(row)?);
+        let a = self.entry("A", self.a, n * n, row)?;
+        let a: Vec<f64> = (0..used * used)
+            .map(|place| a[place / used * n + place % used])
+            .collect();
         LoopPolynomials::new(
-            self.entry("A", self.a, n * n, row)?,
-            self.entry("B", self.b, n, row)?,
+            &a,
+            &self.entry("B", self.b, n, row)?[..used],
             self.number("delay", self.delay, row)?,
             self.number("sample_time", self.sample_time, row)?,
         )
@@ -201,7 +230,8 @@ impl<'a> LoopRows<'a> {
         let is_shared = self.a.len() == n * n
             && self.b.len() == n
             && self.delay.len() == 1
-            && self.sample_time.len() == 1;
+            && self.sample_time.len() == 1
+            && self.used.len() == 1;
         is_shared.then(|| self.model(0)).transpose()
     }
 
@@ -214,13 +244,13 @@ impl<'a> LoopRows<'a> {
                 &own
             }
         };
-        let n = self.states;
+        let (n, used) = (self.states, self.used(row)?);
         let constant = model.feedback(
-            self.entry("K", self.k, n, row)?,
+            &self.entry("K", self.k, n, row)?[..used],
             self.number("L", self.l, row)?,
         );
         let slope = model.feedback(
-            self.entry("the slope of K", self.k_slope, n, row)?,
+            &self.entry("the slope of K", self.k_slope, n, row)?[..used],
             self.number("the slope of L", self.l_slope, row)?,
         );
         let sample_time = self.number("sample_time", self.sample_time, row)?;
@@ -252,8 +282,8 @@ impl Numbers {
         slope: Polynomial,
         sample_time: f64,
     ) -> Self {
-        let share = |polynomial: &Polynomial| share_of_errors(polynomial, model.delay, sample_time);
-        let coefficients = share(&model.a).max(share(&constant)).max(share(&slope));
+        let coefficients =
+            share_of_errors(&[&model.a, &constant, &slope], model.delay, sample_time);
         let negative = |row: &[f64]| row.iter().map(|c| -c).collect::<Vec<f64>>();
         let a = model.a.coefficients.clone();
         let rows = vec![a.clone(), negative(&constant.coefficients)];
@@ -299,25 +329,4 @@ impl Numbers {
             hold: Some(self.hold),
         })
     }
-}
-
-/// The largest ratio of the polynomial with the errors of the coefficients to that with their
-/// moduli, and of their derivatives, wherever a bound is taken.
-fn share_of_errors(polynomial: &Polynomial, delay: f64, sample_time: f64) -> f64 {
-    if polynomial.errors.iter().all(|error| *error == 0.0) {
-        return 0.0;
-    }
-    let mut most = 0.0f64;
-    let mut x = LEAST / delay;
-    while x < LARGEST / sample_time {
-        let bounds = sizes(&polynomial.coefficients, x);
-        let errors = sizes(&polynomial.errors, 2.0 * x);
-        for (size, error) in bounds.into_iter().zip(errors) {
-            if error > 0.0 {
-                most = most.max(error / size);
-            }
-        }
-        x *= 2.0;
-    }
-    most
 }

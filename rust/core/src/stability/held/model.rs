@@ -15,14 +15,17 @@
 
 use crate::Error;
 use crate::dde::control_loop::sampled::Timing;
+use crate::dde::propagator::balanced;
+use crate::dde::{LinearLoop, Update};
 use crate::elementary::DoubleDouble;
+use crate::stability::crossings::sizes;
 
 /// Bound on the errors in double-double arithmetic, relative to sums of moduli: some thousand
 /// roundings of 2⁻¹⁰⁴ each, and doublings that enlarge them.
-const ROUGHNESS: f64 = 1e-22;
+const ROUGHNESS: f64 = 1e-25;
 
 /// Share of the largest entry of M that is added to the modulus of each.
-const SPREAD: f64 = 1e-6;
+const SPREAD: f64 = 1e-4;
 
 /// Largest norm of A times a step for which the series is summed without doubling, and its number of
 /// terms: 0.5²⁷/27! < 1e-36.
@@ -34,6 +37,11 @@ const MOST_DOUBLINGS: i32 = 1000;
 
 /// Upper limit on the states: the recursion loses digits with each.
 const MOST_STATES: usize = 24;
+
+/// Least |σ| at which bounds are compared, in units of one over the delay; and the largest, in
+/// units of one over the sample time, for |z| ≤ 1.
+const LEAST: f64 = 1.0 / 64.0;
+const LARGEST: f64 = 4.0;
 
 type Matrix = Vec<DoubleDouble>;
 
@@ -52,6 +60,8 @@ pub(super) struct LoopPolynomials {
     /// d, s.
     pub(super) delay: f64,
     pub(super) a: Polynomial,
+    /// Exponents of the units of the states.
+    units: Vec<i32>,
     a_exact: Matrix,
     a_moduli: Vec<f64>,
     /// adj(σI − M) (G + Γ₀ σ): for each power of σ a vector, with moduli.
@@ -85,24 +95,72 @@ impl LoopPolynomials {
             a.iter().chain(b).any(|entry| !entry.is_finite()),
             "an entry of the equations is not finite: choose smaller gains"
         );
+        Ok(Self::built((a, b), None, delay, sample_time))
+    }
+
+    /// The same for a loop whose samples change its states as well.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(super) fn of_loop(plant: &LinearLoop, delay: f64, sample_time: f64) -> Result<Self, Error> {
+        let equations = plant.equations();
+        let (a, b) = (&equations.a[..], &equations.b[..]);
+        match plant.update() {
+            None => Self::new(a, b, delay, sample_time),
+            Some(update) if b.len() <= MOST_STATES => {
+                Ok(Self::built((a, b), Some(update), delay, sample_time))
+            }
+            Some(_) => refuse!(
+                "{} states of plant and controller: up to {MOST_STATES} are taken",
+                b.len()
+            ),
+        }
+    }
+
+    fn built(
+        (a, b): (&[f64], &[f64]),
+        update: Option<&Update>,
+        delay: f64,
+        sample_time: f64,
+    ) -> Self {
+        let n = b.len();
+        // In units of the states, powers of two, that make A small.
+        let (a, units) = balanced(a, n);
+        let scaled = |vector: &[f64]| -> Vec<f64> {
+            let entries = vector.iter().zip(&units);
+            entries.map(|(x, unit)| libm::ldexp(*x, -unit)).collect()
+        };
         let timing = Timing::new(delay, sample_time);
-        let late = Step::new(a, b, timing.late);
-        let early = Step::new(a, b, timing.early);
+        let late = Step::new(&a, &scaled(b), timing.late);
+        let early = Step::new(&a, &scaled(b), timing.early);
         // Φ − I = F₀ + F₁ + F₀ F₁ with F = Φ − I of both parts.
         let product = times(&late.growth, &early.growth, n);
         let sum = |x: DoubleDouble, y: DoubleDouble| x + y;
-        let growth = joined(&joined(&late.growth, &early.growth, sum), &product, sum);
-        let m: Matrix = growth.iter().map(|entry| entry.over(sample_time)).collect();
-        // G = (Γ₀ + (I + F₀) Γ(δ))/Ts.
+        let mut growth = joined(&joined(&late.growth, &early.growth, sum), &product, sum);
+        // Γ₀ + (I + F₀) Γ(δ).
         let moved = times(&late.growth, &early.gamma, n);
-        let all = joined(&joined(&late.gamma, &early.gamma, sum), &moved, sum);
+        let mut all = joined(&joined(&late.gamma, &early.gamma, sum), &moved, sum);
+        if let Some(update) = update {
+            // x becomes J x + G w first: Φ J − I = F J + (J − I), and Φ G is added.
+            let exact = |entries: &[f64]| -> Matrix {
+                entries
+                    .iter()
+                    .map(|entry| DoubleDouble::from(*entry))
+                    .collect()
+            };
+            let place = |i: usize| libm::ldexp(update.states[i], units[i % n] - units[i / n]);
+            let states: Vec<f64> = (0..n * n).map(place).collect();
+            let (states, command) = (exact(&states), exact(&scaled(&update.command)));
+            let change = joined(&states, &identity(n), |x, y| x - y);
+            let added = joined(&command, &times(&growth, &command, n), sum);
+            all = joined(&all, &added, sum);
+            growth = joined(&times(&growth, &states, n), &change, sum);
+        }
+        let m: Matrix = growth.iter().map(|entry| entry.over(sample_time)).collect();
         let g: Matrix = all.iter().map(|entry| entry.over(sample_time)).collect();
-        Ok(Self::of(
-            &m,
-            &g,
-            &late.gamma,
-            (timing.samples + 1) as f64 * sample_time,
-        ))
+        let delay = (timing.samples + 1) as f64 * sample_time;
+        let found = Self::of(&m, &g, &late.gamma, delay);
+        Self { units, ..found }
     }
 
     fn of(m: &[DoubleDouble], g: &[DoubleDouble], now: &[DoubleDouble], delay: f64) -> Self {
@@ -146,6 +204,7 @@ impl LoopPolynomials {
                 coefficients: a.iter().map(|c| c.high).collect(),
                 errors: a_moduli.iter().map(|size| ROUGHNESS * size).collect(),
             },
+            units: Vec::new(),
             a_exact: a,
             a_moduli,
             forward,
@@ -160,8 +219,11 @@ impl LoopPolynomials {
         for ((vector, moduli), (a, a_size)) in powers.zip(self.a_exact.iter().zip(&self.a_moduli)) {
             let mut sum = *a * l;
             let mut size = l.abs() * a_size;
-            for ((entry, modulus), k) in vector.iter().zip(moduli).zip(k) {
-                sum = sum + *entry * *k;
+            for ((entry, modulus), (k, unit)) in
+                vector.iter().zip(moduli).zip(k.iter().zip(&self.units))
+            {
+                let k = libm::ldexp(*k, *unit);
+                sum = sum + *entry * k;
                 size += k.abs() * modulus;
             }
             found.coefficients.push(sum.high);
@@ -279,4 +341,24 @@ fn moduli(entries: &[DoubleDouble]) -> Vec<f64> {
         .iter()
         .map(|entry| entry.high.abs() + SPREAD * largest)
         .collect()
+}
+
+/// The largest ratio of a polynomial with the errors of its coefficients to that with their moduli,
+/// and of the derivatives of both, wherever a bound is taken.
+pub(super) fn share_of_errors(polynomials: &[&Polynomial], delay: f64, sample_time: f64) -> f64 {
+    let mut most = 0.0f64;
+    let mut x = LEAST / delay;
+    while x < LARGEST / sample_time {
+        for polynomial in polynomials {
+            let bounds = sizes(&polynomial.coefficients, x);
+            let errors = sizes(&polynomial.errors, 2.0 * x);
+            for (size, error) in bounds.into_iter().zip(errors) {
+                if error > 0.0 {
+                    most = most.max(error / size);
+                }
+            }
+        }
+        x *= 2.0;
+    }
+    most
 }

@@ -73,6 +73,7 @@ fn mapped(
     question: Question,
 ) -> Chart {
     let n = plant.b.len();
+    let used = [n as f64];
     let k: Vec<f64> = kv
         .iter()
         .flat_map(|kv| plant.v.iter().map(move |v| kv * v))
@@ -81,6 +82,7 @@ fn mapped(
     let rows = LoopRows {
         rows: kv.len(),
         states: n,
+        used: &used,
         a: &plant.a,
         b: &plant.b,
         k: &k,

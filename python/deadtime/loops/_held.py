@@ -13,19 +13,30 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from deadtime._deadtime import MapBoundary, MapCells, held_boundaries, held_map
 from deadtime._base.progress import Report
-from deadtime.loops import Controller, Plant
+from deadtime._deadtime import (
+    MapBoundary,
+    MapCells,
+    held_boundaries,
+    held_crossings,
+    held_map,
+)
+from deadtime.loops._controllers import Controller
 from deadtime.loops._model import LoopModel, refuse_discretised
-from deadtime.stability._arguments import Floats
+from deadtime.loops._plants import Plant
+
+Floats = NDArray[np.float64]
 
 
 class HeldRows(NamedTuple):
-    """Rows of loops u = (K + k K_slope) x + ...: every array has one entry for all, or one a row."""
+    """Rows of loops u = (K + k K_slope) x + ...: arrays with one entry for all, or one a row."""
 
     rows: int
+    #: Of the arrays; a row may use fewer of them, from the first on.
     states: int
+    used: Floats
     A: Floats
     B: Floats
     K: Floats
@@ -45,8 +56,9 @@ class Feedback(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """Equations for some numbers other than gains, one entry or one a row, and each gain's share."""
+    """Equations, one entry for all rows or one a row, and each gain's share of the feedback."""
 
+    used: Floats
     A: Floats
     B: Floats
     shares: dict[str, Feedback]
@@ -92,7 +104,7 @@ class HeldFamily:
         )
 
     def boundaries(self, decay: float, damping: tuple[float, float] | None) -> list[MapBoundary]:
-        """Curves of crossings; none where both axes are other numbers than gains."""
+        """Curves of crossings, found along a gain."""
         if self.along is None:
             raise ValueError(
                 f"neither {' nor '.join(self.axes)} is a gain: the crossings of a sampled loop are "
@@ -100,12 +112,25 @@ class HeldFamily:
             )
         return held_boundaries(self._rows, along=self.along, decay=decay, damping=damping)
 
+    def crossings(self, low: float, high: float) -> Floats:
+        """Values of the only axis, a gain, between two at which a pole is on the unit circle."""
+        ((name, points),) = self.axes.items()
+        found = held_crossings(self._held({}, name, points), low, high)
+        if found is None:
+            raise ValueError(
+                f"the values of {name} at which a pole of this sampled loop is on the unit circle "
+                "are beyond double precision: a pole and a zero of its loop gain may cancel there"
+            )
+        return found[0]
+
     @cached_property
     def along(self) -> str | None:
         """The gain that varies along the rows: best one that moves a pole at z = 1."""
         gains = (*self.controller._gains(), "gain")
         names = [name for name in self.axes if name in gains]
-        return max(names, key=lambda name: (self._moves_rest(name), len(self.axes[name])), default=None)
+        return max(
+            names, key=lambda name: (self._moves_rest(name), len(self.axes[name])), default=None
+        )
 
     def _moves_rest(self, name: str) -> bool:
         """Whether the feedback at rest depends on this gain."""
@@ -137,12 +162,12 @@ class HeldFamily:
 
     def _held(self, moving: Mapping[str, Floats], along: str | None, points: Floats) -> HeldRows:
         """Rows with these values of what changes from row to row."""
-        rows = len(next(iter(moving.values())))
+        rows = max((len(points) for points in moving.values()), default=1)
         gains = self.controller._gains()
         fixed = {**self.values, "gain": self.values.get("gain", 1.0)}
         numbers = {name: np.array([value]) for name, value in fixed.items()} | dict(moving)
         equations = self._equations({n: v for n, v in moving.items() if n not in (*gains, "gain")})
-        size = len(equations.B.shape) and equations.B.shape[-1]
+        size = equations.B.shape[-1]
         K, L = np.zeros((1, size)), np.zeros(1)
         K_slope, L_slope = np.zeros((1, size)), np.zeros(1)
         gain = np.ones(1) if along == "gain" else numbers["gain"]
@@ -156,6 +181,7 @@ class HeldFamily:
         return HeldRows(
             rows=rows,
             states=size,
+            used=equations.used,
             A=equations.A,
             B=equations.B,
             K=K,
@@ -174,17 +200,29 @@ class HeldFamily:
             return self._equations_at({})
         columns = np.column_stack(list(moving.values()))
         distinct, place = np.unique(columns, axis=0, return_inverse=True)
-        found = [self._equations_at(dict(zip(moving, row, strict=True))) for row in distinct.tolist()]
+        found = [
+            self._equations_at(dict(zip(moving, row, strict=True))) for row in distinct.tolist()
+        ]
+        # With a lag of zero there is one state less.
+        size = max(one.B.shape[-1] for one in found)
         spread = place.ravel()
+
+        def joined(arrays: list[Floats]) -> Floats:
+            return np.concatenate([_padded(array, size) for array in arrays])[spread]
+
         shares = {
             name: Feedback(
-                np.concatenate([one.shares[name].K for one in found])[spread],
+                joined([one.shares[name].K for one in found]),
                 np.concatenate([one.shares[name].L for one in found])[spread],
             )
             for name in self.controller._gains()
         }
-        A, B = (np.concatenate([one[i] for one in found])[spread] for i in (0, 1))
-        return _Equations(A, B, shares)
+        return _Equations(
+            np.concatenate([one.used for one in found])[spread],
+            joined([one.A for one in found]),
+            joined([one.B for one in found]),
+            shares,
+        )
 
     def _equations_at(self, changed: Mapping[str, float]) -> _Equations:
         gains = self.controller._gains()
@@ -193,4 +231,9 @@ class HeldFamily:
             alone = {**self.values, **changed, **dict.fromkeys(gains, 0.0), name: 1.0, "gain": 1.0}
             model = LoopModel.build(self.plant, self.controller, alone)
             shares[name] = Feedback(model.K[None, :], np.array([float(model.L)]))
-        return _Equations(model.A[None], model.B[None], shares)
+        return _Equations(np.array([float(len(model.B))]), model.A[None], model.B[None], shares)
+
+
+def _padded(array: Floats, size: int) -> Floats:
+    """The array with zeros after the last entry of all axes but the first."""
+    return np.pad(array, [(0, 0)] + [(0, size - array.shape[-1])] * (array.ndim - 1))
