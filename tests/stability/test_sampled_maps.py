@@ -72,9 +72,11 @@ def test_cells_are_counts_of_eigenvalues(loop, ranges, demand):
         if close or known != MapStatus.OK:
             continue
         assert chart.unstable[i, j] == number
-        assert chart.abscissa[i, j] == pytest.approx(
-            poles.real.max(initial=-np.inf), rel=1e-6, abs=1e-6
-        )
+        if poles.size == 0:
+            # All eigenvalues are zero: the motion is over after some samples.
+            assert chart.abscissa[i, j] * cell.sample_time < -5.0
+            continue
+        assert chart.abscissa[i, j] == pytest.approx(poles.real.max(), rel=1e-6, abs=1e-6)
         compared += 1
     assert compared > 150
 

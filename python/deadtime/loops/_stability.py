@@ -44,7 +44,9 @@ _FARTHEST = 1e6
 
 def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> float:
     """Return ln(rho)/Ts with rho the largest modulus of the loop's eigenvalues."""
-    return float(model.native(delay, sample_time).poles()[0].real)
+    native = model.native(delay, sample_time)
+    found = native.abscissa()
+    return float(native.poles()[0].real) if found is None else found
 
 
 def sampled_is_stable(model: LoopModel, delay: float, sample_time: float) -> bool:

@@ -227,11 +227,7 @@ impl PyLinearLoop {
 
     /// ln(ρ)/Ts of a sampled loop, ρ its spectral radius; None where it is not found.
     fn abscissa(&self, py: Python<'_>) -> PyResult<Option<f64>> {
-        let found = run_here(py, |task| {
-            let held = HeldLoop::new(&self.inner)?;
-            held.at(held.delay())?.abscissa(task)
-        })?;
-        Ok(found.map(|(abscissa, _)| abscissa))
+        run_here(py, |task| HeldLoop::new(&self.inner)?.abscissa(task))
     }
 
     /// Margins of a sampled loop; the delay margin is NaN where it is not asked for.

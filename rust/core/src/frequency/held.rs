@@ -8,10 +8,11 @@
 //! A further delay T changes the fraction of a sample in it, and b with that. Its effect on a
 //! crossover at ω is close to a turn by ω T: from a stable loop, steps of less than the smallest
 //! φ/ω over the crossovers, φ the turn that brings L to −1, approach the first loss of stability,
-//! and Newton's iteration for φ = 0 ends at it. Counts on both sides of the result prove that
-//! stability is lost there; that it is not lost before is not proved. Where the command acts at once
-//! (L jumps where the delay is a whole number of samples), both sides of each such delay are looked
-//! at.
+//! and Newton's iteration for φ = 0 ends at it. The poles are counted after every step, and on both
+//! sides of the result, which proves that stability is lost there; that it is not lost and regained
+//! within a step is not proved. Where the plant has modes faster than a sample, or the command acts
+//! at once (L jumps where the delay is a whole number of samples), the steps near the loss are parts
+//! of a sample.
 
 use std::f64::consts::{PI, TAU};
 
@@ -44,8 +45,16 @@ const FRACTIONS: usize = 33;
 /// Fractions just below a whole sample.
 const LATE: [f64; 3] = [1e-1, 1e-4, 1e-9];
 
-/// Halvings of a sample time before Newton's iteration.
-const HALVINGS: u32 = 30;
+/// Product of the fastest mode of the plant and the sample time beyond which the loop gain changes
+/// much with the fraction of a sample in the delay; parts of a sample that are looked at then.
+const ABRUPT: f64 = 0.5;
+const PARTS: u32 = 8;
+
+/// Relative distance at which a jump of the loop gain is looked at from below.
+const JUMP: f64 = 1e-11;
+
+/// Upper limit on halvings of a step in which stability is lost.
+const HALVINGS: u32 = 60;
 
 /// Relative distance from the result at which stability is counted.
 const BESIDE: f64 = 1e-7;
@@ -253,28 +262,35 @@ fn is_stable(numbers: &HeldNumbers, task: &Task) -> Result<bool, Error> {
 /// As for [`held_margins`]; [`Error::Argument`] also where the loss is beyond double precision.
 pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Error> {
     let (start, period) = (held.delay(), held.sample_time());
+    let is_abrupt = held.fastest() * period > ABRUPT || held.is_direct();
     let mut delay = start;
     for _ in 0..STEPS {
         task.check()?;
-        let Some((omega, turn)) = nearest(held, delay, task)? else {
+        let Some((omega, turn)) = nearest(held, delay, is_abrupt, task)? else {
             match next_crossover(held, delay, task)? {
                 Some(next) => delay = next,
                 None => return Ok((f64::INFINITY, f64::NAN)),
             }
             continue;
         };
-        let step = CAUTIOUS * turn / omega;
-        if held.is_direct() && step < period {
-            match within_sample(held, delay, task)? {
-                Ok(found) => return confirmed(held, found, task),
-                Err(next) => delay = next,
-            }
-        } else if turn < CLOSE
+        if !is_abrupt
+            && turn < CLOSE
             && let Some(found) = newton(held, delay, omega, task)?
         {
             return confirmed(held, found, task);
+        }
+        let step = CAUTIOUS * turn / omega;
+        let points = if is_abrupt && step < period {
+            within_sample(delay, period)
         } else {
-            delay += step;
+            vec![delay + step]
+        };
+        for next in points {
+            if !is_stable(&held.at(next)?, task)? {
+                let found = bracketed(held, delay, next, task)?;
+                return confirmed(held, found, task);
+            }
+            delay = next;
         }
     }
     refuse!(
@@ -284,13 +300,17 @@ pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Erro
 }
 
 /// The crossover whose estimated distance to the loss of stability is least; with a loop gain that
-/// jumps, on both sides of the next whole number of samples as well.
-fn nearest(held: HeldLoop<'_>, delay: f64, task: &Task) -> Result<Option<(f64, f64)>, Error> {
+/// changes much within a sample, on both sides of the next whole number of samples as well.
+fn nearest(
+    held: HeldLoop<'_>,
+    delay: f64,
+    is_abrupt: bool,
+    task: &Task,
+) -> Result<Option<(f64, f64)>, Error> {
     let period = held.sample_time();
     let mut found = crossovers(&held.at(delay)?, period, task)?;
-    if held.is_direct() {
-        let whole = next_whole(delay, period);
-        for beside in [just_below(whole), whole] {
+    if is_abrupt {
+        for beside in within_sample(delay, period).into_iter().rev().take(2) {
             found.extend(crossovers(&held.at(beside)?, period, task)?);
         }
     }
@@ -300,47 +320,45 @@ fn nearest(held: HeldLoop<'_>, delay: f64, task: &Task) -> Result<Option<(f64, f
         .min_by(|p, q| distance(p).total_cmp(&distance(q))))
 }
 
-fn next_whole(delay: f64, period: f64) -> f64 {
-    period * ((delay / period * (1.0 + 1e-12)).floor() + 1.0)
+/// Delays up to the next whole number of samples, the last two on both sides of it.
+fn within_sample(delay: f64, period: f64) -> Vec<f64> {
+    let whole = period * ((delay / period * (1.0 + 1e-12)).floor() + 1.0);
+    let below = whole * (1.0 - JUMP);
+    let inner = (1..PARTS).map(|part| delay + (below - delay) * f64::from(part) / f64::from(PARTS));
+    inner.chain([below, whole]).collect()
 }
 
-fn just_below(whole: f64) -> f64 {
-    whole * (1.0 - 1e-11)
-}
-
-/// The loss of stability up to the next whole number of samples, at which the loop gain jumps; or
-/// this delay as an error where stability lasts.
-fn within_sample(
+/// The loss of stability between a delay at which the loop is stable and one at which it is not.
+fn bracketed(
     held: HeldLoop<'_>,
-    delay: f64,
+    mut low: f64,
+    mut high: f64,
     task: &Task,
-) -> Result<Result<(f64, f64), f64>, Error> {
-    let whole = next_whole(delay, held.sample_time());
-    let below = just_below(whole);
-    let turned = |at: f64| -> Result<Option<(f64, f64)>, Error> {
-        let found = crossovers(&held.at(at)?, held.sample_time(), task)?;
+) -> Result<(f64, f64), Error> {
+    let turned = |delay: f64| -> Result<f64, Error> {
+        let found = crossovers(&held.at(delay)?, held.sample_time(), task)?;
         let size = |place: &(f64, f64)| place.1.min(TAU - place.1);
-        Ok(found.into_iter().min_by(|p, q| size(p).total_cmp(&size(q))))
+        let closest = found.into_iter().min_by(|p, q| size(p).total_cmp(&size(q)));
+        Ok(closest.map_or(f64::NAN, |place| place.0))
     };
-    if !is_stable(&held.at(below)?, task)? {
-        let (mut low, mut high) = (delay, below);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if is_stable(&held.at(middle)?, task)? {
-                low = middle;
-            } else {
-                high = middle;
+    for halving in 0..HALVINGS {
+        if high - low <= 2.0 * JUMP * high {
+            break;
+        }
+        if halving % 6 == 5 {
+            let found = newton(held, high, turned(high)?, task)?;
+            if let Some(found) = found.filter(|found| found.0 >= low && found.0 <= high) {
+                return Ok(found);
             }
         }
-        let omega = turned(high)?.map_or(f64::NAN, |place| place.0);
-        let found = newton(held, high, omega, task)?;
-        return Ok(Ok(found.unwrap_or((high, omega))));
+        let middle = 0.5 * (low + high);
+        if is_stable(&held.at(middle)?, task)? {
+            low = middle;
+        } else {
+            high = middle;
+        }
     }
-    if !is_stable(&held.at(whole)?, task)? {
-        let omega = turned(whole)?.map_or(f64::NAN, |place| place.0);
-        return Ok(Ok((whole, omega)));
-    }
-    Ok(Err(whole))
+    Ok((high, turned(high)?))
 }
 
 /// The next delay with a fraction of a sample for which the gain reaches one.

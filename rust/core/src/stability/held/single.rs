@@ -6,12 +6,17 @@ use super::count::{count, crossings};
 use super::model::{LoopPolynomials, share_of_errors};
 use super::rightmost::rightmost;
 use crate::dde::LinearLoop;
+use crate::dde::control_loop::sampled;
+use crate::dde::propagator::balanced_norm;
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::cell::Cell;
 use crate::stability::crossings::Crossing;
 use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
 use crate::{Error, Task};
+
+/// Samples in the delay up to which eigenvalues are computed.
+const FEW: f64 = 10.0;
 
 /// A sampled loop whose polynomials can be formed at any delay.
 #[derive(Debug, Clone, Copy)]
@@ -49,9 +54,29 @@ impl<'a> HeldLoop<'a> {
         self.plant.delay()
     }
 
+    /// A bound on the moduli of the poles of plant and controller, 1/s.
+    pub fn fastest(&self) -> f64 {
+        let equations = self.plant.equations();
+        balanced_norm(&equations.a, equations.states())
+    }
+
     /// Does the command act on the feedback at once when it arrives?
     pub fn is_direct(&self) -> bool {
         self.plant.equations().l != 0.0
+    }
+
+    /// ln(ρ)/Ts, ρ the spectral radius; `None` where it is not found. With few samples in the delay
+    /// the eigenvalues of the transition matrix cost least, with many the search of `rightmost`.
+    ///
+    /// # Errors
+    /// As [`at`](Self::at); [`Error::Convergence`] where the QR algorithm fails.
+    pub fn abscissa(&self, task: &Task) -> Result<Option<f64>, Error> {
+        if self.delay() <= FEW * self.sample_time {
+            let found = sampled::poles(self.plant)?;
+            return Ok(found.first().map(|pole| pole.re));
+        }
+        let numbers = self.at(self.delay())?;
+        Ok(rightmost(&numbers.h()?, numbers.hold, task)?.abscissa)
     }
 
     /// The polynomials at another delay. Factors that both have in common are left out where they
@@ -103,15 +128,6 @@ impl HeldNumbers {
     pub fn count(&self, specification: Specification, task: &Task) -> Result<Cell, Error> {
         specification.check()?;
         count(&self.h()?, specification, self.hold, task)
-    }
-
-    /// The spectral abscissa, and whether it is proved; `None` where it is not found.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`].
-    pub fn abscissa(&self, task: &Task) -> Result<Option<(f64, bool)>, Error> {
-        let found = rightmost(&self.h()?, self.hold, task)?;
-        Ok(found.abscissa.map(|abscissa| (abscissa, found.is_proved)))
     }
 
     /// The places on the circle, with factors k in `range`, at which k L = −1; `None` where that is
