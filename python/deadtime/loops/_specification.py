@@ -111,8 +111,9 @@ class LoopSpecification:
         _ = self.known_delay
         if self.sample_time is None:
             return float(self.characteristic_at(values).spectral_abscissa())
-        poles = self.model_at(values).native(values["delay"], values["sample_time"]).poles()
-        return float(poles[0].real)
+        native = self.model_at(values).native(values["delay"], values["sample_time"])
+        found = native.abscissa()
+        return float(native.poles()[0].real) if found is None else found
 
     def characteristic_at(self, values: Mapping[str, Any]) -> Any:
         """The characteristic function with numbers or symbols, one for each of `parameters`."""
