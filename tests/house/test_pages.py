@@ -20,6 +20,7 @@ PAGES = [
     # A design for intervals takes as long as all other pages together.
     pytest.param("guide/from-recording-to-gains.md", marks=pytest.mark.survey),
     "guide/internet-loop.md",
+    "guide/large-maps.md",
     "guide/planning-an-experiment.md",
     "guide/what-a-ground-log-cannot-tell.md",
 ]

@@ -1,13 +1,15 @@
 """Stability over ranges of gains and delays: maps, proved boxes, robust maps, stability radius.
 
 `_map` is `stability_map`, `_boundaries` its crossing curves; `_boxes`, `_robust` and `_radius`
-prove what holds for whole ranges. `_arguments` reads axes and intervals.
+prove what holds for whole ranges; `_tiles` divides maps too large for one call. `_arguments`
+reads axes and intervals.
 """
 
 from deadtime.stability._boxes import ProvedBoxes, largest_stable_box, proved_boxes
 from deadtime.stability._map import MapStatus, StabilityMap, stability_map
 from deadtime.stability._radius import StabilityRadius, stability_radius
 from deadtime.stability._robust import RobustMap, robust_map
+from deadtime.stability._tiles import Tile, Tiles, tiles
 
 __all__ = [
     "MapStatus",
@@ -15,9 +17,12 @@ __all__ = [
     "RobustMap",
     "StabilityMap",
     "StabilityRadius",
+    "Tile",
+    "Tiles",
     "largest_stable_box",
     "proved_boxes",
     "robust_map",
     "stability_map",
     "stability_radius",
+    "tiles",
 ]
