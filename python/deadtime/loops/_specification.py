@@ -7,7 +7,7 @@ them take the specification.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -111,9 +111,32 @@ class LoopSpecification:
         _ = self.known_delay
         if self.sample_time is None:
             return float(self.characteristic_at(values).spectral_abscissa())
-        native = self.model_at(values).native(values["delay"], values["sample_time"])
+        native = self._closed_at(values).native(values["delay"], values["sample_time"])
         found = native.abscissa()
         return float(native.poles()[0].real) if found is None else found
+
+    def _closed_at(self, values: Mapping[str, Any]) -> LoopModel:
+        """Equations whose poles are those with other numbers; from parts where gains alone differ.
+
+        The feedback is linear in the gains, and nothing else that the poles depend on has them.
+        """
+        gains = self.controller._gains()
+        own = self.parameters
+        fixed = (name for name in own if name not in (*gains, "delay", "limit"))
+        if self.model.update is not None or any(values[name] != own[name] for name in fixed):
+            return self.model_at(values)
+        K, L = np.zeros_like(self.model.K), 0.0
+        for name, (row, direct) in self._shares.items():
+            K, L = K + values[name] * row, L + values[name] * direct
+        return replace(self.model, K=K, L=L)
+
+    @cached_property
+    def _shares(self) -> dict[str, tuple[NDArray[np.float64], float]]:
+        """The feedback K and L of each gain alone, for a gain of one."""
+        gains = self.controller._gains()
+        alone = {name: self.parameters | dict.fromkeys(gains, 0.0) | {name: 1.0} for name in gains}
+        models = {name: self.model_at(values) for name, values in alone.items()}
+        return {name: (model.K, float(model.L)) for name, model in models.items()}
 
     def characteristic_at(self, values: Mapping[str, Any]) -> Any:
         """The characteristic function with numbers or symbols, one for each of `parameters`."""
