@@ -18,7 +18,8 @@ CORE_ARROWS = {
     "elementary": set(),
     "quasipoly": {"elementary"},
     "roots": {"elementary", "lambertw", "quasipoly"},
-    "stability": {"elementary", "lambertw", "quasipoly", "roots"},
+    # Loops with a hold are stepped in `dde`.
+    "stability": {"elementary", "lambertw", "quasipoly", "roots", "dde"},
     "frequency": {"elementary", "quasipoly", "roots", "stability"},
     "dde": {"elementary", "quasipoly"},
     "estimation": {"dde"},
@@ -30,11 +31,13 @@ ORDER = {
     "stability": [
         "family",
         "specification",
+        "hold",
         "cell",
         "crossings",
         "branches",
         "boxes",
         "map",
+        "held",
     ],
     "frequency": [
         "two_sided",
@@ -47,6 +50,7 @@ ORDER = {
         "argument",
         "chains",
         "margins",
+        "held",
         "equation",
         "passage",
         "multiples",

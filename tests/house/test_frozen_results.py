@@ -112,6 +112,8 @@ MADE = {
     "RootSet": LOOP.rightmost,
     "RootSensitivity": lambda: h.root_sensitivity(h.rightmost()[0]),
     "StabilityMap": lambda: dtm.stability_map(FAMILY, RANGES, shape=(3, 3)),
+    "Tile": lambda: dtm.stability.tiles(FAMILY, RANGES, (4, 4), (2, 2))[0, 1],
+    "Tiles": lambda: dtm.stability.tiles(FAMILY, RANGES, (4, 4), (2, 2)),
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
     "Series": lambda: logged().loops["roll"].setpoint,

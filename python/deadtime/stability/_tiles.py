@@ -80,9 +80,6 @@ class Tiles(ReadOnlyArrays):
         first, second = self.chunks
         return len(first), len(second)
 
-    def __len__(self) -> int:
-        return math.prod(self.shape)
-
     def __iter__(self) -> Iterator[Tile]:
         first, second = self.shape
         return (self[place] for place in itertools.product(range(first), range(second)))

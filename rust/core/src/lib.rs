@@ -3,7 +3,7 @@
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
 //! Python. Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots
-//! ← stability ← frequency; quasipoly ← dde ← estimation.
+//! ← stability ← frequency; quasipoly ← dde ← estimation, stability.
 
 #[macro_use]
 pub mod error;

@@ -24,6 +24,9 @@ const ELEMENTS: usize = FOLLOWED * STRETCH;
 /// within half of it.
 const NEAR_CENTER: f64 = 0.4;
 
+/// Covers the rounding error of a distance.
+const ROOM: f64 = 1.0 + 1e-9;
+
 /// A simple root and its disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Root {
@@ -41,6 +44,16 @@ impl Root {
             (self.s.im.abs() > self.radius && top - self.s.im > self.radius).then_some(2)
         }
     }
+}
+
+/// Are all discs disjoint?
+pub(super) fn are_apart(roots: &[Root]) -> bool {
+    roots.iter().enumerate().all(|(place, one)| {
+        roots
+            .iter()
+            .skip(place + 1)
+            .all(|other| modulus(one.s - other.s) > (one.radius + other.radius) * ROOM)
+    })
 }
 
 /// A root at one k, and its slope.

@@ -11,14 +11,14 @@
 //! them as the search in a single cell would go. Roots closer than a few times that distance are
 //! left to that search.
 
-use super::branch::{Branches, Root};
+use super::branch::{Branches, Root, are_apart};
+use super::held;
 use super::plane::Plane;
 use crate::memory::reserved;
-use crate::quasipoly::{QuasiPolynomial, modulus};
+use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
 use crate::stability::cell::{Cell, judge, with_abscissa};
 use crate::stability::crossings::{Members, Row};
-use crate::stability::held;
 use crate::stability::hold::Hold;
 use crate::{Error, Task};
 
@@ -34,9 +34,6 @@ const BESIDE: usize = 2;
 
 /// Roots closer to the chains than this many margins are left to the search in a single cell.
 const CLOSE_TO_CHAINS: f64 = 10.0;
-
-/// Covers the rounding error of a distance.
-const ROOM: f64 = 1.0 + 1e-9;
 
 /// Least gap between roots, in units of the scale, into which a line is put.
 const LEAST_GAP: f64 = 1e-3;
@@ -344,14 +341,4 @@ impl Leading<'_> {
         self.branches.start(&self.plane, near.copied(), k);
         Ok(Known::Isolated(first))
     }
-}
-
-/// Are all discs disjoint?
-pub(crate) fn are_apart(roots: &[Root]) -> bool {
-    roots.iter().enumerate().all(|(place, one)| {
-        roots
-            .iter()
-            .skip(place + 1)
-            .all(|other| modulus(one.s - other.s) > (one.radius + other.radius) * ROOM)
-    })
 }

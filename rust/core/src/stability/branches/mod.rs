@@ -6,9 +6,8 @@
 
 mod branch;
 mod certify;
+mod held;
 mod leading;
 mod plane;
 
-pub(crate) use branch::{Branches, Root};
-pub(crate) use leading::are_apart;
-pub(crate) use plane::Plane;
+pub(crate) use held::rightmost;

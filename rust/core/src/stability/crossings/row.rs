@@ -9,11 +9,11 @@
 use std::ops::Range;
 
 use super::crossing::{Crossing, crossings};
+use super::held;
 use super::pencil::{Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
 use crate::stability::cell::{Cell, UNKNOWN, by_chain, judge};
-use crate::stability::held;
 use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
 use crate::status::CellStatus;

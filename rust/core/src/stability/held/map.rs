@@ -5,10 +5,9 @@
 //! counts of all rows start from those of one column. Rows are counted as those of any map
 //! (`crossings`). A row of one cell is judged alone.
 
-use super::count::crossings;
 use super::model::{LoopPolynomials, Polynomial, share_of_errors};
 use crate::quasipoly::QuasiPolynomial;
-use crate::stability::crossings::{Crossing, Members};
+use crate::stability::crossings::{Crossing, Members, crossings};
 use crate::stability::hold::Hold;
 use crate::stability::map::{Chart, Proof, Question, Vertex, join};
 use crate::stability::specification::Specification;

@@ -2,15 +2,14 @@
 
 use num_complex::Complex64;
 
-use super::count::{count, crossings};
 use super::model::{LoopPolynomials, share_of_errors};
-use super::rightmost::rightmost;
 use crate::dde::LinearLoop;
 use crate::dde::control_loop::sampled;
 use crate::dde::propagator::balanced_norm;
 use crate::quasipoly::QuasiPolynomial;
+use crate::stability::branches::rightmost;
 use crate::stability::cell::Cell;
-use crate::stability::crossings::Crossing;
+use crate::stability::crossings::{Crossing, count, crossings};
 use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
 use crate::{Error, Task};

@@ -7,12 +7,13 @@
 
 use num_complex::Complex64;
 
-use super::count::count;
+use super::branch::{Branches, Root, are_apart};
+use super::plane::Plane;
 use crate::dde::control_loop::sampled::eigenvalues;
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::{self, Region};
-use crate::stability::branches::{Branches, Plane, Root, are_apart};
 use crate::stability::cell::Cell;
+use crate::stability::crossings::count;
 use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
 use crate::status::CellStatus;

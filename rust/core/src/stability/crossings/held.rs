@@ -12,9 +12,10 @@
 //! only. They are proved and isolated, so that a root on the edge to working precision shows as a
 //! crossing whose interval holds 0.
 
+use super::crossing::{self, Crossing};
+use super::pencil::Pencil;
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::cell::{Cell, UNKNOWN};
-use crate::stability::crossings::{self, Crossing, Pencil};
 use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
 use crate::status::CellStatus;
@@ -41,7 +42,7 @@ pub(crate) fn crossings(
             return Ok(None);
         };
         let length = part.piece.length;
-        match crossings::crossings(&pencil, part.from_axis, length, range, task)? {
+        match crossing::crossings(&pencil, part.from_axis, length, range, task)? {
             Some(found) => all.extend(found.into_iter().map(|crossing| Crossing {
                 jump: crossing.jump.map(|jump| jump * part.sign),
                 ..crossing
