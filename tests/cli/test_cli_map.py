@@ -63,9 +63,9 @@ def test_crossings_along_one_gain():
     assert "+2" in printed
 
 
-def test_a_sampled_map_has_cells_and_a_margin_but_no_curves():
-    out = found("map", *SMALL, "--sample-time", 0.065)
-    assert out["boundaries"] == []
+def test_a_sampled_map_has_cells_a_margin_and_curves():
+    out = found("map", *SMALL, "--sample-time", 0.065, "--damping", 0.1, 5)
+    assert max(len(curve["omega"]) for curve in out["boundaries"]) > 10
     assert 0 < out["best_delay_margin"] < 1
 
 
@@ -93,7 +93,6 @@ def test_a_gain_is_listed_where_no_chains_reach_the_axis():
         (["--along", "Kd"], "Kd"),
         (["--along", "Kp", "--at", "nan"], "nan"),
         (["--along", "Kp", "--at", "0", "--sample-time", "0.1"], "sample_time"),
-        (["--sample-time", "0.1", "--damping", "0.4", "2"], "circle"),
         (["--proof", "none"], "none"),
     ],
 )

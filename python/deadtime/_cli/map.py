@@ -88,8 +88,7 @@ def command(
         best, abscissa = chart.best()
         margin = delay_margin(loop.replace(**best))
     crossed = None if along is None else _crossings_along(loop, along, at, best, chart.axes)
-    # A sampled loop has no curves.
-    curves = () if loop.is_sampled else chart.boundaries
+    curves = chart.boundaries
     if plot is not None:
         figure, axes = new_figure(7.0, 4.5)
         chart.plot(axes, best)
@@ -99,7 +98,7 @@ def command(
             {
                 "axes": chart.axes,
                 "unstable": chart.unstable,
-                "abscissa": None if counts and not loop.is_sampled else chart.abscissa,
+                "abscissa": None if counts else chart.abscissa,
                 "status": chart.status,
                 "boundaries": [
                     {**curve.values, **_attributes(curve, "omega", "crossing", "along")}

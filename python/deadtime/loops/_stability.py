@@ -175,7 +175,9 @@ def sampled_range(
             values["delay"], values["sample_time"]
         )
         return 0.0 if before is None else before.value, number.value + native.further_delay()[0]
-    if name == "gain" or name in controller._gains():
+    smooth = controller._filter
+    in_samples = smooth is not None and smooth.discretisation is not None
+    if (name == "gain" or name in controller._gains()) and not in_samples:
         return _gain_range(plant, controller, values, name, (low, high))
     endless = name in _NON_NEGATIVE or _keeps_sign(plant, name)
     return _sampled_end(number, low, -1.0, endless), _sampled_end(number, high, 1.0, endless)
