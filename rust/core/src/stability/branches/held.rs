@@ -135,7 +135,7 @@ fn refined(h: &QuasiPolynomial, hold: Hold, starts: &[Complex64]) -> Vec<Complex
             let step = value / slope;
             s -= step;
             last = modulus(step);
-            if !(last > SAME * modulus(s)) {
+            if last <= SAME * modulus(s) || last.is_nan() {
                 break;
             }
         }

@@ -275,13 +275,13 @@ impl Step {
 }
 
 fn identity(n: usize) -> Matrix {
-    let entry = |place: usize| DoubleDouble::from(f64::from(u8::from(place % (n + 1) == 0)));
+    let entry = |place: usize| DoubleDouble::from(f64::from(u8::from(place.is_multiple_of(n + 1))));
     (0..n * n).map(entry).collect()
 }
 
 /// The product of a square matrix of side n with another matrix, both row-major.
 fn times(left: &[DoubleDouble], right: &[DoubleDouble], n: usize) -> Matrix {
-    let width = if n == 0 { 0 } else { right.len() / n };
+    let width = right.len().checked_div(n).unwrap_or(0);
     let mut product = vec![ZERO; right.len()];
     for i in 0..n {
         for j in 0..width {
