@@ -61,6 +61,7 @@ mod huge_branch;
 mod kernel;
 mod log_form;
 mod real;
+mod real_coefficients;
 mod refine;
 mod scalar;
 mod special_values;
