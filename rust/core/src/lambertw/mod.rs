@@ -68,4 +68,5 @@ mod special_values;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use elementary::{rough_angle, rough_log};
 pub use scalar::{dde_root, lambertw, lambertw_log};
