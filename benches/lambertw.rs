@@ -1,7 +1,8 @@
 //! Lambert W: time per block of 1000 elements, one thread.
 //!
 //! Control problems have arguments in the disc. Next to -1/e and at extreme exponents other
-//! implementations become slow or fail.
+//! implementations become slow or fail. The real branches stand beside those of the crate
+//! `lambert_w`.
 
 use std::hint::black_box;
 
@@ -77,15 +78,27 @@ fn real_branches(criterion: &mut Criterion) {
         .map(|i| -INVERSE_E * f64::from(i) / f64::from(LENGTH + 1))
         .collect();
     let mut w = vec![0.0; LENGTH as usize];
-    group.bench_function(BenchmarkId::from_parameter("k=0"), |bencher| {
-        bencher.iter(|| block::lambertw0(black_box(&positive), &mut w));
-    });
-    group.bench_function(BenchmarkId::from_parameter("k=0 below zero"), |bencher| {
-        bencher.iter(|| block::lambertw0(black_box(&negative), &mut w));
-    });
-    group.bench_function(BenchmarkId::from_parameter("k=-1"), |bencher| {
-        bencher.iter(|| block::lambertwm1(black_box(&negative), &mut w));
-    });
+    let mut ours = |name: &str, kernel: fn(&[f64], &mut [f64]), x: &[f64]| {
+        group.bench_function(BenchmarkId::from_parameter(name), |bencher| {
+            bencher.iter(|| kernel(black_box(x), &mut w));
+        });
+    };
+    ours("k=0", block::lambertw0, &positive);
+    ours("k=0 below zero", block::lambertw0, &negative);
+    ours("k=-1", block::lambertwm1, &negative);
+    // The crate `lambert_w`, one number at a time.
+    let mut theirs = |name: &str, function: fn(f64) -> f64, x: &[f64]| {
+        group.bench_function(BenchmarkId::new("lambert_w", name), |bencher| {
+            bencher.iter(|| {
+                for (w, x) in w.iter_mut().zip(black_box(x)) {
+                    *w = function(*x);
+                }
+            });
+        });
+    };
+    theirs("k=0", lambert_w::lambert_w0, &positive);
+    theirs("k=0 below zero", lambert_w::lambert_w0, &negative);
+    theirs("k=-1", lambert_w::lambert_wm1, &negative);
     group.finish();
 }
 

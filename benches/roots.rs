@@ -4,11 +4,13 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
+use deadtime::lambertw;
 use deadtime::quasipoly::QuasiPolynomial;
 use deadtime::roots::matrix::{self, CharacteristicMatrix};
 use deadtime::roots::{Region, count, count_right_of, rightmost, roots};
+use num_complex::Complex64;
 
 struct Case {
     name: &'static str,
@@ -93,6 +95,33 @@ fn characteristic_roots(c: &mut Criterion) {
     }
 }
 
+/// A hundred thousand roots of s + e^(−s): their count, the whole list with its discs, and as the
+/// ceiling W_k(−1), which are the same numbers without a disc, a count or a list.
+fn long_chain(c: &mut Criterion) {
+    const ROOTS: u32 = 100_000;
+    let task = Task::new();
+    let rows = vec![vec![0.0, 1.0], vec![1.0]];
+    let Ok(h) = QuasiPolynomial::new(rows, vec![0.0, 1.0]) else {
+        return;
+    };
+    let region = Region {
+        re: (-20.0, 2.0),
+        im: (0.0, std::f64::consts::TAU * f64::from(ROOTS)),
+    };
+    let mut group = c.benchmark_group("chain of 100000");
+    group.sample_size(30);
+    group.throughput(Throughput::Elements(u64::from(ROOTS)));
+    group.bench_function("count", |b| b.iter(|| count(black_box(&h), &region, &task)));
+    group.bench_function("roots", |b| b.iter(|| roots(black_box(&h), &region, &task)));
+    let z = vec![Complex64::new(-1.0, 0.0); ROOTS as usize];
+    let k: Vec<i64> = (0..i64::from(ROOTS)).collect();
+    let mut w = vec![Complex64::ZERO; ROOTS as usize];
+    group.bench_function("ceiling", |b| {
+        b.iter(|| lambertw::block::lambertw(black_box(&z), &k, &mut w));
+    });
+    group.finish();
+}
+
 /// `n` states in a ring, with dense coupling without delay and delayed coupling to the next state.
 fn ring(n: usize) -> Option<CharacteristicMatrix> {
     let filled = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
@@ -132,5 +161,5 @@ fn matrix_roots(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, characteristic_roots, matrix_roots);
+criterion_group!(benches, characteristic_roots, long_chain, matrix_roots);
 criterion_main!(benches);

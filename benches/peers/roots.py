@@ -8,8 +8,10 @@ per cent, need only be accurate to the m-th root of 1e-10, as one number or as s
 upper half of the region. cxroots refuses a contour through a root, so it gets an edge 2 per cent of
 the height below the real axis; ours and qpmr accept roots on the real axis. Times are medians after
 a first call and include the conversion of the coefficients to the format of the program; ratios are
-those of cases that both get right. Run ``python benches/peers/roots.py [--quick] [--only CASE …]
-[--peers PEER …]``.
+those of cases that both get right. At the end the roots of a long chain, beside Lambert W, which
+gives the same numbers without a proof.
+
+Run ``python benches/peers/roots.py [--quick] [--only CASE …] [--peers PEER …]``.
 """
 
 from __future__ import annotations
@@ -161,6 +163,19 @@ def judge(found: Any, case: dict[str, Any]) -> tuple[int, int]:
     return int((~met.any(axis=1)).sum()), int((~met.any(axis=0)).sum())
 
 
+def long_chain(number: int) -> None:
+    """The roots of s + e^-s up to a height, and the same numbers from Lambert W alone."""
+    h, high = dtm.s + dtm.delay(1.0), 2 * math.pi * number
+    found, seconds = timed(lambda: h.roots(re=(-20, 2), im=(0, high)))
+    z, branches = -np.ones(number), np.arange(number)
+    _, bare = timed(lambda: dtm.lambertw(z, branches, threads=1))
+    print(
+        f"chain of {len(found)} roots: {seconds * 1e3:.2f} ms, {seconds / len(found) * 1e6:.3f} us "
+        f"a root with its disc; Lambert W, without discs, count or list: "
+        f"{bare / number * 1e6:.3f} us, {seconds / bare:.1f} times less"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a moment's run, rough numbers")
@@ -220,6 +235,8 @@ def main() -> None:
                 if verdicts["ours"] == "ok":
                     ratios[peer.name].append(float(np.median(spent)) / median)
         print(line, flush=True)
+    if not options.only:
+        long_chain(10_000 if options.quick else 100_000)
     print(f"right: ours {right['ours']} of {len(cases)}")
     for name, values in ratios.items():
         ratio = ""

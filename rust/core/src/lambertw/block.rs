@@ -5,7 +5,7 @@
 
 use num_complex::Complex64;
 
-use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep};
+use crate::simd::{Complex, Kernel, Mask, Real, SHORT, Simd, sweep, sweep_along};
 
 use super::branch_sort::Order;
 use super::kernel::Point;
@@ -109,7 +109,7 @@ impl Kernel<1, 1> for LambertW0 {
 
 /// `w[i] = W_0(x[i])` where that is real, from -1/e up, and NaN elsewhere.
 pub fn lambertw0(x: &[f64], w: &mut [f64]) {
-    real_to_real(&LambertW0, x, w);
+    sweep_along(&LambertW0, x, w);
 }
 
 struct LambertWm1;
@@ -123,7 +123,7 @@ impl Kernel<1, 1> for LambertWm1 {
 
 /// `w[i] = W_-1(x[i])` where that is real, from -1/e to zero, and NaN elsewhere.
 pub fn lambertwm1(x: &[f64], w: &mut [f64]) {
-    real_to_real(&LambertWm1, x, w);
+    sweep_along(&LambertWm1, x, w);
 }
 
 /// `w[i] = W_k[i](e^log_z[i])`: the solution of w + log w = log z + 2 pi i k, also where
@@ -290,19 +290,6 @@ fn complex_values<K: Kernel<IN, 3>, const IN: usize>(
         };
         Some(())
     });
-}
-
-fn real_to_real<K: Kernel<1, 1>>(kernel: &K, x: &[f64], w: &mut [f64]) {
-    let load = |i| x.get(i).map(|x| [*x]);
-    run(
-        kernel,
-        x.len().min(w.len()),
-        load,
-        |i, [value]: [f64; 1]| {
-            *w.get_mut(i)? = value;
-            Some(())
-        },
-    );
 }
 
 /// `store(i, kernel(load(i)))` for all i below `length`.

@@ -43,20 +43,3 @@ pub(super) const BEHIND_DENOMINATOR: [f64; 5] = [
     0.194_536_471_190_430_77,
     0.010_735_523_836_686_491,
 ];
-
-/// Numerator of the real W_-1 on [-1/e, -1/256], in sqrt(2 (e x + 1)): relative error 6.3e-05.
-pub(super) const LOWER_NUMERATOR: [f64; 5] = [
-    -1.000_062_895_041_829_3,
-    1.168_960_408_217_634_8,
-    0.141_935_157_683_218_82,
-    -0.552_170_205_880_106_7,
-    0.156_162_637_405_647_95,
-];
-/// Denominator that belongs to [`LOWER_NUMERATOR`].
-pub(super) const LOWER_DENOMINATOR: [f64; 5] = [
-    1.0,
-    -2.167_138_222_301_640_7,
-    1.682_195_008_700_218_2,
-    -0.540_671_808_274_954_1,
-    0.057_418_151_776_336_16,
-];

@@ -167,7 +167,7 @@ pub(super) fn turned_back<S: Simd>(z: Complex<S>, quarters: Real<S>) -> Complex<
 
 /// `log x` within 3e-7 for a positive normal number.
 #[inline(always)]
-pub(super) fn rough_log<S: Simd>(x: Real<S>) -> Real<S> {
+pub(crate) fn rough_log<S: Simd>(x: Real<S>) -> Real<S> {
     let t = x.mantissa().mul_add(2.0 / 3.0, -1.0);
     let exponent = x.binade().exponent();
     exponent.mul_add(std::f64::consts::LN_2, polynomial(&LOG, t))
@@ -175,7 +175,7 @@ pub(super) fn rough_log<S: Simd>(x: Real<S>) -> Real<S> {
 
 /// The angle of a complex number that is not zero, within 5e-6; that of a real one is exact.
 #[inline(always)]
-pub(super) fn rough_angle<S: Simd>(z: Complex<S>) -> Real<S> {
+pub(crate) fn rough_angle<S: Simd>(z: Complex<S>) -> Real<S> {
     let (along, across) = (z.re.abs(), z.im.abs());
     let steep = across.gt(along);
     let t = steep.select(along, across) / steep.select(across, along);

@@ -61,10 +61,12 @@ mod huge_branch;
 mod kernel;
 mod log_form;
 mod real;
+mod real_coefficients;
 mod refine;
 mod scalar;
 mod special_values;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use elementary::{rough_angle, rough_log};
 pub use scalar::{dde_root, lambertw, lambertw_log};

@@ -24,11 +24,11 @@ use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, log, sin_cos};
 
 /// Half an ulp of 1, enlarged by the rounding errors of computing the bounds.
-const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
+pub(super) const ROUNDING: f64 = 1.02 * 0.5 * f64::EPSILON;
 
 /// Largest relative error of an exponential, in units of u: its phase is wrong by at most half a
 /// turn.
-const OPPOSITE: f64 = 5.0 / f64::EPSILON;
+pub(super) const OPPOSITE: f64 = 5.0 / f64::EPSILON;
 
 /// Factor on a computed bound: larger than the rounding errors of its sums and powers with
 /// millions of operations, and too small to weaken the bound.

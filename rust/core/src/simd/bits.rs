@@ -34,18 +34,17 @@ impl<S: Simd> Real<S> {
         )
     }
 
-    #[inline(always)]
-    pub(crate) fn abs(self) -> Self {
-        let [a, b] = self.lanes;
-        Self::new(self.simd, [self.simd.abs_f64s(a), self.simd.abs_f64s(b)])
-    }
-
     /// The bits that are also set in `mask`.
     #[inline(always)]
     fn masked(self, mask: u64) -> Self {
         let ([a, b], mask) = (self.bits(), self.simd.splat_u64s(mask));
         let simd = self.simd;
         Self::from_bits(simd, [simd.and_u64s(a, mask), simd.and_u64s(b, mask)])
+    }
+
+    #[inline(always)]
+    pub(crate) fn abs(self) -> Self {
+        self.masked(!SIGN)
     }
 
     /// The sign alone: +0 or -0.

@@ -54,6 +54,44 @@ where
     }
 }
 
+struct Along<'a, K> {
+    kernel: &'a K,
+    x: &'a [f64],
+    values: &'a mut [f64],
+}
+
+impl<K: Kernel<1, 1>> WithSimd for Along<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let lanes = 2 * S::F64_LANES;
+        let whole = self.x.len().min(self.values.len()) / lanes * lanes;
+        let (x, x_end) = self.x.split_at(whole);
+        let (values, end) = self.values.split_at_mut(whole);
+        let pairs = S::as_simd_f64s(x).0.as_chunks().0.iter();
+        for (lanes, place) in pairs.zip(S::as_mut_simd_f64s(values).0.as_chunks_mut().0) {
+            let [value] = self.kernel.lanes([Real::new(simd, *lanes)]);
+            *place = value.lanes();
+        }
+        let Some(&some) = x_end.first() else { return };
+        // The last vectors are filled with an element like the others.
+        let mut last = Real::splat(simd, some);
+        for (lane, x) in last.numbers_mut().iter_mut().zip(x_end) {
+            *lane = *x;
+        }
+        let [value] = self.kernel.lanes([last]);
+        for ((place, value), _) in end.iter_mut().zip(value.numbers()).zip(x_end) {
+            *place = *value;
+        }
+    }
+}
+
+/// `values[i] = kernel(x[i])` as far as both reach.
+pub(crate) fn sweep_along<K: Kernel<1, 1>>(kernel: &K, x: &[f64], values: &mut [f64]) {
+    Instructions::chosen().run(Along { kernel, x, values });
+}
+
 /// Fill `values` for the first `length` elements and for those that complete their last vector.
 pub(crate) fn sweep<K, const IN: usize, const OUT: usize, const W: usize>(
     kernel: &K,

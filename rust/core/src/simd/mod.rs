@@ -16,7 +16,7 @@ mod real;
 
 #[cfg(test)]
 pub(crate) use columns::sweep_on;
-pub(crate) use columns::{Columns, Kernel, SHORT, sweep};
+pub(crate) use columns::{Columns, Kernel, SHORT, sweep, sweep_along};
 pub(crate) use complex::Complex;
 pub(crate) use dispatch::Instructions;
 pub(crate) use pulp::Simd;

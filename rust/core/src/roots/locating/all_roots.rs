@@ -13,6 +13,9 @@ use crate::{Error, Task};
 /// Upper limit on the number of roots in a list (bounds memory and time).
 const MAX_ROOTS: u64 = 1_000_000;
 
+/// Number of roots from which on chains are followed.
+const MANY: u64 = 64;
+
 /// Add exact roots at 0, to the disc that contains 0 or as a disc of their own.
 pub(crate) fn add_zeros(discs: &mut Vec<Disc>, zeros: u32) {
     if zeros == 0 {
@@ -85,12 +88,14 @@ pub(crate) fn all_discs(walker: &mut impl Seek, closed: &Closed) -> Result<Vec<D
     let upper = closed.above.map(|im| Cell::new(walker, re, im, false));
     let (lower, upper) = (lower.transpose()?, upper.transpose()?);
     for cell in [lower, upper].into_iter().flatten() {
-        for disc in locate(walker, cell)? {
-            if cell.symmetric && !closed.half {
-                discs.extend(with_mirror_image(disc));
-            } else {
-                discs.push(disc);
-            }
+        let located = locate(walker, cell)?;
+        if cell.symmetric && !closed.half {
+            discs.reserve(2 * located.len());
+            discs.extend(located.into_iter().flat_map(with_mirror_image));
+        } else if discs.is_empty() {
+            discs = located;
+        } else {
+            discs.extend(located);
         }
     }
     if closed.mirrored {
@@ -112,14 +117,14 @@ pub(crate) fn locate(walker: &mut impl Seek, cell: Cell) -> Result<Vec<Disc>, Er
             advice: "take a smaller region".into(),
         });
     }
-    let mut search = Search::new(walker);
+    let mut search = if cell.count > MANY {
+        Search::after_chains(walker, &cell)?
+    } else {
+        Search::new(walker)
+    };
     search.locate_all(cell)?;
-    let within: Vec<Disc> = search
-        .found()
-        .iter()
-        .filter(|disc| cell.holds(disc.center))
-        .copied()
-        .collect();
+    let mut within = search.into_found();
+    within.retain(|disc| cell.holds(disc.center));
     for disc in &within {
         let Disc { center, radius, .. } = *disc;
         let clear_below = cell.symmetric || center.im - radius > cell.im.0;

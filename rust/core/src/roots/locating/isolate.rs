@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use super::along_chains::discs_along_chains;
 use super::clusters::cluster;
 use super::newton::{Outcome, newton};
 use crate::Error;
@@ -19,6 +20,10 @@ use crate::roots::disc::{Disc, RESOLVED};
 
 /// Cells with more missing roots than this are cut before Newton's iteration is tried in them.
 const MOST_MISSING: u64 = 10;
+
+/// Largest cell, in roots, in which those that chains left out are sought. In a larger one most
+/// starts lead to known roots.
+const FEW: u64 = 16;
 
 /// Number of consecutive cuts that separate no roots after which a cluster is assumed.
 const IDLE_CUTS: u32 = 8;
@@ -49,6 +54,11 @@ pub(crate) trait Seek: Walk {
     /// The largest delay less the smallest, in s.
     fn delay_span(&self) -> f64;
 
+    /// Disjoint discs about simple roots in the upper half of the cell, found along chains.
+    fn along_chains(&self, _cell: &Cell) -> Result<Vec<Disc>, Error> {
+        Ok(Vec::new())
+    }
+
     /// The disc, shrunk to the point 0 where all its roots are known to be exactly there.
     fn at_zero_if_exact(&self, disc: Disc) -> Disc;
 }
@@ -75,6 +85,10 @@ impl Seek for Walker<'_> {
         delays.last().copied().unwrap_or(0.0) - delays.first().copied().unwrap_or(0.0)
     }
 
+    fn along_chains(&self, cell: &Cell) -> Result<Vec<Disc>, Error> {
+        discs_along_chains(self.probe.function(), cell, self.task)
+    }
+
     fn at_zero_if_exact(&self, disc: Disc) -> Disc {
         disc.at_zero_if_exact(self.probe.function())
     }
@@ -86,6 +100,8 @@ pub(crate) struct Search<'w, W: Seek> {
     found: Vec<Disc>,
     widest: f64,
     spacing: f64,
+    /// Were most discs found along chains?
+    along_chains: bool,
 }
 
 impl<'w, W: Seek> Search<'w, W> {
@@ -106,7 +122,18 @@ impl<'w, W: Seek> Search<'w, W> {
             found,
             widest,
             spacing,
+            along_chains: false,
         }
+    }
+
+    /// A search for what is left of a cell after chains of roots have been followed.
+    pub(crate) fn after_chains(walker: &'w mut W, cell: &Cell) -> Result<Self, Error> {
+        let known = walker.along_chains(cell)?;
+        let along_chains = !known.is_empty();
+        Ok(Self {
+            along_chains,
+            ..Self::with(walker, known)
+        })
     }
 
     /// Iterate from `starts` as long as the iterates stay in `window`, and keep the discs of simple
@@ -142,6 +169,11 @@ impl<'w, W: Seek> Search<'w, W> {
     /// The discs, ordered by the imaginary part of their centres.
     pub(crate) fn found(&self) -> &[Disc] {
         &self.found
+    }
+
+    /// The same, at the end of the search.
+    pub(crate) fn into_found(self) -> Vec<Disc> {
+        self.found
     }
 
     /// Number of roots located in the cell.
@@ -208,11 +240,14 @@ impl<'w, W: Seek> Search<'w, W> {
             if missing == 0 {
                 continue;
             }
-            if (missing <= MOST_MISSING || idle >= IDLE_CUTS) && self.try_here(&cell)? {
+            let few = missing <= MOST_MISSING && (!self.along_chains || cell.count <= FEW);
+            if (few || idle >= IDLE_CUTS) && self.try_here(&cell)? {
                 continue;
             }
             let tall = cell.height() > cell.width();
-            let parts = if cell.count > MOST_MISSING && tall {
+            // Chains leave out roots next to 0, and here and there another one.
+            let scattered = self.along_chains && 2 * missing < cell.count && !cell.symmetric;
+            let parts = if cell.count > MOST_MISSING && tall && !scattered {
                 cell.slice(self.walker, 4.0 / cell.count as f64)
             } else if self.is_divisible(&cell) {
                 cell.halves(self.walker)

@@ -3,13 +3,16 @@
 //! * `newton` finds a single root and proves its disc, `clusters` does the same for several roots
 //!   that cannot be separated; `isolate` and `all_roots` find every root of a region, `edge`
 //!   decides about roots on its edge.
-//! * `starts` guesses where roots of large modulus are.
+//! * `chain_laws` states how roots of large modulus are distributed, `along_chains` locates them
+//!   many at a time; `starts` guesses where roots of large modulus are.
 //! * `lines` searches for vertical lines with a known number of roots to their right, `rightmost`
 //!   finds the rightmost roots with them, `exact_abscissa` those of commensurate delays.
 //! * `stable` decides about stability, sooner where `unstable` finds one root in the right half
 //!   plane; `sensitivity` differentiates a root with respect to coefficients and delays.
 
 mod all_roots;
+mod along_chains;
+mod chain_laws;
 mod clusters;
 mod edge;
 mod exact_abscissa;

@@ -21,20 +21,23 @@ use crate::roots::disc::Disc;
 const MAX_STEPS: u32 = 60;
 
 /// Relative radius above which a disc is improved in double-double arithmetic.
-const PRECISE_ENOUGH: f64 = 1e-12;
+pub(super) const PRECISE_ENOUGH: f64 = 1e-12;
 
 /// If the value is below this share of its error, another step cannot improve it.
-const ARRIVED: f64 = 0.25;
+pub(super) const ARRIVED: f64 = 0.25;
+
+/// If the value is below this multiple of its error, one more step is all that helps.
+pub(super) const LOST: f64 = 2.0;
 
 /// Limits on slopes whose squares stay in the range of double precision.
-const LEAST: f64 = 1e-150;
-const MOST: f64 = 1e150;
+pub(super) const LEAST: f64 = 1e-150;
+pub(super) const MOST: f64 = 1e150;
 
 /// Factors that cover the rounding errors of radii.
-const SHRUNK: f64 = 1.0 - 1e-9;
+pub(super) const SHRUNK: f64 = 1.0 - 1e-9;
 
 /// The same upwards.
-const ENLARGED: f64 = 1.0 + 1e-9;
+pub(super) const ENLARGED: f64 = 1.0 + 1e-9;
 
 /// Range of the ratio of two steps in which several roots are assumed.
 const STEADY: std::ops::Range<f64> = 0.45..0.95;
@@ -71,7 +74,7 @@ pub(crate) fn newton(
             jet = probe.jet(z);
         }
         let step = newton_step(&jet);
-        let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
+        let lost_in_rounding = modulus(jet.value) <= LOST * jet.value_error;
         if modulus(jet.value) <= ARRIVED * jet.value_error
             && let Some(disc) = disc_from(probe, z, &jet)
             && disc.radius <= PRECISE_ENOUGH * modulus(z)
@@ -120,7 +123,7 @@ fn newton_in_double_double(
     for _ in 0..MAX_STEPS {
         let jet = probe.double_double_jet(z);
         let step = newton_step(&jet);
-        let lost_in_rounding = modulus(jet.value) <= 2.0 * jet.value_error;
+        let lost_in_rounding = modulus(jet.value) <= LOST * jet.value_error;
         let small = modulus(step) <= 2.0 * f64::EPSILON * modulus(z);
         let mut next = z - step * multiple(step, before);
         if !window(next) {
