@@ -234,8 +234,7 @@ def _simulated(
     kept = times.copy()
     found = loop.native.respond(kept, run, loop.output_lead)
     start = float(kept[0])
-    again = _Again(loop, start, run)
-    response = Response._of_fresh(kept, found, loop.steady_state(last), again)
+    response = Response._of_fresh(kept, found, _Again(loop, start, run, last))
     if not sensitivities:
         return response
     names = slope_names(loop, sensitivities)
@@ -266,10 +265,14 @@ def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -
 class _Again:
     """Output of a run at other times: the run is repeated for them."""
 
-    __slots__ = ("loop", "run", "start")
+    __slots__ = ("last", "loop", "run", "start")
 
-    def __init__(self, loop: LoopSpecification, start: float, run: LoopRun) -> None:
-        self.loop, self.start, self.run = loop, start, run
+    def __init__(self, loop: LoopSpecification, start: float, run: LoopRun, last: float) -> None:
+        self.loop, self.start, self.run, self.last = loop, start, run, last
+
+    def steady_state(self) -> float | None:
+        """Output at rest under the last reference, None without such a rest."""
+        return self.loop.steady_state(self.last)
 
     def __call__(self, times: Vector) -> Vector:
         run = _since_start(self.loop, self.start, self.run)

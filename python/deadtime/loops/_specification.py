@@ -155,7 +155,7 @@ class LoopSpecification:
 
     @cached_property
     def _rest_at_zero(self) -> tuple[NDArray[np.float64], float]:
-        return self._rest_at(0.0, 0.0)
+        return np.zeros(len(self.model.B)), 0.0
 
     def _rest_at(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
         numbers, space = self.parameters, self.model.plant
@@ -163,14 +163,17 @@ class LoopSpecification:
 
     def steady_state(self, reference: float) -> float | None:
         """Output at rest under a constant reference; None without such a rest within the limit."""
-        if self.model.update is None:
-            output, command = rest_of(self.plant, self.controller, self.parameters)
-            gains = None if np.isnan(output) else (float(output), float(command))
-        else:
-            gains = self.model.rest_gains
-        if gains is None:
+        if self._rest_gains is None:
             return None
-        output, command = gains
+        output, command = self._rest_gains
         if self.limit is not None and abs(command * reference) > self.limit:
             return None
         return output * reference
+
+    @cached_property
+    def _rest_gains(self) -> tuple[float, float] | None:
+        """Output and command at rest under a unit reference, None where there is no such rest."""
+        if self.model.update is not None:
+            return self.model.rest_gains
+        output, command = rest_of(self.plant, self.controller, self.parameters)
+        return None if np.isnan(output) else (float(output), float(command))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,18 @@ _LOST = 20.0
 
 #: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
+
+
+class RepeatedRun(Protocol):
+    """A run that can be repeated for what it was not asked for at first."""
+
+    def __call__(self, times: Vector) -> Vector:
+        """Outputs at other times."""
+        ...
+
+    def steady_state(self) -> float | None:
+        """Output at rest under the last reference, None without such a rest."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,8 +113,7 @@ class Response(ReadOnlyArrays):
         cls,
         time: Vector,
         found: LoopResponse,
-        steady_state: float | None,
-        dense: Callable[[Vector], Vector],
+        run: RepeatedRun,
     ) -> Response:
         """Make a response of arrays that are used nowhere else: nothing is copied or converted."""
         response = object.__new__(cls)
@@ -115,10 +126,18 @@ class Response(ReadOnlyArrays):
         for array in list(fields.values()):
             # Read-only, in a fifth of the time that `flags` takes.
             array.setflags(False)
-        fields["states"], fields["steady_state"] = None, steady_state
+        fields["states"] = None
         fields["sensitivities"] = fields["input_sensitivities"] = NONE
-        fields["_dense"] = dense
+        fields["_dense"] = run
         return response
+
+    def __getattr__(self, name: str) -> Any:
+        """Find the steady state when it is first read: few runs are asked for it."""
+        run = self.__dict__.get("_dense")
+        if name != "steady_state" or run is None:
+            raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}")
+        self.__dict__[name] = run.steady_state()
+        return self.__dict__[name]
 
     def __repr__(self) -> str:
         outputs = "1 output" if self.outputs.ndim == 1 else f"{len(self.outputs)} outputs"
@@ -240,6 +259,10 @@ class Response(ReadOnlyArrays):
         ax.set_xlabel("time in s")
         ax.legend()
         return ax
+
+
+# Without a default in the class, a steady state that is missing in a response is found on demand.
+del Response.steady_state
 
 
 def first_duration(A: NDArray[np.float64], delay: float) -> float:
