@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::arrays::rows;
 use crate::errors::to_python;
 use crate::quasipoly::RootSet;
-use crate::runtime::run;
+use crate::runtime::{run, run_here};
 
 type ByDelay<'py> = Vec<(f64, PyReadonlyArray2<'py, f64>)>;
 
@@ -58,14 +58,20 @@ impl CharacteristicMatrix {
     }
 
     fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
-        let set = run(py, None, None, |task: &Task| {
-            matrix::rightmost(&self.core, n, task)
-        })?;
+        let set = run_here(py, |task: &Task| matrix::rightmost(&self.core, n, task))?;
         Ok(RootSet::new(py, set))
     }
 
+    /// None where guesses do not lead to a proof.
+    fn rightmost_from_guesses(&self, py: Python<'_>, n: usize) -> PyResult<Option<RootSet>> {
+        let set = run_here(py, |task: &Task| {
+            matrix::rightmost_from_guesses(&self.core, n, task)
+        })?;
+        Ok(set.map(|set| RootSet::new(py, set)))
+    }
+
     fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {
-        run(py, None, None, |task: &Task| {
+        run_here(py, |task: &Task| {
             matrix::spectral_abscissa(&self.core, task)
         })
     }

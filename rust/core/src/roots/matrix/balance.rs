@@ -19,6 +19,13 @@ use crate::quasipoly::modulus;
 /// Cost that stands for an entry that is zero.
 const FORBIDDEN: f64 = 1e12;
 
+/// Factor on |s| up to which a scaling is kept. Larger: the entries differ more in size; smaller: it
+/// is chosen anew more often.
+const MOST_GROWTH: f64 = 30.0;
+
+/// Modulus that replaces that of points close to 0, in units of the rate of the system.
+const LEAST_SIZE: f64 = 1e-2;
+
 /// The power of two next to e^(−d x). It is taken out of the exponential, so that neither the
 /// exponential nor the entries leave the range of double precision unless their product does.
 pub(super) fn exponent(gap: f64, x: f64) -> f64 {
@@ -26,11 +33,25 @@ pub(super) fn exponent(gap: f64, x: f64) -> f64 {
 }
 
 /// The rows of a scaled matrix.
+#[derive(Debug, Clone)]
 pub(super) struct Balanced {
+    /// Where the scaling was chosen; the powers of two of the exponentials are those of that point.
+    pub(super) place: Complex64,
     /// c(i).
     pub(super) references: Vec<usize>,
     /// Terms with entries scaled, and multiplied by two to the power of [`exponent`].
     pub(super) rows: Vec<Vec<Term>>,
+}
+
+impl Balanced {
+    /// Is the scaling good enough at `s`? `farthest` is the largest change of Re s, in units of one
+    /// over the longest delay.
+    pub(super) fn suits(&self, system: &CharacteristicMatrix, s: Complex64, farthest: f64) -> bool {
+        let least = LEAST_SIZE * system.rate();
+        let (here, there) = (modulus(s).max(least), modulus(self.place).max(least));
+        (s.re - self.place.re).abs() * system.longest() <= farthest
+            && (1.0 / MOST_GROWTH..MOST_GROWTH).contains(&(here / there))
+    }
 }
 
 /// Scale M at `s`; `None` where its determinant is zero because of its pattern of zeros.
@@ -87,7 +108,11 @@ pub(super) fn balance(system: &CharacteristicMatrix, s: Complex64) -> Option<Bal
         });
         rows.push(scaled.collect());
     }
-    Some(Balanced { references, rows })
+    Some(Balanced {
+        place: s,
+        references,
+        rows,
+    })
 }
 
 /// The column of each row, and potentials with u_i + v_j ≤ cost, for the least sum of costs.

@@ -1,16 +1,15 @@
 //! Counts, roots, rightmost roots and stability of det M.
 
-use num_complex::Complex64;
-
+use super::leading::{Found, from_guesses};
 use super::local_enclosure::check_regular;
 use super::outer::Leading;
+use super::prepared::{LEAST_RADIUS, Prepared};
 use super::system::CharacteristicMatrix;
 use super::walker::{MAX_EVALUATIONS, MatrixWalker};
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::counting::{Cell, Closed, EDGE_MARGIN};
 use crate::roots::locating::{
-    Effort, Spectrum, all_discs, balances, first, half_plane_discs, is_none, leading, leads_right,
-    rightmost_first,
+    all_discs, balances, first, half_plane_discs, is_none, leading, leads_right, rightmost_first,
 };
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
@@ -19,75 +18,8 @@ use crate::{Error, Task};
 /// Upper limit on the roots that can be requested.
 const MAX_WANTED: usize = 1000;
 
-/// Factorisations after which a line is abandoned.
-const EVALUATIONS_PER_LINE: u64 = 100_000;
-
 /// Factorisations along the axis before a root right of it is searched for.
 const AT_A_GLANCE: u64 = 2_000;
-
-/// Least radius of a half plane, relative to the rate of the system, so that roots at 0 are inside.
-const LEAST_RADIUS: f64 = 1e-6;
-
-/// A system with the bounds that a search needs.
-struct Prepared<'s> {
-    system: &'s CharacteristicMatrix,
-    leading: Leading,
-}
-
-impl<'s> Prepared<'s> {
-    fn new(system: &'s CharacteristicMatrix) -> Result<Self, Error> {
-        Ok(Self {
-            system,
-            leading: Leading::new(system)?,
-        })
-    }
-
-    /// The upper half of a rectangle with all roots right of `sigma`; `None` where there is none.
-    fn cell(&self, walker: &mut MatrixWalker<'_>, sigma: f64) -> Result<Option<Cell>, Error> {
-        // A margin keeps roots off the edge itself.
-        let least = LEAST_RADIUS * self.system.rate();
-        let radius = EDGE_MARGIN * self.leading.radius(sigma, walker.task())?.max(least);
-        if sigma >= radius {
-            return Ok(None);
-        }
-        let re = (sigma.max(-radius), radius);
-        Cell::new(walker, re, (0.0, radius), true).map(Some)
-    }
-}
-
-impl Spectrum for Prepared<'_> {
-    type Walker<'a>
-        = MatrixWalker<'a>
-    where
-        Self: 'a;
-
-    fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> MatrixWalker<'a> {
-        MatrixWalker::new(self.system, task, limit)
-    }
-
-    fn line(
-        &self,
-        sigma: f64,
-        effort: Effort,
-        task: &Task,
-    ) -> Result<(u64, Vec<Complex64>), Error> {
-        let mut walker = self.walker(task, effort.limit.min(EVALUATIONS_PER_LINE));
-        let cell = self.cell(&mut walker, sigma)?;
-        Ok((cell.map_or(0, |cell| cell.count), walker.hints))
-    }
-
-    fn far_starts(&self) -> Vec<Complex64> {
-        Vec::new()
-    }
-
-    fn cell_right_of<'a>(
-        &'a self,
-        walker: &mut MatrixWalker<'a>,
-        sigma: f64,
-    ) -> Result<Option<Cell>, Error> {
-        self.cell(walker, sigma)
-    }
-}
 
 /// The region in the upper half plane, as far as symmetry allows, with its open sides closed.
 ///
@@ -220,7 +152,35 @@ pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result
         ));
     }
     let (_, chain) = prepared.leading.difference.enclosure(task)?;
-    leading(&prepared, n, None, chain, task, |discs, _| discs)
+    match from_guesses(&prepared, n, chain, task)? {
+        Found::Proved(set) => Ok(set),
+        Found::Open(line) => leading(&prepared, n, line, chain, task, |discs, _| discs),
+    }
+}
+
+/// [`rightmost`] for a system with delays but without delayed derivatives, as far as guesses lead
+/// to simple roots other than 0 and one line proves that these are the rightmost: `None` where they
+/// do not, and another form of the determinant may do better.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+pub fn rightmost_from_guesses(
+    system: &CharacteristicMatrix,
+    n: usize,
+    task: &Task,
+) -> Result<Option<RootSet>, Error> {
+    if n == 0 || n > MAX_WANTED || system.longest() == 0.0 || system.is_neutral() {
+        return Ok(None);
+    }
+    let Ok(prepared) = Prepared::new(system) else {
+        return Ok(None);
+    };
+    let Found::Proved(set) = from_guesses(&prepared, n, f64::NEG_INFINITY, task)? else {
+        return Ok(None);
+    };
+    let mut discs = set.roots.iter().zip(&set.radii);
+    let apart = discs.all(|(root, radius)| root.norm() > *radius);
+    Ok((apart && set.roots.len() >= n).then_some(set))
 }
 
 /// The largest real part of a root, or the upper bound of the chains if that is larger.

@@ -16,7 +16,8 @@ use std::f64::consts::{LN_2, PI, TAU};
 
 use num_complex::Complex64;
 
-use super::factor::{ROUNDING, Rows};
+use super::factor::ROUNDING;
+use super::rows::Rows;
 use crate::elementary::{exp, exp_above, log, sin_cos};
 use crate::{Error, Task};
 
@@ -490,12 +491,12 @@ fn norm(matrix: &Rows) -> f64 {
 }
 
 fn square(matrix: &Rows) -> Rows {
-    let n = matrix.size;
-    let mut found = Rows::zeros(n);
+    let mut found = Rows::zeros(matrix.size);
+    let stride = found.stride();
     let rows = found
         .re
-        .chunks_exact_mut(n)
-        .zip(found.im.chunks_exact_mut(n));
+        .chunks_exact_mut(stride)
+        .zip(found.im.chunks_exact_mut(stride));
     for (i, (re, im)) in rows.enumerate() {
         let (own_re, own_im) = matrix.row(i);
         for (k, (a, b)) in own_re.iter().zip(own_im).enumerate() {

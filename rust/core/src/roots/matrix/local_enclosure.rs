@@ -21,7 +21,9 @@ use std::f64::consts::LN_2;
 use num_complex::Complex64;
 
 use super::balance::{Balanced, balance, exponent};
-use super::factor::{Factored, ROUNDING, Rows, factor, norm};
+use super::factor::{FLOOR, Factored, ROUNDING, factor};
+use super::kernel::combine;
+use super::rows::{Rows, norm};
 use super::system::{CharacteristicMatrix, Term};
 use crate::Error;
 use crate::elementary::{angle, exp, sin_cos};
@@ -46,9 +48,6 @@ const SHRUNK: f64 = 1.0 - 1e-9;
 
 /// Rounding errors, for each row, of sums over all rows and of angles.
 const ROW_ROUNDINGS: f64 = 16.0;
-
-/// Larger than every effect of underflow on a row.
-const FLOOR: f64 = 1e-150;
 
 /// Lower limit that replaces a size lost in underflow, because the size may grow along the step.
 const LEAST: f64 = 1e-150;
@@ -87,6 +86,10 @@ const LEAST_COMMON: f64 = 1e-3;
 
 /// Largest |κ δ|² of a step, because products would overflow.
 const MOST_COMMON: f64 = 1e200;
+
+/// Upper limit on the gaps whose parts are merged over rows. Larger: shorter steps where rows have
+/// gaps of their own; smaller: more operations for each length tried.
+const MOST_MERGED: usize = 2;
 
 /// Points, in units of the rate. A matrix that is not singular everywhere is regular in double
 /// precision at one of them.
@@ -130,7 +133,8 @@ pub(super) struct LocalEnclosure {
     /// det M / det M′: Newton's step is minus that.
     pub(super) correction: Complex64,
     size: f64,
-    residual: f64,
+    /// √(size) times this is below `CLEAR` where the argument is proved.
+    pub(super) residual: f64,
     expansions: [Expansion; 2],
     rows: Vec<Vec<Part>>,
 }
@@ -144,12 +148,12 @@ pub(super) struct Reach {
 
 impl LocalEnclosure {
     /// The enclosure at `s`; `None` where M(s) is too close to a singular matrix.
-    pub(super) fn new(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
-        Self::tried(system, s).filter(Self::is_clear)
+    fn new(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
+        Self::tried(system, &balance(system, s)?, s).filter(Self::is_clear)
     }
 
     /// Is the argument proved?
-    fn is_clear(&self) -> bool {
+    pub(super) fn is_clear(&self) -> bool {
         self.size.sqrt() * self.residual <= CLEAR && self.angle.is_finite()
     }
 
@@ -158,16 +162,17 @@ impl LocalEnclosure {
         self.residual < RESOLVED
     }
 
-    /// The same without any proof, for Newton's iteration.
-    pub(super) fn tried(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
+    /// What is known at `s` with M scaled by `balanced`, proved or not.
+    pub(super) fn tried(
+        system: &CharacteristicMatrix,
+        balanced: &Balanced,
+        s: Complex64,
+    ) -> Option<Self> {
         let n = system.size();
-        let Balanced {
-            references,
-            rows: scaled,
-        } = balance(system, s)?;
-        let mut weights = Weights::new(system, s);
+        let scaled = || balanced.rows.iter().zip(&balanced.references);
+        let mut weights = Weights::new(system, balanced, s);
         let mut g = Rows::zeros(n);
-        for (i, (terms, reference)) in scaled.iter().zip(&references).enumerate() {
+        for (i, (terms, reference)) in scaled().enumerate() {
             for term in terms {
                 let (_, _, factor) = weights.get(term.delay, *reference);
                 for entry in &term.entries {
@@ -183,20 +188,22 @@ impl LocalEnclosure {
         } = factor(g)?;
         let mut sums = Sums::new(n);
         let mut rows = Vec::with_capacity(n);
-        for (i, (terms, reference)) in scaled.iter().zip(&references).enumerate() {
+        for (i, (terms, reference)) in scaled().enumerate() {
             let mut parts = Vec::with_capacity(terms.len());
             sums.start_row();
             for term in terms {
                 let weight = weights.get(term.delay, *reference);
                 let loss = weights.loss(term, terms.len(), weight.0);
-                parts.push(sums.add(term, (s, i), weight, loss, (&inverse, &norms)));
+                let part = sums.add(term, (s, i), weight, loss, (&inverse, &norms));
+                parts.extend(part);
             }
             sums.end_row(i);
             rows.push(parts);
         }
         let size = n as f64;
         let residual = (residual + sums.lost.sqrt()) * MARGIN;
-        let delay: f64 = references
+        let delay: f64 = balanced
+            .references
             .iter()
             .filter_map(|c| system.delays().get(*c))
             .sum();
@@ -214,7 +221,7 @@ impl LocalEnclosure {
                 sums.first.expansion(size, true),
                 sums.zeroth.expansion(size, false),
             ],
-            rows,
+            rows: merged(rows),
         })
     }
 
@@ -299,9 +306,6 @@ impl LocalEnclosure {
         for parts in &self.rows {
             let (mut row, mut own) = (0.0, 0.0);
             for part in parts {
-                if part.gap == 0.0 {
-                    continue;
-                }
                 let z = (part.gap * length).abs();
                 let rise = -part.gap * step.re;
                 let grown = if rise > 0.0 { exp(rise) * MARGIN } else { 1.0 };
@@ -324,24 +328,55 @@ impl LocalEnclosure {
     }
 }
 
+/// All rows as one where few gaps occur, each gap in one part: by Minkowski's inequality the root of
+/// the sum of squares over rows is at most the sum of that over gaps.
+fn merged(rows: Vec<Vec<Part>>) -> Vec<Vec<Part>> {
+    let mut whole: Vec<Part> = Vec::new();
+    for part in rows.iter().flatten() {
+        if let Some(known) = whole.iter_mut().find(|known| known.gap == part.gap) {
+            known.size += part.size * part.size;
+            known.slope += part.slope * part.slope;
+            known.own_size += part.own_size;
+            known.own_slope += part.own_slope;
+        } else if whole.len() == MOST_MERGED {
+            return rows;
+        } else {
+            let (size, slope) = (part.size * part.size, part.slope * part.slope);
+            whole.push(Part {
+                size,
+                slope,
+                ..*part
+            });
+        }
+    }
+    for part in &mut whole {
+        part.size = part.size.sqrt().max(LEAST) * MARGIN;
+        part.slope = part.slope.sqrt().max(LEAST) * MARGIN;
+    }
+    vec![whole]
+}
+
 /// Gap, e^(−x d) and e^(−s d) without their power of two for pairs of delays, each computed once.
-struct Weights<'a> {
+pub(super) struct Weights<'a> {
     delays: &'a [f64],
     s: Complex64,
+    /// Re s of the point with whose powers of two the entries are scaled.
+    scaled_at: f64,
     known: Vec<Option<(f64, f64, Complex64)>>,
 }
 
 impl<'a> Weights<'a> {
-    fn new(system: &'a CharacteristicMatrix, s: Complex64) -> Self {
+    pub(super) fn new(system: &'a CharacteristicMatrix, balanced: &Balanced, s: Complex64) -> Self {
         let delays = system.delays();
         Self {
             delays,
             s,
+            scaled_at: balanced.place.re,
             known: vec![None; delays.len() * delays.len()],
         }
     }
 
-    fn get(&mut self, delay: usize, reference: usize) -> (f64, f64, Complex64) {
+    pub(super) fn get(&mut self, delay: usize, reference: usize) -> (f64, f64, Complex64) {
         let at = delay * self.delays.len() + reference;
         if let Some(Some(known)) = self.known.get(at) {
             return *known;
@@ -352,7 +387,7 @@ impl<'a> Weights<'a> {
             (0.0, 1.0, Complex64::ONE)
         } else {
             // The rest of e^(−x d) without its power of two, which is in the entries.
-            let weight = exp(-gap * self.s.re - exponent(gap, self.s.re) * LN_2);
+            let weight = exp(-gap * self.s.re - exponent(gap, self.scaled_at) * LN_2);
             let (sine, cosine) = sin_cos(gap * self.s.im);
             (gap, weight, Complex64::new(weight * cosine, -weight * sine))
         };
@@ -363,8 +398,8 @@ impl<'a> Weights<'a> {
     }
 
     /// The rounding error of the products of a term with R, relative to the sum of moduli.
-    fn loss(&self, term: &Term, terms: usize, gap: f64) -> f64 {
-        let reach = self.s.re.abs() + self.s.im.abs();
+    pub(super) fn loss(&self, term: &Term, terms: usize, gap: f64) -> f64 {
+        let reach = self.s.re.abs() + self.s.im.abs() + self.scaled_at.abs();
         ROUNDING * ((16 + terms + term.entries.len()) as f64 + 8.0 * gap.abs() * reach)
     }
 }
@@ -377,8 +412,8 @@ struct Sums {
     lost: f64,
     row_lost: f64,
     /// Rows of products of a term with R.
-    on_slope: (Vec<f64>, Vec<f64>),
-    on_value: (Vec<f64>, Vec<f64>),
+    on_slope: Rows,
+    on_value: Rows,
 }
 
 /// A choice of K, row by row. Of K − κ I only norms are needed.
@@ -437,14 +472,13 @@ impl Sum {
 
 impl Sums {
     fn new(n: usize) -> Self {
-        let row = || (vec![0.0; n], vec![0.0; n]);
         Self {
             first: Sum::new(n),
             zeroth: Sum::new(n),
             lost: 0.0,
             row_lost: 0.0,
-            on_slope: row(),
-            on_value: row(),
+            on_slope: Rows::one(n),
+            on_value: Rows::one(n),
         }
     }
 
@@ -458,7 +492,7 @@ impl Sums {
         self.lost += self.row_lost * self.row_lost;
     }
 
-    /// Add what one term contributes to row i.
+    /// Add what one term contributes to row i; the part of it that changes along a step.
     fn add(
         &mut self,
         term: &Term,
@@ -466,74 +500,54 @@ impl Sums {
         (gap, weight, factor): (f64, f64, Complex64),
         loss: f64,
         (inverse, norms): (&Rows, &[f64]),
-    ) -> Part {
-        for row in [&mut self.on_slope, &mut self.on_value] {
-            row.0.fill(0.0);
-            row.1.fill(0.0);
-        }
+    ) -> Option<Part> {
         let (mut slopes, mut values) = (0.0, 0.0);
         for entry in &term.entries {
-            let from = inverse.row(entry.column);
             let size = norms.get(entry.column).copied().unwrap_or(f64::NAN);
             slopes += entry.slope.abs() * size;
             values += entry.value.abs() * size;
-            add_multiple(&mut self.on_slope, entry.slope, from);
-            add_multiple(&mut self.on_value, entry.value, from);
         }
+        // Without a gap values do not change along a step.
+        let rows = [&mut self.on_slope, &mut self.on_value];
+        combine(&term.entries, gap != 0.0, inverse, rows);
         let sizes = modulus(s) * slopes + values;
         let (lost, lost_slope) = (loss * weight * sizes, loss * weight * slopes);
         self.row_lost += lost;
         self.first.row_lost += lost_slope + gap.abs() * lost;
         if gap == 0.0 {
             self.zeroth.row_lost += lost_slope;
+            // The factor is 1.
+            let (re, im) = self.on_slope.row(0);
+            for row in [&mut self.first.row, &mut self.zeroth.row] {
+                for (sum, x) in row.0.iter_mut().zip(re) {
+                    *sum += x;
+                }
+                for (sum, x) in row.1.iter_mut().zip(im) {
+                    *sum += x;
+                }
+            }
+            return None;
         }
-        let at = |row: &(Vec<f64>, Vec<f64>)| {
-            Complex64::new(
-                row.0.get(i).copied().unwrap_or(f64::NAN),
-                row.1.get(i).copied().unwrap_or(f64::NAN),
-            )
-        };
-        let own_slope = at(&self.on_slope);
-        let own_size = own_slope * s + at(&self.on_value);
-        let slope_norm = norm((&self.on_slope.0, &self.on_slope.1));
-        let mut squares = 0.0;
-        let rows = self.on_slope.0.iter().zip(&self.on_slope.1);
-        let values = self.on_value.0.iter().zip(&self.on_value.1);
+        let own_slope = self.on_slope.get(0, i);
+        let own_size = own_slope * s + self.on_value.get(0, i);
+        let slope_norm = norm(self.on_slope.row(0));
+        let rows = self.on_slope.re.iter().zip(&self.on_slope.im);
+        let values = self.on_value.re.iter_mut().zip(&mut self.on_value.im);
         let sums = self.first.row.0.iter_mut().zip(&mut self.first.row.1);
         for (((pr, pi), (vr, vi)), (kr, ki)) in rows.zip(values).zip(sums) {
-            let (qr, qi) = (s.re * pr - s.im * pi + vr, s.re * pi + s.im * pr + vi);
-            squares += qr * qr + qi * qi;
-            let (dr, di) = (pr - gap * qr, pi - gap * qi);
+            (*vr, *vi) = (s.re * pr - s.im * pi + *vr, s.re * pi + s.im * pr + *vi);
+            let (dr, di) = (pr - gap * *vr, pi - gap * *vi);
             *kr += factor.re * dr - factor.im * di;
             *ki += factor.re * di + factor.im * dr;
         }
-        if gap == 0.0 {
-            // The factor is 1.
-            add_multiple(
-                &mut self.zeroth.row,
-                1.0,
-                (&self.on_slope.0, &self.on_slope.1),
-            );
-        }
-        Part {
+        let size_norm = norm(self.on_value.row(0));
+        Some(Part {
             gap,
-            size: weight * squares.sqrt() * MARGIN + lost + LEAST,
+            size: weight * size_norm * MARGIN + lost + LEAST,
             slope: weight * slope_norm * MARGIN + lost_slope + LEAST,
             own_size: weight * modulus(own_size) * MARGIN + lost + LEAST,
             own_slope: weight * modulus(own_slope) * MARGIN + lost_slope + LEAST,
-        }
-    }
-}
-
-fn add_multiple(row: &mut (Vec<f64>, Vec<f64>), factor: f64, (re, im): (&[f64], &[f64])) {
-    if factor == 0.0 {
-        return;
-    }
-    for (sum, x) in row.0.iter_mut().zip(re) {
-        *sum += factor * x;
-    }
-    for (sum, x) in row.1.iter_mut().zip(im) {
-        *sum += factor * x;
+        })
     }
 }
 

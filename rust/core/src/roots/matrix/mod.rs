@@ -1,9 +1,11 @@
 //! Roots of det M(s), M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), without expanding the determinant.
 //!
-//! `system` holds the matrices, `balance` scales them at a point, `factor` their factors and
-//! inverses with rounding bounds, `local_enclosure` what is proved about det M around a point;
+//! `system` holds the matrices, `rows` complex ones, `balance` scales them at a point, `factor` their factors and
+//! inverses (`kernel`) with rounding bounds, `local_enclosure` what is proved about det M around a point;
 //! `walker` follows arg det M along lines and iterates by Newton's method, so that rectangles are
 //! counted, divided and searched as for one function (`counting::cell`, `locating::isolate`).
+//! `simple_root` encloses one root by Newton's method for a bordered matrix, `starts` guesses the
+//! rightmost ones from a linearisation, `leading` proves that these are the rightmost.
 //! `outer` bounds the roots of half planes by norms, `difference` bounds the chains of neutral
 //! systems. `determinant` answers the questions. All statements are proved for the matrices as
 //! given, however large or small their entries are. The accuracy of a root depends on how regular M
@@ -14,15 +16,21 @@ mod balance;
 mod determinant;
 mod difference;
 mod factor;
+mod kernel;
+mod leading;
 mod local_enclosure;
 mod outer;
+mod prepared;
+mod rows;
+mod simple_root;
+mod starts;
 mod system;
 #[cfg(test)]
 mod tests;
 mod walker;
 
 pub use determinant::{
-    chain_abscissa, count, count_right_of, is_invertible, is_stable, rightmost, roots,
-    spectral_abscissa,
+    chain_abscissa, count, count_right_of, is_invertible, is_stable, rightmost,
+    rightmost_from_guesses, roots, spectral_abscissa,
 };
 pub use system::CharacteristicMatrix;

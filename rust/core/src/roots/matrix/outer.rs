@@ -11,7 +11,8 @@
 //! by MARGIN.
 
 use super::difference::Difference;
-use super::factor::{ROUNDING, Rows, factor};
+use super::factor::{ROUNDING, factor};
+use super::rows::Rows;
 use super::system::CharacteristicMatrix;
 use crate::elementary::exp_above;
 use crate::{Error, Task};

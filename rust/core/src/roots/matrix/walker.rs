@@ -12,7 +12,9 @@
 
 use num_complex::Complex64;
 
+use super::balance::{Balanced, balance};
 use super::local_enclosure::{LocalEnclosure, Reach};
+use super::simple_root::simple_root;
 use super::system::CharacteristicMatrix;
 use crate::quasipoly::modulus;
 use crate::roots::counting::{Cell, Turn, Walk};
@@ -98,6 +100,19 @@ const STRETCHES: (f64, f64, f64) = (1.05, 0.9, 1.2);
 /// Factor on the reach for a step that could not be proved.
 const SHORTENED: f64 = 0.999;
 
+/// Largest change of Re s, in units of one over the longest delay, up to which a scaling is kept: on
+/// lines, where steps shorten if it does not suit, and in Newton's iteration. Larger: entries differ
+/// more in size; smaller: it is chosen anew more often, which takes as long as an evaluation.
+const ON_LINE: f64 = 0.02;
+pub(super) const NEAR_ROOT: f64 = 1.0;
+
+/// Residual in units of the least one with a scaling at which it is chosen anew. Larger: shorter
+/// steps until then; smaller: more scalings next to roots, where residuals are large anyway.
+const MOST_RESIDUALS: f64 = 30.0;
+
+/// Upper limit on the points kept that are too far ahead (bounds memory).
+const MOST_AHEAD: usize = 64;
+
 /// Range of the ratio of two steps in which a multiple root is assumed.
 const STEADY: std::ops::Range<f64> = 0.4..0.97;
 
@@ -115,6 +130,11 @@ const LAST_STEP: f64 = 1e-3;
 pub(super) struct MatrixWalker<'a> {
     system: &'a CharacteristicMatrix,
     task: &'a Task,
+    /// The scaling of M at the last points, and the least residual met with it.
+    balanced: Option<Balanced>,
+    least_residual: f64,
+    /// The end of the last line, where the next one usually begins.
+    last: Option<LocalEnclosure>,
     /// Ends of Newton's steps from the points closest to a root.
     pub(super) hints: Vec<Complex64>,
     known: Vec<Disc>,
@@ -132,6 +152,9 @@ impl<'a> MatrixWalker<'a> {
         Self {
             system,
             task,
+            balanced: None,
+            least_residual: f64::INFINITY,
+            last: None,
             hints: Vec::new(),
             known: Vec::new(),
             stalled: Vec::new(),
@@ -170,16 +193,49 @@ impl<'a> MatrixWalker<'a> {
         Ok(())
     }
 
+    /// A scaling of M that suits `s`, chosen within `farthest` of it.
+    pub(super) fn balanced(&mut self, s: Complex64, farthest: f64) -> Option<&Balanced> {
+        let known = self.balanced.take();
+        self.balanced = known
+            .filter(|known| known.suits(self.system, s, farthest))
+            .or_else(|| balance(self.system, s));
+        self.balanced.as_ref()
+    }
+
+    /// What is known at `s`, proved or not.
+    ///
+    /// Long chains of states grow exponentially with a scaling that does not suit them. The residual
+    /// shows that, and the scaling is then chosen anew.
+    fn tried(&mut self, s: Complex64, farthest: f64) -> Option<LocalEnclosure> {
+        let system = self.system;
+        let fresh = |scaling: &Balanced| scaling.place == s;
+        let mut found = LocalEnclosure::tried(system, self.balanced(s, farthest)?, s);
+        let residual = found.as_ref().map_or(f64::INFINITY, |here| here.residual);
+        let is_fresh = self.balanced.as_ref().is_some_and(fresh);
+        if !is_fresh && !(residual <= MOST_RESIDUALS * self.least_residual) {
+            self.balanced = None;
+            found = LocalEnclosure::tried(system, self.balanced(s, farthest)?, s);
+        }
+        let residual = found.as_ref().map_or(f64::INFINITY, |here| here.residual);
+        let is_fresh = self.balanced.as_ref().is_some_and(fresh);
+        self.least_residual = if is_fresh {
+            residual
+        } else {
+            residual.min(self.least_residual)
+        };
+        found
+    }
+
     fn enclosure(&mut self, s: Complex64) -> Result<Option<LocalEnclosure>, Error> {
         self.spend()?;
-        Ok(LocalEnclosure::new(self.system, s))
+        Ok(self.tried(s, ON_LINE).filter(LocalEnclosure::is_clear))
     }
 
     /// The error for a line that cannot be proved to be free of roots at `place`.
     fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
         let mut distance = RESOLUTION * modulus(place).max(LEAST_SIZE * self.system.rate());
         // The point itself may be free of roots, and the root as far away as Newton's step leads.
-        if let Some(here) = LocalEnclosure::tried(self.system, place) {
+        if let Some(here) = self.tried(place, ON_LINE) {
             let correction = modulus(here.correction);
             if correction.is_finite() {
                 distance = distance.max(BEYOND_ROOT * correction);
@@ -199,41 +255,37 @@ impl<'a> MatrixWalker<'a> {
     }
 
     /// The next point, with the distance from `here` of the point where both reaches meet.
+    ///
+    /// Points that turn out to be too far away are kept in `ahead`, the nearest one last.
     fn step(
         &mut self,
         here: &LocalEnclosure,
-        to: Complex64,
-        (along, rest): (Complex64, f64),
-        stretch: &mut f64,
-    ) -> Result<(LocalEnclosure, Reach, f64, Reach), Error> {
+        (to, along): (Complex64, Complex64),
+        (stretch, ahead): (&mut f64, &mut Vec<LocalEnclosure>),
+    ) -> Result<(LocalEnclosure, Meeting), Error> {
+        let rest = (to - here.s).re.abs() + (to - here.s).im.abs();
         let reach = here.reach(along, rest);
-        let mut length = if reach.length >= rest {
-            rest
-        } else {
-            rest.min(*stretch * reach.length)
-        };
+        let mut length = *stretch * reach.length;
+        if let Some(next) = ahead.pop() {
+            match Meeting::of(here, reach, &next, along) {
+                Ok(meeting) => return Ok((next, meeting)),
+                Err(middle) => length = middle,
+            }
+            ahead.push(next);
+        } else if reach.length >= rest {
+            length = rest;
+        }
         let mut unclear = 0;
-        for _ in 0..MAX_STEP_ATTEMPTS {
-            let next = if length >= rest {
+        for attempt in 0..MAX_STEP_ATTEMPTS {
+            let place = if length >= rest {
                 to
             } else {
                 here.s + along * length
             };
-            if next == here.s {
+            if place == here.s {
                 break;
             }
-            if let Some(ahead) = self.enclosure(next)? {
-                let gone = modulus(next - here.s) * ENLARGED;
-                let back = ahead.reach(-along, gone);
-                if back.length + reach.length >= gone * OVERLAP || reach.length >= gone {
-                    *stretch = (STRETCHES.0 * *stretch).min(STRETCH);
-                    // As far from the end of either reach as possible.
-                    let part = reach.length / (reach.length + back.length);
-                    return Ok((ahead, reach, part * gone, back));
-                }
-                *stretch = (STRETCHES.1 * *stretch).max(STRETCHES.2);
-                length = (SHORTENED * reach.length).max(0.5 * length.min(reach.length));
-            } else {
+            let Some(next) = self.enclosure(place)? else {
                 // Points that are free of roots exist at any distance from a root, with shorter and
                 // shorter reaches.
                 unclear += 1;
@@ -241,6 +293,26 @@ impl<'a> MatrixWalker<'a> {
                     break;
                 }
                 length *= 0.5;
+                continue;
+            };
+            match Meeting::of(here, reach, &next, along) {
+                Ok(meeting) => {
+                    if attempt == 0 {
+                        *stretch = (STRETCHES.0 * *stretch).min(STRETCH);
+                    }
+                    return Ok((next, meeting));
+                }
+                Err(middle) => {
+                    *stretch = (STRETCHES.1 * *stretch).max(STRETCHES.2);
+                    length = if attempt == 0 {
+                        middle
+                    } else {
+                        (SHORTENED * reach.length).max(0.5 * length.min(reach.length))
+                    };
+                    if ahead.len() < MOST_AHEAD {
+                        ahead.push(next);
+                    }
+                }
             }
         }
         Err(self.blocked(here.s)?)
@@ -299,7 +371,17 @@ impl<'a> MatrixWalker<'a> {
         if self.stalled.iter().any(|place| (place - up).norm() < most) {
             return Ok(Outcome::Stalled(z));
         }
-        Ok(match self.square(up, most)? {
+        self.spend()?;
+        let system = self.system;
+        let single = self
+            .balanced(up, NEAR_ROOT)
+            .and_then(|balanced| simple_root(system, balanced, up))
+            .filter(|disc| disc.radius < most);
+        let found = match single {
+            Some(disc) => Some(disc),
+            None => self.square(up, most)?,
+        };
+        Ok(match found {
             Some(disc) if disc.multiplicity == 1 => {
                 self.known.push(disc);
                 Outcome::Simple(disc)
@@ -319,7 +401,12 @@ impl Walk for MatrixWalker<'_> {
             return Ok(Turn::default());
         }
         let along = (to - from) / ((to - from).re.abs() + (to - from).im.abs());
-        let Some(mut here) = self.enclosure(from)? else {
+        let known = self.last.take().filter(|last| last.s == from);
+        let first = match known {
+            Some(last) => Some(last),
+            None => self.enclosure(from)?,
+        };
+        let Some(mut here) = first else {
             return Err(self.blocked(from)?);
         };
         let mut turn = Turn {
@@ -328,11 +415,12 @@ impl Walk for MatrixWalker<'_> {
         };
         let summands = self.system.size() as f64 + OTHER_SUMMANDS;
         let mut stretch = STRETCH;
+        let mut known = Vec::new();
         // Newton's corrections at the last two points: a local minimum indicates a root.
         let mut before = (f64::INFINITY, f64::INFINITY);
         while here.s != to {
-            let rest = (to - here.s).re.abs() + (to - here.s).im.abs();
-            let (ahead, reach, gone, back) = self.step(&here, to, (along, rest), &mut stretch)?;
+            let step = self.step(&here, (to, along), (&mut stretch, &mut known))?;
+            let (ahead, Meeting { reach, back, gone }) = step;
             let middle = here.s + along * gone;
             let (first, second) = (middle - here.s, middle - ahead.s);
             let expected = here.expected(reach, first) - ahead.expected(back, second);
@@ -355,7 +443,37 @@ impl Walk for MatrixWalker<'_> {
             here = ahead;
         }
         turn.slack += here.error;
+        self.last = Some(here);
         Ok(turn)
+    }
+}
+
+/// How the reaches of two points overlap, and the distance from the first one of a point in both.
+struct Meeting {
+    reach: Reach,
+    back: Reach,
+    gone: f64,
+}
+
+impl Meeting {
+    /// Where the reach of `here` and that of `next` meet; as an error, the middle of the part that
+    /// neither covers.
+    fn of(
+        here: &LocalEnclosure,
+        reach: Reach,
+        next: &LocalEnclosure,
+        along: Complex64,
+    ) -> Result<Self, f64> {
+        let whole = modulus(next.s - here.s) * ENLARGED;
+        let back = next.reach(-along, whole);
+        if back.length + reach.length < whole * OVERLAP && reach.length < whole {
+            let middle = 0.5 * (whole + reach.length - back.length);
+            return Err(middle.min(STRETCH * reach.length));
+        }
+        // As far from the end of either reach as possible.
+        let part = reach.length / (reach.length + back.length);
+        let gone = part * whole;
+        Ok(Self { reach, back, gone })
     }
 }
 
@@ -375,12 +493,14 @@ impl Seek for MatrixWalker<'_> {
         start: Complex64,
         window: &dyn Fn(Complex64) -> bool,
     ) -> Result<Outcome, Error> {
+        // The scaling next to the root decides how accurate the root is.
+        self.balanced = None;
         let mut z = start;
         let mut last = Complex64::ZERO;
         let mut slow = 0.0;
         for _ in 0..MAX_STEPS {
             self.spend()?;
-            let Some(here) = LocalEnclosure::tried(self.system, z) else {
+            let Some(here) = self.tried(z, NEAR_ROOT) else {
                 return self.proved(z);
             };
             let step = here.correction;
