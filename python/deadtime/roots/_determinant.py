@@ -28,7 +28,7 @@ _Exact: TypeAlias = dict[tuple[int, Fraction], int]
 
 # Upper limits on the states and the terms of an expansion, whose work grows like n 2^n times the
 # terms.
-_LARGEST = 10
+LARGEST = 10
 _MOST_TERMS = 1000
 
 # Upper limit on the effect of rounding the coefficients, in units of that of rounding the entries:
@@ -59,9 +59,9 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
     """
     size = len(entries)
     states = size - int(bordered)
-    if states > _LARGEST:
+    if states > LARGEST:
         raise NotExpandedError(
-            f"the determinant of {states} states is not expanded, only up to {_LARGEST}: its "
+            f"the determinant of {states} states is not expanded, only up to {LARGEST}: its "
             "coefficients would no longer say where its roots are; poles(), rightmost(), "
             "is_stable() and frequency_response() work for any number"
         )

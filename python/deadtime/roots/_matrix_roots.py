@@ -73,6 +73,11 @@ class MatrixDeterminant:
             raise ValueError(f"n={n}: ask for at least 1 rightmost root")
         return root_set(self._native.rightmost(number))
 
+    def rightmost_from_guesses(self, n: int) -> RootSet | None:
+        """Locate simple rightmost roots where guesses lead to them, or give None."""
+        found = self._native.rightmost_from_guesses(n)
+        return None if found is None else root_set(found)
+
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a root, or that of the chains."""
         found = self._native.spectral_abscissa()

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from deadtime._base.validation import OpenRange
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
 from deadtime.roots._crossings import margin_of_family
-from deadtime.roots._determinant import NotExpandedError, expanded
+from deadtime.roots._determinant import LARGEST, NotExpandedError, expanded
 from deadtime.roots._family import family_of
 from deadtime.roots._matrix_roots import MatrixDeterminant
 from deadtime.systems._delay_matrices import DelayMatrices, Matrices, Matrix
@@ -380,6 +380,19 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
             return determinant
         matrix = self._matrix()
         return matrix if matrix.is_invertible else determinant
+
+    def _leading(self, n: int) -> RootSet | None:
+        """Locate the rightmost poles with the matrices, before any determinant is expanded.
+
+        Neutral systems and more states than are ever expanded are left to `_robust_determinant`.
+        """
+        number = operator.index(n)
+        if number < 1 or self._N or not 1 < self.n_states <= LARGEST:
+            return None
+        try:
+            return self._matrix().rightmost_from_guesses(number)
+        except ValueError:
+            return None
 
     def _matrix(self) -> MatrixDeterminant:
         return MatrixDeterminant(self._E, self._N, self._A)

@@ -32,6 +32,10 @@ class HasPoles(ABC):
         """Give it in the form in which strong stability is judged."""
         return self._determinant()
 
+    def _leading(self, n: int) -> RootSet | None:
+        """Locate the rightmost poles sooner than by the characteristic function, if possible."""
+        return None
+
     @abstractmethod
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
         """Give the characteristic function with parameters."""
@@ -141,8 +145,16 @@ class HasPoles(ABC):
         ------
         ValueError, CountMismatchError
             As in `QuasiPolynomial.rightmost`.
+
+        Notes
+        -----
+        Of a `DelaySystem`, guesses of the rightmost poles are eigenvalues of a linearisation of the
+        characteristic matrix; Newton's method for a bordered matrix encloses each in a disc, and
+        the matrix is factorised along one vertical line to count the poles right of it, as in
+        `count`. Only where this proves nothing is the determinant expanded or the plane searched.
         """
-        return self._robust_determinant().rightmost(n)
+        leading = self._leading(n)
+        return self._robust_determinant().rightmost(n) if leading is None else leading
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a pole in 1/s, or `chain_abscissa` if that is larger.
@@ -162,6 +174,9 @@ class HasPoles(ABC):
             As in `rightmost`; for ``strong=False`` also where only an expanded determinant could
             tell, and there is none.
         """
+        leading = self._leading(1)
+        if leading is not None:
+            return float(leading.roots[0].real)
         found = self._robust_determinant().spectral_abscissa()
         return found if strong else min(found, self._determinant().spectral_abscissa(strong=False))
 
