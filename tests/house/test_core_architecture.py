@@ -69,7 +69,6 @@ ORDER = {
         "path",
         "orthogonal",
         "whiten",
-        "noises",
         "kicks",
         "mean",
         "likelihood",

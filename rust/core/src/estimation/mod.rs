@@ -16,7 +16,6 @@ mod kept;
 mod kicks;
 mod likelihood;
 mod mean;
-mod noises;
 mod orthogonal;
 mod path;
 mod plant;

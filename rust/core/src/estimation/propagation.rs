@@ -59,23 +59,11 @@ impl<const N: usize> Propagation<N> {
         found
     }
 
-    /// Φ P Φᵀ + Q for a symmetric P.
-    #[expect(
-        clippy::needless_range_loop,
-        reason = "entries of two matrices by the same numbers"
-    )]
+    /// Φ P Φᵀ + Q.
     #[inline(always)]
     pub(super) fn predicted(&self, p: &Square<N>) -> Square<N> {
-        let left = product(&self.phi, p);
-        let mut next = self.q;
-        for i in 0..N {
-            for j in 0..=i {
-                for (x, y) in left[i].iter().zip(&self.phi[j]) {
-                    next[i][j] += x * y;
-                }
-                next[j][i] = next[i][j];
-            }
-        }
+        let mut next = self.moved(p);
+        add(&mut next, &self.q);
         next
     }
 
