@@ -94,9 +94,9 @@ def test_small_systems_have_the_roots_of_their_expansion(n):
 
 
 @pytest.mark.survey
-def test_a_thousand_systems_are_never_wrong():
+def test_many_random_systems_are_never_wrong():
     proved = 0
-    for seed in range(1000):
+    for seed in range(250):
         rng = np.random.default_rng(seed)
         n, delays = int(rng.integers(2, 7)), int(rng.integers(1, 4))
         system = random_system(seed, n, delays, size=float(rng.uniform(0.1, 4)))
@@ -107,7 +107,7 @@ def test_a_thousand_systems_are_never_wrong():
         top = found.roots[0]
         values = collocated(system, 30)
         assert abs(values.real.max() - top.real) < 1e-6 * (1 + abs(top)), seed
-    assert proved > 900
+    assert proved > 220
 
 
 # Structure
