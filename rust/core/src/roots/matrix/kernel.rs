@@ -4,6 +4,11 @@
 //! bits do not depend on the instruction set. The loops count and index: methods of iterators and of
 //! complex numbers are not inlined into functions compiled for another instruction set.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "indices as in the formulas; closures would not be compiled for the vectors"
+)]
+
 use num_complex::Complex64;
 use pulp::{Simd, WithSimd};
 
@@ -54,11 +59,8 @@ impl WithSimd for Elimination {
         let Self(mut upper) = self;
         let (n, stride) = (upper.size, upper.blocks());
         let (mut lower, mut inverse) = (Rows::zeros(n), Rows::zeros(n));
-        let mut order = vec![0; n];
+        let mut order: Vec<usize> = (0..n).collect();
         let mut reciprocals = vec![(0.0, 0.0); n];
-        for i in 0..n {
-            order[i] = i;
-        }
         let direction = factor(
             (&mut upper, &mut lower),
             (n, stride),
@@ -112,7 +114,7 @@ fn factor(
         let (x, y) = (re[k * stride + block][lane], im[k * stride + block][lane]);
         let square = x * x + y * y;
         let size = square.sqrt();
-        if !(size >= USABLE.start && size < USABLE.end) {
+        if !USABLE.contains(&size) {
             return None;
         }
         let (p, q) = (x / size, y / size);

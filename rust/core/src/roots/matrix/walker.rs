@@ -212,7 +212,8 @@ impl<'a> MatrixWalker<'a> {
         let mut found = LocalEnclosure::tried(system, self.balanced(s, farthest)?, s);
         let residual = found.as_ref().map_or(f64::INFINITY, |here| here.residual);
         let is_fresh = self.balanced.as_ref().is_some_and(fresh);
-        if !is_fresh && !(residual <= MOST_RESIDUALS * self.least_residual) {
+        let suits = residual <= MOST_RESIDUALS * self.least_residual;
+        if !is_fresh && !suits {
             self.balanced = None;
             found = LocalEnclosure::tried(system, self.balanced(s, farthest)?, s);
         }

@@ -6,6 +6,11 @@
 //! that differ much cost doublings, but no accuracy: all sums and products are relative to their
 //! own entries.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "indices as in the formulas; closures would not be compiled for the vectors"
+)]
+
 use crate::simd::{Outlined, Real, Simd, outlined};
 
 /// Largest ‖A‖₁ h for which φ is summed without doubling.

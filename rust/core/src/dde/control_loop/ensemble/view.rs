@@ -3,6 +3,11 @@
 //! Place 0 is the begin of the trace and place i the end of part i − 1, so that part p lies between
 //! places p and p + 1.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "indices as in the formulas; closures would not be compiled for the vectors"
+)]
+
 use crate::dde::limits::slack;
 use crate::simd::{Mask, Outlined, Real, Simd, outlined};
 

@@ -1,5 +1,10 @@
 //! Sample by sample through the loops of two vectors.
 
+#![expect(
+    clippy::manual_memcpy,
+    reason = "indices as in the formulas; closures would not be compiled for the vectors"
+)]
+
 use crate::dde::limits::DIVERGED;
 use crate::simd::{Mask, Outlined, Real, Simd, outlined};
 
