@@ -637,9 +637,7 @@ class _LoopSets(Protocol):
     @property
     def states(self) -> int: ...
     @property
-    def size(self) -> int: ...
-    @property
-    def entries(self) -> Sequence[float | _Reals]: ...
+    def rows(self) -> _Reals: ...
     @property
     def amplitude(self) -> float: ...
     @property
@@ -658,8 +656,7 @@ class SweepResponses:
 def sweep_metrics(
     sets: _LoopSets,
     *,
-    steady_state: float | _Reals,
-    slowest_time: float | _Reals,
+    steady_state: _Reals,
     span: float,
     settling: float,
     rise: _Pair,
