@@ -43,7 +43,7 @@ def test_a_package_that_comes_along_has_a_permissive_licence(name):
     told = distribution(name).metadata
     classifiers = [one for one in told.get_all("Classifier", []) if one.startswith("License ::")]
     # Where there is an expression it is the licence; the text in the old field may be a whole page.
-    # A key that is missing raises, where importlib_metadata has taken the place of importlib.metadata.
+    # With importlib_metadata a missing key raises.
     expression, text = told.get("License-Expression"), told.get("License")
     stated = expression or " ".join(classifiers) or (text or "")[:200]
     assert PERMISSIVE.search(stated), stated
