@@ -5,12 +5,12 @@ eigenvalue of the collocation matrix, corrected by Newton's method (Breda, Maset
 2005): no proof, and no statement about what the polynomial leaves out. Ours is the whole call on a
 new `DelaySystem`. The ceiling is a fixed number of factorisations and inversions of M(s) by LAPACK,
 40: those that a line and two roots take. CPU times, the least of several runs. Run
-``OPENBLAS_NUM_THREADS=1 python benches/peers/matrices.py [N ...]``.
+``OPENBLAS_NUM_THREADS=1 python benches/peers/matrices.py [--quick] [N ...]``.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 
@@ -75,8 +75,13 @@ def least(function: Callable[[Matrix, Matrix], float], *arguments: Matrix) -> tu
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("states", nargs="*", type=int, help="numbers of states")
+    parser.add_argument("--quick", action="store_true", help="8 states, for a check that it runs")
+    given = parser.parse_args()
+    sizes = given.states or ([8] if given.quick else [8, 40, 80])
     print("states | ours, ms | numpy, ms, ratio | ceiling, ms, ratio | difference")
-    for n in [int(text) for text in sys.argv[1:]] or [8, 40, 80]:
+    for n in sizes:
         arguments = matrices(n)
         ours, mine = least(by_deadtime, *arguments)
         theirs, peer = least(by_numpy, *arguments)
