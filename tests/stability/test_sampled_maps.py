@@ -125,3 +125,22 @@ def test_more_states_than_a_map_takes_are_refused():
     loop = dtm.ControlLoop(plant, dtm.P(1.0), delay=0.1, sample_time=0.1)
     with pytest.raises(ValueError, match="up to 24"):
         dtm.stability_map(loop, {"Kp": (0.0, 1.0), "delay": (0.0, 1.0)}, (3, 3))
+
+
+def test_a_plant_of_high_order_at_a_kilohertz():
+    """Cells too close to a crossing for their rounding made margins say that a loop is unstable."""
+    den = np.poly(-np.geomspace(0.3, 60.0, 7))
+    plant = dtm.RationalPlant([den[-1]], den)
+    loop = dtm.ControlLoop(plant, dtm.PI(1.0, 0.3), delay=0.06, sample_time=1e-3)
+    chart = dtm.stability_map(loop, {"Kp": (0.2, 6.0), "Ki": (0.1, 2.0)}, (12, 9))
+    assert (chart.status == MapStatus.OK).any()
+    for (i, j), known in np.ndenumerate(chart.status):
+        cell = loop.replace(Kp=chart.axes["Kp"][i], Ki=chart.axes["Ki"][j])
+        poles = poles_of(cell)
+        if known == MapStatus.OK:
+            assert chart.unstable[i, j] == number_of(poles, 0.0, None)[0]
+        assert chart.abscissa[i, j] == pytest.approx(poles.real.max(), rel=1e-6, abs=1e-6)
+    margins = loop.margin()
+    assert margins.stable
+    assert loop.replace(delay=0.06 + margins.delay_margin * (1.0 - 1e-3)).is_stable()
+    assert not loop.replace(delay=0.06 + margins.delay_margin * (1.0 + 1e-3)).is_stable()

@@ -19,8 +19,7 @@ use std::f64::consts::{PI, TAU};
 use super::margins::{Margins, least};
 use super::zeros::{ORDER, RealFunction, Taylor, zeros_between};
 use crate::elementary::{DoubleDouble, angle};
-use crate::stability::{HeldLoop, HeldNumbers, Specification};
-use crate::status::CellStatus;
+use crate::stability::{HeldLoop, HeldNumbers};
 use crate::{Error, Task};
 
 /// The largest factor on a loop gain that is looked for.
@@ -197,7 +196,7 @@ fn crossovers(
 /// [`Error::Argument`] where numbers are beyond double precision; [`Error::Interrupted`].
 pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Result<Margins, Error> {
     let numbers = held.at(held.delay())?;
-    let stable = is_stable(&numbers, task)?;
+    let stable = numbers.is_stable(task)?;
     let found = crossovers(&numbers, held.sample_time(), task)?;
     let (places, turns): (Vec<f64>, Vec<f64>) = found.into_iter().unzip();
     let degrees: Vec<f64> = turns
@@ -212,7 +211,7 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
     };
     let mut factors: Vec<(f64, f64)> = factors
         .iter()
-        .filter(|at| at.low > 0.0)
+        .filter(|at| at.low > 1.0 / FAR)
         .map(|at| (at.omega, at.gain))
         .collect();
     factors.sort_by(|p, q| p.0.total_cmp(&q.0));
@@ -250,11 +249,6 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
     })
 }
 
-fn is_stable(numbers: &HeldNumbers, task: &Task) -> Result<bool, Error> {
-    let cell = numbers.count(Specification::default(), task)?;
-    Ok(cell.status == CellStatus::Ok && cell.unstable == 0)
-}
-
 /// The further delay in s with which a stable loop first loses stability, and the frequency there;
 /// infinite where no delay is too much.
 ///
@@ -286,7 +280,7 @@ pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Erro
             vec![delay + step]
         };
         for next in points {
-            if !is_stable(&held.at(next)?, task)? {
+            if !held.at(next)?.is_stable(task)? {
                 let found = bracketed(held, delay, next, task)?;
                 return confirmed(held, found, task);
             }
@@ -352,7 +346,7 @@ fn bracketed(
             }
         }
         let middle = 0.5 * (low + high);
-        if is_stable(&held.at(middle)?, task)? {
+        if held.at(middle)?.is_stable(task)? {
             low = middle;
         } else {
             high = middle;
@@ -420,8 +414,8 @@ fn confirmed(
 ) -> Result<(f64, f64), Error> {
     let start = held.delay();
     let (before, after) = (delay * (1.0 - BESIDE), delay * (1.0 + BESIDE));
-    let lost = !is_stable(&held.at(after)?, task)?;
-    let kept = before <= start || is_stable(&held.at(before)?, task)?;
+    let lost = !held.at(after)?.is_stable(task)?;
+    let kept = before <= start || held.at(before)?.is_stable(task)?;
     refuse_if!(
         !(lost && kept),
         "stability seems to be lost at a delay of {delay} s, but a count of the poles on both \

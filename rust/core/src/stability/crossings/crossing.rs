@@ -50,6 +50,10 @@ const FLAT: f64 = 3.0;
 /// Factors on the reach and on the length of a step that could not be proved.
 const SHORTENED: (f64, f64) = (0.999, 0.6);
 
+/// Step ahead of a point for bounds that hold at the point alone: relative to t, and at least to one
+/// over the longest delay, from where on `hold` compares the errors of coefficients.
+const ALONE: (f64, f64) = (1e-3, 1.0 / 16.0);
+
 /// Covers the rounding errors of radii and bounds.
 const ENLARGED: f64 = 1.0 + 1e-9;
 
@@ -373,7 +377,15 @@ impl<'a> Search<'a> {
 
     /// Store the crossing within `radius` of `point`, if its k may lie in the range.
     fn record(&mut self, point: &Point, radius: f64, jump: Option<i32>) -> Option<()> {
-        let bounds = self.bounds_to(point.t - radius, point.t + radius)?;
+        // Of the point alone: further ahead the moduli of a polynomial of high degree are far larger.
+        let (from, to) = (point.t - radius, point.t + radius);
+        let step = (ALONE.1 * self.pencil.step())
+            .min(self.step)
+            .max(ALONE.0 * to);
+        let bounds = match self.pencil.bounds(from, to, step) {
+            Some(bounds) => bounds,
+            None => self.bounds_to(from, to)?,
+        };
         let (a, b) = (modulus(point.a), modulus(point.b));
         let spread = |i: usize| {
             bounds.rounding * [bounds.a, bounds.b][i][0] + radius * [bounds.a, bounds.b][i][1]

@@ -12,6 +12,7 @@ use crate::stability::cell::Cell;
 use crate::stability::crossings::{Crossing, count, crossings};
 use crate::stability::hold::Hold;
 use crate::stability::specification::Specification;
+use crate::status::CellStatus;
 use crate::{Error, Task};
 
 /// Samples in the delay up to which eigenvalues are computed.
@@ -127,6 +128,20 @@ impl HeldNumbers {
     pub fn count(&self, specification: Specification, task: &Task) -> Result<Cell, Error> {
         specification.check()?;
         count(&self.h()?, specification, self.hold, task)
+    }
+
+    /// Are all poles inside the circle? By the proved count, and by the abscissa of the eigenvalues
+    /// where a pole is too close to the circle for a proof.
+    ///
+    /// # Errors
+    /// As [`count`](Self::count).
+    pub fn is_stable(&self, task: &Task) -> Result<bool, Error> {
+        let cell = self.count(Specification::default(), task)?;
+        if cell.status == CellStatus::Ok {
+            return Ok(cell.unstable == 0);
+        }
+        let found = rightmost(&self.h()?, self.hold, task)?;
+        Ok(found.abscissa.is_some_and(|abscissa| abscissa < 0.0))
     }
 
     /// The places on the circle, with factors k in `range`, at which k L = −1; `None` where that is
