@@ -1,10 +1,16 @@
 //! The polynomials of a loop with a hold.
 //!
-//!     x_{k+1} = Φ x_k + Γ₁ u_{k−m−1} + Γ₀ u_{k−m},   u_k = K x_k + L u_{k−m−1}
+//! ```text
+//! x_{k+1} = Φ x_k + Γ₁ u_{k−m−1} + Γ₀ u_{k−m},   u_k = K x_k + L u_{k−m−1}
+//! ```
 //!
 //! (`dde::control_loop::sampled`). With M = (Φ − I)/Ts and G = (Γ₀ + Γ₁)/Ts its poles are the zeros
 //! of a(σ) − e^(−s d) b(σ), d = (m + 1) Ts,
-//!     a = det(σI − M),   b = K adj(σI − M) (G + Γ₀ σ) + L a,
+//!
+//! ```text
+//! a = det(σI − M),   b = K adj(σI − M) (G + Γ₀ σ) + L a,
+//! ```
+//!
 //! the adjugate and a by the recursion of Faddeev and LeVerrier (Gantmacher 1959, The Theory of
 //! Matrices, chapter IV, section 5). b is linear in K and L, so that a gain in them is one in h.
 //!
