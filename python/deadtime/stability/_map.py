@@ -92,7 +92,7 @@ class StabilityMap(ReadOnlyArrays):
         Raises
         ------
         ValueError
-            If the family is affine in neither parameter and a root stays at 0 whatever they are, or
+            If neither parameter is a gain and a root stays at 0 whatever they are, or
             the loop is sampled and neither is a gain.
 
         Examples
@@ -313,9 +313,9 @@ def stability_map(
     proof : {"curves", "cells"}
         How cells are proved: by all crossings of the boundary along each row of cells and one
         count for every row, or each cell by itself. Both give the same counts; the second is a
-        check of the first, hundreds of times slower. Where the family is affine in neither
-        parameter, blocks of cells are proved to have no boundary in them, and the abscissa is
-        searched in each cell by itself.
+        check of the first, hundreds of times slower. Where neither parameter is a gain or the
+        delay of some terms, blocks of cells are proved to have no boundary in them, and the
+        abscissa is searched in each cell by itself.
     threads : int, optional
         Number of threads; all cores by default. Results have the same bits for any number.
     progress : bool or callable

@@ -207,6 +207,27 @@ impl Family {
         part(0).zip(part(1))
     }
 
+    /// A, B and σ > 0 with h = A + e^(−s σ p) B, where the parameter p enters A not at all and B only
+    /// by its delays; `None` where h is not of this form.
+    pub(super) fn split_delay(&self, parameter: usize) -> Option<(Self, Self, f64)> {
+        let slope_of = |delay: &Affine| delay.slopes.get(parameter).copied().unwrap_or(0.0);
+        let slope = self.delays.iter().map(slope_of).find(|s| *s != 0.0)?;
+        let all = || self.terms.iter().flatten();
+        let enters_otherwise = all().any(|term| {
+            let power = term.exponents.get(parameter).copied().unwrap_or(0);
+            let own = slope_of(&term.delay);
+            power > 0 || (own != 0.0 && own != slope)
+        });
+        if enters_otherwise || slope < 0.0 {
+            return None;
+        }
+        let part = |varies: bool| {
+            let terms = all().filter(|term| (slope_of(&term.delay) != 0.0) == varies);
+            Self::new(self.names.clone(), terms.cloned().collect()).ok()
+        };
+        Some((part(false)?, part(true)?, slope))
+    }
+
     /// The highest power of s for any parameters.
     pub(super) fn degree(&self) -> u32 {
         let terms = self.terms.iter().flatten();

@@ -1,7 +1,8 @@
-//! Roots of A + k B, followed as k varies, several of them and several values of k at a time.
+//! Roots of the members of a row, A + k B or A + e^(−s d) B with a delay d of k, followed as k varies,
+//! several of them and several values of k at a time.
 //!
 //! From the last two values of k the next roots are extrapolated (cubic, with the slopes ds/dk =
-//! −B/h′), and each root is refined from there and proved by itself (`certify`). If a root is lost,
+//! −(∂h/∂k)/h′), and each root is refined from there and proved by itself (`certify`). If a root is lost,
 //! only the values of k after it are repeated.
 
 use num_complex::Complex64;
@@ -339,6 +340,7 @@ mod tests {
             &make(&[&[0.0, 1.0]], &[0.0]),
             &make(&[&[1.0]], &[1.0]),
             None,
+            None,
         );
         for cells in [100, 1000] {
             let points: Vec<f64> = (0..=cells)
@@ -366,6 +368,7 @@ mod tests {
         let plane = Plane::new(
             &make(&[&[0.0, 1.0]], &[0.0]),
             &make(&[&[1.0]], &[1.0]),
+            None,
             None,
         );
         let points: Vec<f64> = (0..100)

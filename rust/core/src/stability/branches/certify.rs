@@ -1,4 +1,4 @@
-//! The disc of the root of A + k B next to a start, one in each lane.
+//! The disc of the root of a member h next to a start, one in each lane.
 //!
 //! Newton's step leads from s₀ to s₁. Let a = |h′(s₀)| − e₁, η = (|h(s₀)| + e₀)/a, and M bound |h″|
 //! within 2η of s₀. If M η ≤ a/4, then by Rouché's theorem exactly one root lies within 2η of s₀:
@@ -57,8 +57,7 @@ impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
             if !open.any() {
                 break;
             }
-            let [a, da, b, db] = self.0.at(s);
-            let (h, dh) = (a + b.scaled(k), da + db.scaled(k));
+            let [h, dh, rate] = self.0.member(s, k);
             let (square, slope_square) = (h.square_modulus(), dh.square_modulus());
             let usable = slope_square.gt(SQUARES.start)
                 & slope_square.lt(SQUARES.end)
@@ -80,7 +79,7 @@ impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
             let done = open & precise;
             root = done.choose(next, root);
             radius = done.select(wide, radius);
-            along = done.choose(-over(b, dh, inverse_slope), along);
+            along = done.choose(over(rate, dh, inverse_slope), along);
             // Comparisons with NaN are false.
             open = open & !precise & usable & distance(next, center).le(within);
             s = open.choose(next, s);
@@ -119,6 +118,7 @@ mod tests {
         Plane::new(
             &make(&[&[0.0, 1.0]], &[0.0]),
             &make(&[&[1.0]], &[1.0]),
+            None,
             None,
         )
     }

@@ -234,7 +234,7 @@ fn proved(
     task: &Task,
 ) -> Result<Option<f64>, Error> {
     let one = QuasiPolynomial::new(vec![vec![1.0]], vec![0.0])?;
-    let plane = Plane::new(h, &one, Some(hold));
+    let plane = Plane::new(h, &one, Some(hold), None);
     let mut branches = Branches::none();
     branches.start(&plane, starts.iter().copied().take(ROOTS), 0.0);
     let mut roots = branches.started();

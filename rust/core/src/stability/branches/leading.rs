@@ -7,19 +7,24 @@
 //! A line can be used until a root that is not followed crosses it. Where no line can be used, the
 //! cell is searched alone, which also finds the roots to follow from there.
 //!
+//! Along a delay the crossings of a line off the imaginary axis are not known for the whole row. There
+//! the roots right of a line are counted in one cell, and the proof that no root crosses it (`boxes`)
+//! carries the count on to as many cells as it can.
+//!
 //! The chains of a neutral equation are the abscissa if no root lies right of a line as close to
 //! them as the search in a single cell would go. Roots closer than a few times that distance are
 //! left to that search.
 
 use super::branch::{Branches, Root, are_apart};
 use super::held;
-use super::plane::Plane;
+use super::plane::{DelayOf, Plane};
 use crate::memory::reserved;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
 use crate::stability::cell::{Cell, judge, with_abscissa};
-use crate::stability::crossings::{Members, Row};
+use crate::stability::crossings::{Delay, Members, Row, Span};
 use crate::stability::hold::Hold;
+use crate::stability::specification::Specification;
 use crate::{Error, Task};
 
 /// Distance behind the first root, in units of one over the longest delay, up to which roots are
@@ -37,6 +42,9 @@ const CLOSE_TO_CHAINS: f64 = 10.0;
 
 /// Least gap between roots, in units of the scale, into which a line is put.
 const LEAST_GAP: f64 = 1e-3;
+
+/// Cells for which one proof is tried along a delay: at first, and at most.
+const AHEAD: (usize, usize) = (8, 256);
 
 /// Distance of lines, in units of the scale, below which they are the same.
 const SAME_LINE: f64 = 1e-6;
@@ -73,6 +81,8 @@ struct Leading<'a> {
     roots: Vec<Root>,
     /// Had the last cell that was searched alone no root right of its chains?
     chains_led: bool,
+    /// Cells to try at once along a delay.
+    ahead: usize,
 }
 
 impl Members<'_> {
@@ -121,18 +131,29 @@ impl<'a> Leading<'a> {
         b: &QuasiPolynomial,
         task: &'a Task,
     ) -> Option<Self> {
-        // A loop with a hold has no chains.
-        let hull = match members.hold {
-            None => Some(members.hull(a, b)?),
-            Some(_) => None,
+        // A loop with a hold has no chains, and a delay of lower terms does not change them.
+        let hull = match (members.hold, members.delay) {
+            (None, None) => Some(members.hull(a, b)?),
+            (None, Some(_)) => Some((b.degree() < a.degree()).then(|| a.clone())?),
+            (Some(_), _) => None,
         };
+        let range = members.points.first().zip(members.points.last());
+        let delay = members
+            .delay
+            .zip(range)
+            .map(|(delay, (low, high))| DelayOf {
+                slope: delay.slope,
+                origin: *low,
+                longest: delay.slope * (high - low),
+            });
         let span = |h: &QuasiPolynomial| h.delays().last().copied().unwrap_or(0.0);
         let longest = span(a).max(span(b))
             - a.delays()
                 .iter()
                 .chain(b.delays())
                 .copied()
-                .fold(f64::INFINITY, f64::min);
+                .fold(f64::INFINITY, f64::min)
+            + delay.map_or(0.0, |delay| delay.longest);
         if hull.as_ref().is_some_and(|hull| hull.degree() == 0) || b.is_zero() {
             return None;
         }
@@ -140,7 +161,7 @@ impl<'a> Leading<'a> {
         Some(Self {
             members,
             task,
-            plane: Plane::new(a, b, members.hold),
+            plane: Plane::new(a, b, members.hold, delay),
             chain: hull.map_or(f64::NEG_INFINITY, |hull| chain_abscissa(&hull)),
             margin: chain_margin(scale),
             scale,
@@ -149,6 +170,7 @@ impl<'a> Leading<'a> {
             branches: Branches::none(),
             roots: Vec::new(),
             chains_led: false,
+            ahead: AHEAD.0,
         })
     }
 
@@ -196,10 +218,16 @@ impl<'a> Leading<'a> {
                 return Ok(known());
             }
         }
+        if self.members.delay.is_some() {
+            self.lines.clear();
+        }
         let Some(sigma) = self.next_line(roots) else {
             return Ok(None);
         };
-        self.lay(sigma)?;
+        match self.members.delay {
+            None => self.lay(sigma)?,
+            Some(delay) => self.lay_ahead(sigma, index, delay)?,
+        }
         let place = self.lines.len() - 1;
         if self.fits(place, index, roots) {
             self.last = place;
@@ -210,7 +238,7 @@ impl<'a> Leading<'a> {
 
     /// Are there no roots right of the chains?
     fn by_chains(&mut self, index: usize) -> Result<Option<Known>, Error> {
-        if self.chain == f64::NEG_INFINITY {
+        if self.chain == f64::NEG_INFINITY || self.members.delay.is_some() {
             return Ok(None);
         }
         let sigma = self.chain + self.margin;
@@ -235,6 +263,27 @@ impl<'a> Leading<'a> {
 
     fn lay(&mut self, sigma: f64) -> Result<(), Error> {
         let row = self.members.right_of(sigma).crossed(self.task)?;
+        self.lines.push(Line { sigma, row });
+        Ok(())
+    }
+
+    /// Count the roots right of a line in one cell, and prove the same for cells after it.
+    fn lay_ahead(&mut self, sigma: f64, index: usize, delay: Delay<'_>) -> Result<(), Error> {
+        let mut row = Row::default();
+        if let Some(h) = (self.members.member)(index) {
+            let cell = judge(&h, Specification::left_of(sigma), false, self.task)?;
+            let rest = self.members.points.len() - 1 - index;
+            let mut more = self.ahead.min(rest);
+            while more > 0 && !delay.by_parts.is_clear(sigma, [index, index + more])? {
+                more /= 2;
+            }
+            self.ahead = (2 * more).clamp(1, AHEAD.1);
+            row.spans.push(Span {
+                start: index,
+                end: index + more + 1,
+                cell,
+            });
+        }
         self.lines.push(Line { sigma, row });
         Ok(())
     }

@@ -1,4 +1,5 @@
-//! A + k B at any point: value and derivative in SIMD lanes, and bounds around a point.
+//! A + k B, or A + e^(−s d) B, at any point: value and derivative in SIMD lanes, and bounds around a
+//! point.
 //!
 //! Bounds on A⁽ⁱ⁾ within r of a centre are Σ (P⁽ⁱ⁾ …)(|s| + r) e^(−d (Re s − r)) with the moduli of
 //! the coefficients, as in `pencil`, and so is the bound ε on rounding errors. That of `pencil` is
@@ -10,7 +11,7 @@ use num_complex::Complex64;
 
 use crate::elementary::{exp, simd};
 use crate::quasipoly::{QuasiPolynomial, modulus};
-use crate::simd::{Complex, Simd};
+use crate::simd::{Complex, Real, Simd};
 use crate::stability::crossings::{sizes, united};
 use crate::stability::hold::{Hold, ROUNDINGS};
 
@@ -27,13 +28,25 @@ const ROOM: f64 = 1.0 + 1e-9;
 /// Range of exponentials that double precision can use.
 const USABLE: std::ops::Range<f64> = 1e-250..1e250;
 
-/// Evaluates A + k B and its derivatives anywhere.
+/// Evaluates A + k B, or A + e^(−s d) B, and derivatives anywhere.
 #[derive(Debug, Clone)]
 pub(crate) struct Plane {
     rows: Vec<(f64, Vec<f64>, Vec<f64>)>,
     degree: f64,
     longest: f64,
     hold: Option<Hold>,
+    delay: Option<DelayOf>,
+}
+
+/// The delay d = σ (k − k₀).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DelayOf {
+    /// σ.
+    pub(crate) slope: f64,
+    /// k₀.
+    pub(crate) origin: f64,
+    /// The largest d.
+    pub(crate) longest: f64,
 }
 
 /// Bounds within `radius` of `center`: on A, A′, A″ and those of B, and ε.
@@ -44,10 +57,16 @@ pub(crate) struct Around {
     a: [f64; 3],
     b: [f64; 3],
     rounding: f64,
+    delay: Option<DelayOf>,
 }
 
 impl Plane {
-    pub(crate) fn new(a: &QuasiPolynomial, b: &QuasiPolynomial, hold: Option<Hold>) -> Self {
+    pub(crate) fn new(
+        a: &QuasiPolynomial,
+        b: &QuasiPolynomial,
+        hold: Option<Hold>,
+        delay: Option<DelayOf>,
+    ) -> Self {
         let rows = united(a, b);
         let first = rows.first().map_or(0.0, |row| row.0);
         let rows: Vec<_> = rows
@@ -56,9 +75,29 @@ impl Plane {
             .collect();
         Self {
             degree: a.degree().max(b.degree()) as f64,
-            longest: rows.last().map_or(0.0, |row| row.0),
+            longest: rows.last().map_or(0.0, |row| row.0)
+                + delay.map_or(0.0, |delay| delay.longest),
             rows,
             hold,
+            delay,
+        }
+    }
+
+    /// The member h at k in s, h′, and −∂h/∂k.
+    #[inline(always)]
+    pub(crate) fn member<S: Simd>(&self, s: Complex<S>, k: Real<S>) -> [Complex<S>; 3] {
+        let [a, da, b, db] = self.at(s);
+        match self.delay {
+            None => [a + b.scaled(k), da + db.scaled(k), -b],
+            Some(DelayOf { slope, origin, .. }) => {
+                let delay = (k - origin) * slope;
+                let (sine, cosine) = simd::sin_cos(s.im * delay);
+                let weight = simd::exp(-(s.re * delay));
+                let turn = Complex::new(weight * cosine, -(weight * sine));
+                let turned = b * turn;
+                let derivative = (db - b.scaled(delay)) * turn;
+                [a + turned, da + derivative, (turned * s).scaled(slope)]
+            }
         }
     }
 
@@ -143,15 +182,26 @@ impl Plane {
             a,
             b,
             rounding: 0.51 * f64::EPSILON * units + held,
+            delay: self.delay,
         })
     }
 }
 
 impl Around {
-    /// Bounds on the errors of h = A + k B and of h′, and on |h″|.
+    /// Bounds on the errors of h at k and of h′, and on |h″|.
     #[inline(always)]
     pub(crate) fn bounds(&self, k: f64) -> [f64; 3] {
-        let [h, slope, bend] = [0, 1, 2].map(|i| self.a[i] + k.abs() * self.b[i]);
+        let [h, slope, bend] = match self.delay {
+            None => [0, 1, 2].map(|i| self.a[i] + k.abs() * self.b[i]),
+            Some(of) => {
+                let d = (of.slope * (k - of.origin)).max(0.0) * ROOM;
+                let nearest = self.center.re - self.radius;
+                let weight = exp(-d * (nearest - 1e-9 * nearest.abs())) * ROOM;
+                let [b, b1, b2] = self.b;
+                let terms = [b, b1 + d * b, b2 + d * (2.0 * b1 + d * b)];
+                [0, 1, 2].map(|i| self.a[i] + weight * terms[i] * ROOM)
+            }
+        };
         [self.rounding * h, self.rounding * slope, bend]
     }
 }

@@ -23,7 +23,7 @@ use crate::{Error, Task};
 const MAX_POINTS: u32 = 2_000_000;
 
 /// Factor on proved lengths that covers the rounding errors of the inequalities.
-const SHARE: f64 = 1.0 - 1e-9;
+pub(super) const SHARE: f64 = 1.0 - 1e-9;
 
 /// First step, relative to ω and to one over the longest delay, past a point that cannot be
 /// resolved. It is doubled until the next point can be.
@@ -39,7 +39,7 @@ const MAX_ITERATIONS: u32 = 30;
 const STRIDE: f64 = 2.5;
 
 /// First points tried off the real axis, as shares of a step.
-const STARTS: [f64; 5] = [1.0, 0.7, 0.4, 0.2, 0.1];
+pub(super) const STARTS: [f64; 5] = [1.0, 0.7, 0.4, 0.2, 0.1];
 
 /// Length of a step, in reaches of its first point.
 const STRETCH: f64 = 1.9;
@@ -55,7 +55,7 @@ const SHORTENED: (f64, f64) = (0.999, 0.6);
 const ALONE: (f64, f64) = (1e-3, 1.0 / 16.0);
 
 /// Covers the rounding errors of radii and bounds.
-const ENLARGED: f64 = 1.0 + 1e-9;
+pub(super) const ENLARGED: f64 = 1.0 + 1e-9;
 
 /// Share of the length tried at which a length of the cubic is accepted.
 const CLOSE_LENGTHS: f64 = 0.7;
@@ -82,6 +82,15 @@ pub struct Crossing {
     pub slope_at_zero: Option<f64>,
 }
 
+/// What varies along the row, and in which range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Varied {
+    /// A real k.
+    Gain((f64, f64)),
+    /// The delay d of k = e^(−s d): see `one_delay`.
+    Delay((f64, f64)),
+}
+
 /// What a point proves of its neighbourhood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sense {
@@ -98,8 +107,8 @@ struct Reach {
     sense: Sense,
 }
 
-/// All crossings of one piece up to t = `top` with k in `range`, by increasing ω; does the piece
-/// begin on the real axis?
+/// All crossings of one piece up to t = `top`, by increasing ω; does the piece begin on the real
+/// axis?
 ///
 /// `None` where the piece cannot be searched: A and B vanish together, or double precision does not
 /// suffice.
@@ -110,16 +119,16 @@ pub(crate) fn crossings(
     pencil: &Pencil,
     from_axis: bool,
     top: f64,
-    range: (f64, f64),
+    varied: Varied,
     task: &Task,
 ) -> Result<Option<Vec<Crossing>>, Error> {
-    let Some(mut search) = Search::new(pencil, range, top) else {
+    let Some(mut search) = Search::new(pencil, varied, top) else {
         return Ok(None);
     };
-    let Some(mut here) = (if from_axis {
-        search.start()
-    } else {
-        search.enter()
+    let Some(mut here) = (match varied {
+        Varied::Gain(_) if from_axis => search.start(),
+        Varied::Gain(_) => search.enter(),
+        Varied::Delay((_, longest)) => search.start_at_rest(longest),
     }) else {
         return Ok(None);
     };
@@ -140,28 +149,28 @@ pub(crate) fn crossings(
     Ok(None)
 }
 
-struct Search<'a> {
-    pencil: &'a Pencil,
+pub(super) struct Search<'a> {
+    pub(super) pencil: &'a Pencil,
     /// A length over which the pencil changes little.
     step: f64,
-    bounds: Bounds,
+    pub(super) bounds: Bounds,
     /// Does F vanish to a higher order where the piece begins? Bounds are then taken for short
     /// stretches there.
     is_flat: bool,
-    range: (f64, f64),
-    top: f64,
-    found: Vec<Crossing>,
+    varied: Varied,
+    pub(super) top: f64,
+    pub(super) found: Vec<Crossing>,
 }
 
 impl<'a> Search<'a> {
-    fn new(pencil: &'a Pencil, range: (f64, f64), top: f64) -> Option<Self> {
+    fn new(pencil: &'a Pencil, varied: Varied, top: f64) -> Option<Self> {
         let step = pencil.step().min(top / 16.0);
         Some(Self {
             pencil,
             step,
             bounds: pencil.bounds(0.0, step, step)?,
             is_flat: false,
-            range,
+            varied,
             top,
             found: Vec::new(),
         })
@@ -223,7 +232,7 @@ impl<'a> Search<'a> {
         self.skip(&zero)
     }
 
-    fn is_clear(&self, point: &Point) -> bool {
+    pub(super) fn is_clear(&self, point: &Point) -> bool {
         point.f[0].abs() > self.bounds.error[0]
     }
 
@@ -247,11 +256,16 @@ impl<'a> Search<'a> {
             -0.5 * bounds.third,
         )
         .min(most);
-        let largest = self.largest();
-        let excess = modulus(point.a)
-            - bounds.rounding * bounds.a[0]
-            - largest * (modulus(point.b) + bounds.rounding * bounds.b[0]) * ENLARGED;
-        let beyond = (excess / (bounds.modulus[0] + largest * bounds.modulus[1])).min(most);
+        let beyond = match self.varied {
+            Varied::Gain(range) => {
+                let largest = largest_of(range);
+                let excess = modulus(point.a)
+                    - bounds.rounding * bounds.a[0]
+                    - largest * (modulus(point.b) + bounds.rounding * bounds.b[0]) * ENLARGED;
+                (excess / (bounds.modulus[0] + largest * bounds.modulus[1])).min(most)
+            }
+            Varied::Delay(_) => 0.0,
+        };
         let (length, sense) = if beyond > clear && beyond > monotone {
             (beyond, Sense::Beyond)
         } else if clear >= monotone {
@@ -263,11 +277,6 @@ impl<'a> Search<'a> {
             length: SHARE * length,
             sense,
         }
-    }
-
-    /// The largest |k|.
-    fn largest(&self) -> f64 {
-        self.range.0.abs().max(self.range.1.abs())
     }
 
     /// The next point: at most as far as both points prove what lies between, or past what cannot
@@ -332,7 +341,9 @@ impl<'a> Search<'a> {
     /// The one zero between two points.
     fn refine(&mut self, left: &Point, right: &Point) -> Option<()> {
         let rising = right.f[0] > 0.0;
-        let jump = Some(if rising { -2 } else { 2 });
+        // As a gain grows roots go to the left where F′ > 0, as a delay grows to the right.
+        let goes_left = rising == matches!(self.varied, Varied::Gain(_));
+        let jump = Some(if goes_left { -2 } else { 2 });
         let (mut low, mut high) = (left.t, right.t);
         let quotient = |point: &Point| (point.f[0] / point.f[1]).abs();
         let mut best = if quotient(left) < quotient(right) {
@@ -391,7 +402,13 @@ impl<'a> Search<'a> {
             bounds.rounding * [bounds.a, bounds.b][i][0] + radius * [bounds.a, bounds.b][i][1]
         };
         let (off_a, off_b) = (spread(0), spread(1));
-        if (a - off_a) * SHARE > self.largest() * (b + off_b) {
+        let range = match self.varied {
+            Varied::Gain(range) => range,
+            Varied::Delay(range) => {
+                return self.record_delays(point, radius, (off_a, off_b), range, jump);
+            }
+        };
+        if (a - off_a) * SHARE > largest_of(range) * (b + off_b) {
             return Some(());
         }
         if b * SHARE <= off_b {
@@ -401,7 +418,7 @@ impl<'a> Search<'a> {
         let gain = -(point.a.re * point.b.re + point.a.im * point.b.im) / (b * b);
         let error = (off_a + a / b * off_b) / (b - off_b) * ENLARGED + 8.0 * f64::EPSILON * a / b;
         let (low, high) = (gain - error, gain + error);
-        if high >= self.range.0 && low <= self.range.1 {
+        if high >= range.0 && low <= range.1 {
             self.found.push(Crossing {
                 omega: point.s.im,
                 gain,
@@ -413,6 +430,11 @@ impl<'a> Search<'a> {
         }
         Some(())
     }
+}
+
+/// The largest |k|.
+fn largest_of(range: (f64, f64)) -> f64 {
+    range.0.abs().max(range.1.abs())
 }
 
 /// The t up to which a + b t + c t² > 0.

@@ -12,8 +12,8 @@
 //! only. They are proved and isolated, so that a root on the edge to working precision shows as a
 //! crossing whose interval holds 0.
 
-use super::crossing::{self, Crossing};
-use super::pencil::Pencil;
+use super::crossing::{self, Crossing, Varied};
+use super::pencil::{Factor, Pencil};
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::cell::{Cell, UNKNOWN};
 use crate::stability::hold::Hold;
@@ -38,11 +38,11 @@ pub(crate) fn crossings(
 ) -> Result<Option<Vec<Crossing>>, Error> {
     let mut all = Vec::new();
     for part in specification.pieces_below(hold.top()) {
-        let Some(pencil) = Pencil::new(a, b, part.piece, Some(hold)) else {
+        let Some(pencil) = Pencil::new(a, b, part.piece, Factor::Gain, Some(hold)) else {
             return Ok(None);
         };
         let length = part.piece.length;
-        match crossing::crossings(&pencil, part.from_axis, length, range, task)? {
+        match crossing::crossings(&pencil, part.from_axis, length, Varied::Gain(range), task)? {
             Some(found) => all.extend(found.into_iter().map(|crossing| Crossing {
                 jump: crossing.jump.map(|jump| jump * part.sign),
                 ..crossing

@@ -14,8 +14,8 @@
 
 use num_complex::Complex64;
 
-use super::crossing::{Crossing, crossings};
-use super::pencil::{Pencil, united};
+use super::crossing::{Crossing, Varied, crossings};
+use super::pencil::{Factor, Pencil, united};
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::family::Family;
 use crate::stability::specification::Piece;
@@ -88,8 +88,8 @@ pub fn crossings_along(
         along: Complex64::I,
         length: top,
     };
-    let found = match Pencil::new(&a, &b, axis, None) {
-        Some(pencil) => crossings(&pencil, true, top, range, task)?,
+    let found = match Pencil::new(&a, &b, axis, Factor::Gain, None) {
+        Some(pencil) => crossings(&pencil, true, top, Varied::Gain(range), task)?,
         None => None,
     };
     let Some(found) = found else {

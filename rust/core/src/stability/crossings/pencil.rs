@@ -1,16 +1,19 @@
-//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function whose zeros
-//! are its crossings.
+//! A pencil A(s) + k B(s) on a straight line s = s₀ + c t, |c| = 1, and the function F(t) whose
+//! zeros are its crossings.
 //!
 //! With the delays counted from one of B's, F(t) = Im(A B*) vanishes where some real k makes A + k
 //! B zero at s, and there k = −Re(A/B) (D-subdivision: Neimark 1949). F and its first two
 //! derivatives in t come from A, A′, A″ and those of B; |F‴| ≤ A₃B₀ + 3A₂B₁ + 3A₁B₂ + A₀B₃, where
 //! A_i bounds |A⁽ⁱ⁾| by the moduli of its coefficients on a stretch of the line.
 //!
+//! With k = e^(−s d) on the imaginary axis, d a delay, some d makes A + k B zero where F(t) = |A|² −
+//! |B|² vanishes (Walton and Marshall 1987); |F‴| ≤ 2 (A₃A₀ + 3A₂A₁ + B₃B₀ + 3B₂B₁).
+//!
 //! Rounding, as derived in `quasipoly::probe`: A, A′ and A″ of degree n with m terms are within ε
 //! A_i, ε = u (12n + m + 16 + 4 d (|x| + |y|)), d the largest delay. Coefficients and delays that
 //! are themselves sums of a few rounded products change A by u (8 + 8 d (|x| + |y|)) A₀ at most,
-//! which ε includes, so that the proofs hold for both. Then F⁽ⁱ⁾ is within 2.25 ε times the product
-//! of bounds that bounds it: 2 ε + ε² from the factors, 3 u from their product. With a `hold` the
+//! which ε includes, so that the proofs hold for both. Then F⁽ⁱ⁾ is within 2.25 ε times the sum of
+//! products of bounds that bounds it: 2 ε + ε² from the factors, 3 u from their product. With a `hold` the
 //! polynomials are those in σ, and ε is larger by what `hold` adds.
 
 use num_complex::Complex64;
@@ -39,11 +42,21 @@ struct Row {
     weight: Option<f64>,
 }
 
+/// What k is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Factor {
+    /// A real number: F = Im(A B*).
+    Gain,
+    /// e^(−s d), on the imaginary axis: F = |A|² − |B|².
+    Delay,
+}
+
 /// A(s) + k B(s) along a line.
 #[derive(Debug, Clone)]
 pub(crate) struct Pencil {
     rows: Vec<Row>,
     line: Piece,
+    factor: Factor,
     degree: f64,
     longest: f64,
     hold: Option<Hold>,
@@ -87,6 +100,7 @@ impl Pencil {
         a: &QuasiPolynomial,
         b: &QuasiPolynomial,
         line: Piece,
+        factor: Factor,
         hold: Option<Hold>,
     ) -> Option<Self> {
         let origin = b.delays().first().copied().filter(|_| !b.is_zero())?;
@@ -109,6 +123,7 @@ impl Pencil {
         let longest = rows.iter().fold(0.0, |d, row| row.delay.abs().max(d));
         rows.iter().all(usable).then(|| Self {
             line,
+            factor,
             degree: a.degree().max(b.degree()) as f64,
             longest,
             rows,
@@ -155,16 +170,25 @@ impl Pencil {
         let along = |[value, slope, bend]: Jet| [value, c * slope, c * c * bend];
         let (p, q) = (along(a), along(b));
         let cross = |i: usize, j: usize| p[i].im * q[j].re - p[i].re * q[j].im;
+        let real = |u: Complex64, v: Complex64| u.re * v.re + u.im * v.im;
+        let square = |i: usize, j: usize| real(p[i], p[j]) - real(q[i], q[j]);
         Point {
             t,
             s,
             a: p[0],
             b: q[0],
-            f: [
-                cross(0, 0),
-                cross(1, 0) + cross(0, 1),
-                cross(2, 0) + 2.0 * cross(1, 1) + cross(0, 2),
-            ],
+            f: match self.factor {
+                Factor::Gain => [
+                    cross(0, 0),
+                    cross(1, 0) + cross(0, 1),
+                    cross(2, 0) + 2.0 * cross(1, 1) + cross(0, 2),
+                ],
+                Factor::Delay => [
+                    square(0, 0),
+                    2.0 * square(1, 0),
+                    2.0 * (square(2, 0) + square(1, 1)),
+                ],
+            },
         }
     }
 
@@ -231,10 +255,23 @@ impl Pencil {
             hold.coefficients + 0.51 * f64::EPSILON * ROUNDINGS * (self.degree + 1.0)
         });
         let rounding = 0.51 * f64::EPSILON * units + held;
-        let first = a[1] * b[0] + a[0] * b[1];
-        let second = a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2];
-        let third = a[3] * b[0] + 3.0 * (a[2] * b[1] + a[1] * b[2]) + a[0] * b[3];
-        let products = [a[0] * b[0], first, second];
+        // Bounds on the derivatives of the product of functions with the bounds p and q.
+        let product = |p: [f64; 4], q: [f64; 4]| {
+            [
+                p[0] * q[0],
+                p[1] * q[0] + p[0] * q[1],
+                p[2] * q[0] + 2.0 * p[1] * q[1] + p[0] * q[2],
+                p[3] * q[0] + 3.0 * (p[2] * q[1] + p[1] * q[2]) + p[0] * q[3],
+            ]
+        };
+        let [value, first, second, third] = match self.factor {
+            Factor::Gain => product(a, b),
+            Factor::Delay => {
+                let (one, other) = (product(a, a), product(b, b));
+                std::array::from_fn(|i| one[i] + other[i])
+            }
+        };
+        let products = [value, first, second];
         let usable = USABLE.contains(&products[0]) && (third + second + first).is_finite();
         usable.then(|| Bounds {
             reach,

@@ -1,4 +1,4 @@
-//! One row of a map: a gain k varies, everything else is fixed.
+//! One row of a map: a gain k varies, or a delay T (`one_delay`), everything else is fixed.
 //!
 //! Where the members A + k B have the same leading terms for all k, their violating roots lie
 //! within one radius, and their number changes only at crossings of the edge (`crossing`). One
@@ -8,9 +8,10 @@
 
 use std::ops::Range;
 
-use super::crossing::{Crossing, crossings};
+use super::crossing::{Crossing, Varied, crossings};
 use super::held;
-use super::pencil::{Pencil, united};
+use super::one_delay::crossings_of_delay;
+use super::pencil::{Factor, Pencil, united};
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::{chain_abscissa, radius_right_of};
 use crate::stability::cell::{Cell, UNKNOWN, by_chain, judge};
@@ -76,12 +77,45 @@ impl Row {
     }
 }
 
-/// A row of members A + k B.
+/// How a row depends on a delay.
+#[derive(Clone, Copy)]
+pub(crate) struct Delay<'a> {
+    /// σ > 0.
+    pub(crate) slope: f64,
+    /// What divides the row where its crossings are not known.
+    pub(crate) by_parts: &'a dyn ByParts,
+}
+
+/// A row that is divided until no member of a part has a root on the edge.
+pub(crate) trait ByParts {
+    /// The counts.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    fn counts(&self) -> Result<Row, Error>;
+
+    /// The crossings.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    fn crossings(&self) -> Result<Vec<Crossing>, Error>;
+
+    /// Is it proved that no member has a root on a vertical line, for any T from that of the first to
+    /// that of the second cell?
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] alone.
+    fn is_clear(&self, line: f64, cells: [usize; 2]) -> Result<bool, Error>;
+}
+
+/// A row of members A + k B, or A + e^(−s σ (T − T₀)) B.
 #[derive(Clone, Copy)]
 pub(crate) struct Members<'a> {
     /// A and B; `None` where a coefficient overflows.
     pub(crate) parts: Option<&'a (QuasiPolynomial, QuasiPolynomial)>,
-    /// The values of k, increasing.
+    /// Given where a delay T varies; T₀ is the first point.
+    pub(crate) delay: Option<Delay<'a>>,
+    /// The values of k, or of T, increasing.
     pub(crate) points: &'a [f64],
     /// The member of a cell; `None` where it cannot be formed.
     pub(crate) member: &'a dyn Fn(usize) -> Option<QuasiPolynomial>,
@@ -107,13 +141,18 @@ impl Members<'_> {
             let cell = self.judge(0, task)?;
             return Ok(self.uniform(cell));
         }
-        let chains = self.hull(a, b).filter(|_| self.hold.is_none());
+        let affine = self.hold.is_none() && self.delay.is_none();
+        let chains = affine.then(|| self.hull(a, b)).flatten();
         if let Some(cell) = chains.and_then(|hull| self.led_by_chains(&hull)) {
             return Ok(self.uniform(cell));
         }
-        match self.crossings(a, b, task)? {
-            Some(crossings) => self.between(&crossings, task),
-            None => self.alone(task),
+        match (self.crossings(a, b, task)?, self.delay) {
+            (Some(crossings), _) => self.between(&crossings, task),
+            // Next to chains boundaries are denser than cells.
+            (None, Some(delay)) if matches!(a.kind(), Kind::Polynomial | Kind::Retarded) => {
+                delay.by_parts.counts()
+            }
+            (None, _) => self.alone(task),
         }
     }
 
@@ -202,6 +241,14 @@ impl Members<'_> {
         if let Some((range, hold)) = self.range().zip(self.hold) {
             return held::crossings(a, b, self.specification, hold, range, task);
         }
+        if let Some((range, delay)) = self.range().zip(self.delay) {
+            let on_axis = self.specification == Specification::default();
+            return if on_axis {
+                crossings_of_delay(a, b, delay.slope, range, task)
+            } else {
+                Ok(None)
+            };
+        }
         let Some((range, hull)) = self.range().zip(self.hull(a, b)) else {
             return Ok(None);
         };
@@ -219,10 +266,10 @@ impl Members<'_> {
             if length <= 0.0 {
                 break;
             }
-            let Some(pencil) = Pencil::new(a, b, piece, None) else {
+            let Some(pencil) = Pencil::new(a, b, piece, Factor::Gain, None) else {
                 return Ok(None);
             };
-            match crossings(&pencil, index == 0, length, range, task)? {
+            match crossings(&pencil, index == 0, length, Varied::Gain(range), task)? {
                 Some(found) => all.extend(found),
                 None => return Ok(None),
             }

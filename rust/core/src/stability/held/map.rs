@@ -321,6 +321,7 @@ impl Numbers {
         let member = |index: usize| self.member(points.get(index).copied()?);
         work(&Members {
             parts: self.parts.as_ref(),
+            delay: None,
             points,
             member: &member,
             specification,

@@ -114,7 +114,7 @@ impl<const D: usize> Grid<'_, D> {
     }
 
     /// The values of the varying parameters in a cell.
-    fn point(&self, cell: &[usize; D]) -> [f64; D] {
+    pub(crate) fn point(&self, cell: &[usize; D]) -> [f64; D] {
         std::array::from_fn(|i| self.points[i].get(cell[i]).copied().unwrap_or(f64::NAN))
     }
 

@@ -61,15 +61,7 @@ pub(crate) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
         |(), index| {
             let mut values = map.values.to_vec();
             put(&mut values, across, index);
-            let reduced = Reduced::new(map.family, &values, &[axis.parameter]);
-            let mut row = Grid {
-                reduced: reduced.with_specification(map.question.specification),
-                points: [axis.points],
-            };
-            row.refer_to_middle(&Block {
-                start: [0],
-                end: [axis.points.len()],
-            });
+            let row = Grid::row(map.family, &values, axis, map.question.specification);
             let found = row.crossings(map.task)?;
             map.task.advance(axis.points.len() as u64);
             Ok(found)

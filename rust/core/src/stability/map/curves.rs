@@ -183,9 +183,18 @@ fn closest<T>(
     place: impl Fn(&T) -> (f64, f64, i32),
     scale: (f64, f64),
 ) -> Option<usize> {
+    let omega = |index: usize| candidates.get(index).map(|candidate| place(candidate).1);
     let middle = candidates.partition_point(|candidate| place(candidate).1 < from.1);
-    let window = middle.saturating_sub(2 * WINDOW)..(middle + 2 * WINDOW).min(candidates.len());
-    window
+    let mut start = middle.saturating_sub(2 * WINDOW);
+    let mut end = (middle + 2 * WINDOW).min(candidates.len());
+    // One frequency has many delays.
+    while start > 0 && omega(start - 1) == omega(start) {
+        start -= 1;
+    }
+    while end < candidates.len() && end > 0 && omega(end) == omega(end - 1) {
+        end += 1;
+    }
+    (start..end)
         .filter_map(|index| {
             let (gain, omega, jump) = place(candidates.get(index)?);
             let off = distance((gain, omega), (from.0, from.1), scale);

@@ -1,7 +1,7 @@
 //! Stability over two parameters of a family.
 //!
-//! Counts: if the family is affine in one of the two, every value of the other makes a row, whose
-//! crossings of the edge give all its cells (`row`); the cost grows with the number of rows and of
+//! Counts: if the family is affine in one of the two, or has it as the delay of some terms, every
+//! value of the other makes a row, whose crossings of the edge give all its cells (`row`); the cost grows with the number of rows and of
 //! crossings, not of cells. Otherwise blocks of cells are divided along the boundaries (`blocks`).
 //! With `Proof::Cells`, and for the abscissa of a family that is affine in neither, every cell is
 //! judged alone. In each case a cell equals [`judge`] of the family's member there, and results
@@ -15,7 +15,7 @@ use super::axes::{Axis, Map, Proof, Question, check_parameters, put};
 use super::blocks;
 use super::chart::Chart;
 use super::curves::{Vertex, join};
-use super::rows::Rows;
+use super::rows::{Rows, Wanted};
 use crate::roots::chain_abscissa;
 use crate::stability::cell::{Cell, judge};
 use crate::stability::family::Family;
@@ -55,7 +55,12 @@ pub fn map(
     if question.proof == Proof::Cells {
         return map.cell_by_cell();
     }
-    match Rows::of(&map) {
+    let wanted = if question.abscissa {
+        Wanted::Abscissas
+    } else {
+        Wanted::Counts
+    };
+    match Rows::of(&map, wanted) {
         Some(rows) => rows.chart(),
         None => match blocks::grid(&map).filter(|_| !question.abscissa) {
             Some(grid) => grid.chart(task),
@@ -98,8 +103,9 @@ pub fn boundaries(
         },
         task,
     };
-    let (along, crossings) = match Rows::of(&map) {
-        Some(rows) => (rows.along, rows.crossings()?),
+    let (along, crossings) = match Rows::of(&map, Wanted::Boundaries) {
+        Some(rows) if rows.has_boundaries() => (rows.along, rows.crossings()?),
+        Some(_) => return Ok(None),
         None => match blocks::crossings(&map)? {
             Some(found) => found,
             None => return Ok(None),

@@ -9,7 +9,7 @@
 //! therefore complete except for gaps whose crossings cancel, or beyond which infinitely many roots
 //! violate the specification; ω and p are those of the zero that was found within the gap.
 
-use super::block::{Block, Finding, Grid};
+use super::block::{Finding, Grid};
 use crate::stability::boxes::{BoxExpansion, Claim, Examined, Range, Stretch, examine, tangent};
 use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
@@ -68,13 +68,9 @@ impl Grid<'_, 1> {
     /// # Errors
     /// [`Error::Interrupted`] alone.
     pub(crate) fn crossings(&self, task: &Task) -> Result<Vec<Crossing>, Error> {
-        let whole = Block {
-            start: [0],
-            end: [self.points[0].len()],
-        };
         let mut expansion = BoxExpansion::new(&self.reduced);
         let mut intervals = Vec::new();
-        for part in self.divide(whole, task)? {
+        for part in self.divide(self.whole(), task)? {
             let range = self.range(&part.block);
             let (low, high) = (range.low[0], range.high[0]);
             let known = match part.finding {

@@ -1,4 +1,4 @@
-"""Maps of families affine in neither parameter: against counts of single cells, closed forms."""
+"""Maps of families affine in neither parameter: against single cells, closed forms."""
 
 import deadtime as dtm
 import numpy as np
@@ -27,6 +27,12 @@ FAMILIES = {
         {"a": (-1.2, 1.2), "T": (0.1, 2)},
     ),
     "delay and plant": (s * (a * a * s + 1) + 2.0 * a * delay(T), {"a": (0.1, 2), "T": (0.05, 2)}),
+    "multiples of two delays": (
+        s + 0.9 * delay(T1) + 0.3 * delay(2 * T1) + 0.7 * delay(T2) + 0.4 * delay(2 * T2),
+        {"T1": (0, 4), "T2": (0.01, 4)},
+    ),
+    "proportional and velocity": (s + (K + 0.3 * s) * delay(T), {"K": (-1, 6), "T": (0.01, 2)}),
+    "equal moduli at 0": (s + K * K + delay(T), {"K": (-2, 2), "T": (0, 3)}),
     "leading term vanishes": (
         a * a * s**2 + a * s + 1 + 0.5 * delay(T),
         {"a": (-1, 1), "T": (0, 2)},
@@ -36,18 +42,27 @@ names = pytest.mark.parametrize("name", FAMILIES)
 
 
 def assert_same(family, ranges, shape, **options):
-    """The map by blocks has the counts and statuses of the one by cells."""
-    blocks = dtm.stability_map(family, ranges, shape, abscissa=False, **options)
-    cells = dtm.stability_map(family, ranges, shape, abscissa=False, proof="cells", **options)
-    np.testing.assert_array_equal(blocks.unstable, cells.unstable)
-    np.testing.assert_array_equal(blocks.status, cells.status)
-    return blocks
+    """The map by curves has the counts and statuses of the one by cells."""
+    options = {"abscissa": False, **options}
+    curves = dtm.stability_map(family, ranges, shape, **options)
+    cells = dtm.stability_map(family, ranges, shape, proof="cells", **options)
+    np.testing.assert_array_equal(curves.unstable, cells.unstable)
+    np.testing.assert_array_equal(curves.status, cells.status)
+    if options["abscissa"]:
+        np.testing.assert_allclose(curves.abscissa, cells.abscissa, rtol=1e-9, atol=1e-9)
+    return curves
 
 
 @names
 @pytest.mark.parametrize("shape", [(75, 70), (2, 40), (40, 2), (2, 3)])
 def test_every_cell_is_the_one_counted_alone(name, shape):
     assert_same(*FAMILIES[name], shape)
+
+
+@names
+@pytest.mark.parametrize("decay", [0.0, 0.2, -0.3])
+def test_abscissas_followed_along_a_delay_are_those_of_single_cells(name, decay):
+    assert_same(*FAMILIES[name], (11, 60), abscissa=True, decay=decay)
 
 
 @names
