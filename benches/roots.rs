@@ -20,7 +20,7 @@ struct Case {
     height: f64,
 }
 
-const CASES: [Case; 6] = [
+const CASES: [Case; 7] = [
     Case {
         name: "armah_K2",
         rows: &[&[0.0, 1.0], &[2.0]],
@@ -40,6 +40,14 @@ const CASES: [Case; 6] = [
         rows: &[&[0.0, 1.0], &[2.0, 0.3]],
         delays: &[0.0, 0.36],
         re: (-12.0, 2.0),
+        height: 100.0,
+    },
+    // The best gains: two roots almost meet where the next ones lie on the chain.
+    Case {
+        name: "armah_neutral_best",
+        rows: &[&[0.0, 1.0], &[1.503849446591373, 0.1353576030581129]],
+        delays: &[0.0, 0.36],
+        re: (-5.6, 2.0),
         height: 100.0,
     },
     Case {

@@ -118,6 +118,18 @@ def test_rightmost_roots_close_to_the_chains():
 # The paper's loops: s + (Kp + Kv s) e^(−s Td)
 
 
+def test_a_pair_almost_double_beside_roots_on_the_chain():
+    # The next pair is 1.5e-8 right of the chain; no line lies between the two.
+    h = s + (1.503849446591373 + 0.1353576030581129 * s) * delay(0.36)
+    mp.mp.dps = 30
+    kp, kv, wait = (mp.mpf(x) for x in (1.503849446591373, 0.1353576030581129, 0.36))
+    first = mp.findroot(lambda z: z + (kp + kv * z) * mp.exp(-z * wait), mp.mpc(-5.55, 0.09))
+    found = h.rightmost()
+    np.testing.assert_allclose(found.roots, [complex(first), complex(first).conjugate()], rtol=1e-9)
+    assert h.spectral_abscissa() == found.roots[0].real
+    assert h.count(re=(float(first.real) - 1e-3, None)) == 2
+
+
 def test_pv_loop_of_the_paper():
     def loop(Kv):
         return s + (2.0 + Kv * s) * delay(0.36)

@@ -33,6 +33,9 @@ const CHAIN_MARGIN: f64 = 1e-4;
 /// If no line this close could be counted, the result is an error.
 const NEAR_CHAINS: f64 = 1e-3;
 
+/// Distance from the chains, in the margin, below which no line is put beside a root.
+const ON_CHAINS: f64 = 0.1;
+
 /// Evaluations after which the first line is abandoned, because lines very close to the chains cost
 /// without bound. Each later line may cost half as much, but at least the second number.
 const EVALUATIONS_PER_LINE: u64 = 2_000_000;
@@ -394,7 +397,9 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         let share = (0..self.given_up).fold(CLEARANCE, |share, _| CLOSER * share);
         let sigma = edge - (share * free).min(self.step);
         let further = line.sigma - sigma > CLOSE_LINES * self.margin;
-        Ok((sigma > self.barrier && further).then_some(sigma))
+        // A line on the chains would cost without bound, and a root further right may be unknown.
+        let free_of_chains = sigma - self.chain > ON_CHAINS * self.margin;
+        Ok((sigma > self.barrier && free_of_chains && further).then_some(sigma))
     }
 
     /// Points near the lower end of a line, for which there may be no hints: where one row
