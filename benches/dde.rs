@@ -42,6 +42,39 @@ fn filtered(kp: f64, kv: f64) -> Equations {
     }
 }
 
+/// The plant with a lag: its output and the force behind it.
+fn lagging(kp: f64, lag: f64) -> Equations {
+    Equations {
+        a: vec![-1.0 / lag, 1.0, 0.0, 0.0],
+        b: vec![0.0, 1.0 / lag],
+        e: vec![0.0; 2],
+        k: vec![-kp, 0.0],
+        m: kp,
+        c: vec![1.0, 0.0],
+        ..Equations::default()
+    }
+}
+
+/// Both.
+fn filtered_lagging(kp: f64, kv: f64, lag: f64) -> Equations {
+    let omega = 38.0;
+    Equations {
+        a: [
+            [-1.0 / lag, 1.0, 0.0, 0.0],
+            [0.0; 4],
+            [0.0, 0.0, 0.0, omega],
+            [omega, 0.0, -omega, -2.0 * omega],
+        ]
+        .concat(),
+        b: vec![0.0, 1.0 / lag, 0.0, 0.0],
+        e: vec![0.0; 4],
+        k: vec![-kp, 0.0, 0.0, -kv * omega],
+        m: kp,
+        c: vec![1.0, 0.0, 0.0, 0.0],
+        ..Equations::default()
+    }
+}
+
 fn simulations(criterion: &mut Criterion) {
     let cases = [
         ("p step", drone(1.31, 0.0), None, None),
@@ -117,28 +150,44 @@ fn sweeps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sweep 10 s, metrics");
     group.sample_size(10);
     let count = 10_000;
-    for (name, equations) in [("p", drone(1.0, 0.0)), ("pv filtered", filtered(1.0, 0.3))] {
+    let cases = [
+        ("p", drone(1.0, 0.0)),
+        ("p, lag", lagging(1.0, 0.2)),
+        ("pv filtered", filtered(1.0, 0.3)),
+        ("pv filtered, lag", filtered_lagging(1.0, 0.3, 0.2)),
+    ];
+    for (name, equations) in cases {
         let states = equations.states();
-        let mut rows = Vec::new();
+        let mut gains = Vec::new();
+        let (mut feedback, mut delays) = (Vec::new(), Vec::new());
         for i in 0..count {
             let part = f64::from(i) / f64::from(count);
             let gain = 0.5 + 2.0 * part;
-            rows.extend_from_slice(&equations.a);
-            rows.extend_from_slice(&equations.b);
-            rows.extend_from_slice(&equations.e);
-            rows.push(-gain);
-            rows.extend_from_slice(&equations.k[1..]);
-            rows.extend_from_slice(&equations.c);
-            rows.extend([equations.l, gain, 0.0, 0.0]);
-            rows.extend([0.1 + 0.4 * part, SAMPLE_TIME, 1.0]);
+            gains.push(gain);
+            feedback.push(-gain);
+            delays.push(0.1 + 0.4 * part);
         }
-        let sets = Sets {
-            states,
-            rows: &rows,
-            amplitude: 1.0,
-            is_ahead: false,
+        let numbers = [equations.l, 0.0, 0.0, 0.0, 0.0, SAMPLE_TIME, 1.0];
+        let shared: Vec<f64> = [
+            &equations.a,
+            &equations.b,
+            &equations.e,
+            &equations.k,
+            &equations.c,
+        ]
+        .into_iter()
+        .flatten()
+        .copied()
+        .chain(numbers)
+        .collect();
+        let mut entries: Vec<&[f64]> = shared.chunks(1).collect();
+        let matrices = states * states + 4 * states;
+        entries[states * states + 2 * states] = &feedback;
+        entries[matrices + 1] = &gains;
+        entries[matrices + 4] = &delays;
+        let Ok(sets) = Sets::new(states, count as usize, &entries, 1.0, false) else {
+            continue;
         };
-        let steady = vec![1.0; count as usize];
         let criteria = Criteria {
             rise: (0.1, 0.9),
             settling: 0.02,
@@ -146,7 +195,9 @@ fn sweeps(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(count as u64));
         group.bench_function(name, |bencher| {
             let task = Task::new();
-            bencher.iter(|| ensemble::metrics(black_box(&sets), &steady, 10.0, &criteria, &task));
+            bencher.iter(|| {
+                ensemble::metrics(black_box(&sets), (&[1.0], &[0.0]), 10.0, &criteria, &task)
+            });
         });
     }
     group.finish();

@@ -8,8 +8,6 @@ use deadtime::dde::history::{History, Piece};
 use deadtime::dde::spectral::{Columns, Equation, Problem, solve};
 use deadtime::{Error, Task};
 
-const COMPONENTS: usize = 50;
-
 /// y′ = 0.2 z / (1 + z¹⁰) − 0.1 y.
 struct MackeyGlass;
 
@@ -24,6 +22,7 @@ impl Equation for MackeyGlass {
 
 /// y′_i = −y_i + tanh(z_{i+1} − 2 z_{i+7}), indices modulo the number of components.
 struct Network {
+    components: usize,
     costly: bool,
 }
 
@@ -31,7 +30,7 @@ impl Equation for Network {
     fn slope(&mut self, at: Columns<'_>, out: &mut [f64], _: &Task) -> Result<(), Error> {
         let n = at.t.len();
         for (i, out) in out.chunks_exact_mut(n).enumerate() {
-            let row = |shift: usize| &at.z[(i + shift) % COMPONENTS * n..];
+            let row = |shift: usize| &at.z[(i + shift) % self.components * n..];
             let inputs = row(1).iter().zip(row(7));
             for ((out, y), (a, b)) in out.iter_mut().zip(&at.y[i * n..]).zip(inputs) {
                 *out = -y + libm::tanh(a - 2.0 * b);
@@ -88,13 +87,14 @@ fn runs(criterion: &mut Criterion) {
         group.bench_function("PV loop, neutral, 10 s", |bencher| {
             bencher.iter(|| solve(black_box(&drone), &mut Drone, &task));
         });
-        let firing = (0..COMPONENTS).map(|i| (i as f64).sin()).collect();
-        let network = problem(firing, 1.0, 50.0, rtol, false);
         group.sample_size(20);
-        for costly in [false, true] {
+        for (components, end, costly) in [(50, 50, false), (50, 50, true), (2000, 10, true)] {
+            let firing = (0..components).map(|i| (i as f64).sin()).collect();
+            let network = problem(firing, 1.0, f64::from(end), rtol, false);
             let name = if costly { ", few sweeps" } else { "" };
-            group.bench_function(format!("network of 50, 50 s{name}"), |bencher| {
-                let mut equation = Network { costly };
+            let id = format!("network of {components}, {end} s{name}");
+            group.bench_function(id, |bencher| {
+                let mut equation = Network { components, costly };
                 bencher.iter(|| solve(black_box(&network), &mut equation, &task));
             });
         }

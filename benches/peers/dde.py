@@ -3,8 +3,8 @@
 Every solver is run once with each of several settings, and compared with references on which two
 unrelated methods agree (`tests/reference`). For 1e-6 and for 1e-9, the fastest setting whose true
 error is smaller is timed, ours and the peer's in turn. Compilation (JiTCDDE, numba) is not
-included. The last lines are sweeps: time per trajectory. Run ``python benches/peers/dde.py
-[--quick]``.
+included. A sparse network of 2000 components follows, beside its right-hand side alone; the last
+lines are sweeps: CPU time of a set. Run ``python benches/peers/dde.py [--quick]``.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import deadtime as dtm
 import numpy as np
 from drivers import dde as peers
 from drivers.dde import Run, Values
+from scipy.sparse import random_array
 
 try:
     from numba import carray, cfunc, types
@@ -246,24 +247,136 @@ def compare(problem: Problem, rounds: int) -> None:
                 )
 
 
+#: Microseconds of a set in C with AVX-512: the sampled P loop alone, and behind a lag, the
+#: overshoot of which is then equal to 4e-5 %.
+CEILINGS = {"P": 0.138, "P, lag": 0.158}
+
+
+def swept() -> dict[str, tuple[dtm.ControlLoop, tuple[float, float]]]:
+    """Loops of up to four states with a hold and a limit, and the range of their gain."""
+    held = {"delay": DELAY, "limit": 1.0, "sample_time": SAMPLE_TIME}
+    smooth = dtm.DerivativeFilter(38.0)
+    lagging = dtm.Integrator(1.0, 0.2)
+    first, second = dtm.FirstOrder(2.0, 0.5), dtm.FactoredPlant([0.2, 0.1])
+    return {
+        "P": (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), **held), (0.5, 2.0)),
+        "PI": (dtm.ControlLoop(dtm.Integrator(), dtm.PI(1.3, 0.1), **held), (0.5, 2.0)),
+        "filtered PV": (
+            dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.3, 0.2, smooth), **held),
+            (0.5, 2.0),
+        ),
+        "P, lag": (dtm.ControlLoop(lagging, dtm.P(1.3), **held), (0.5, 2.0)),
+        "PI, first order": (dtm.ControlLoop(first, dtm.PI(0.3, 0.2), **held), (0.1, 0.6)),
+        "PI, two lags": (dtm.ControlLoop(second, dtm.PI(0.3, 1.0), **held), (0.1, 0.6)),
+        "filtered PV, lag": (
+            dtm.ControlLoop(lagging, dtm.PV(1.3, 0.2, smooth), **held),
+            (0.5, 2.0),
+        ),
+        "continuous P": (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=DELAY), (0.5, 2.0)),
+    }
+
+
+def numba_sweep() -> Callable[[Values, Values], Values] | None:
+    """The P loop with hold and limit as a user would write it for numba: peak, settling, rise."""
+    try:
+        from numba import njit
+    except ImportError:
+        return None
+
+    @njit(cache=False)
+    def swept(gains: Values, delays: Values) -> Values:
+        found = np.empty((gains.size, 3))
+        steps = int(np.ceil(10.0 / SAMPLE_TIME))
+        for i in range(gains.size):
+            whole = int(delays[i] / SAMPLE_TIME)
+            early = delays[i] - whole * SAMPLE_TIME
+            commands = np.zeros(whole + 2)
+            y, peak, settled, risen = 0.0, 0.0, 0.0, -1.0
+            for k in range(steps):
+                u = min(max(gains[i] * (1.0 - y), -1.0), 1.0)
+                commands[k % (whole + 2)] = u
+                for part in range(2):
+                    length = early if part == 0 else SAMPLE_TIME - early
+                    y += commands[(k + 1 + part) % (whole + 2)] * length
+                    time = k * SAMPLE_TIME + (early if part == 0 else SAMPLE_TIME)
+                    peak = max(peak, y)
+                    if risen < 0.0 and y >= 0.9:
+                        risen = time
+                    if abs(y - 1.0) > 0.02:
+                        settled = time
+            found[i] = peak, settled, risen
+        return found
+
+    return swept
+
+
 def sweeps(sets: int, rounds: int) -> None:
-    """Trajectories of the sampled loop with a limit, a hundred thousand at once."""
-    gains, delays = np.linspace(0.5, 2.0, sets), np.linspace(0.2, 0.4, sets)
-    loop = dtm.ControlLoop(
-        dtm.Integrator(), dtm.P(1.31), delay=DELAY, limit=1.0, sample_time=SAMPLE_TIME
-    )
-    varied = {"Kp": gains, "delay": delays}
+    """Step metrics of many sets, their gain and delay varied: CPU time a set in one thread."""
+
+    def cpu(call: Callable[[], object]) -> float:
+        times = []
+        for _ in range(rounds):
+            start = time.process_time()
+            call()
+            times.append(time.process_time() - start)
+        return min(times)
+
+    delays = np.linspace(0.2, 0.4, sets)
     times = np.linspace(0.0, 10.0, 11)
-    peer = peers.scipy_samples(1.31, DELAY, SAMPLE_TIME, 1.0)
-    other = statistics.median(seconds(peer, times) for _ in range(rounds))
-    for name, options in (("figures", {}), ("responses", {"responses": True})):
-        mine = statistics.median(
-            seconds(lambda options=options: dtm.sweep(loop, varied, times, threads=1, **options))
-            for _ in range(rounds)
-        )
+    one = peers.scipy_samples(1.31, DELAY, SAMPLE_TIME, 1.0)
+    other = statistics.median(seconds(one, times) for _ in range(rounds))
+    by_numba = numba_sweep()
+    for name, (loop, bounds) in swept().items():
+        count = sets if loop.is_sampled else max(sets // 10, 1)
+        varied = {"Kp": np.linspace(*bounds, count), "delay": delays[:: sets // count][:count]}
+        mine = cpu(lambda loop=loop, varied=varied: dtm.sweep(loop, varied, 10.0, threads=1))
+        line = f"sweep of {count} sets, {name}: {1e6 * mine / count:.3f} us a set"
+        if name in CEILINGS:
+            ceiling = CEILINGS[name]
+            line += f"; C {ceiling:.3f} us: ratio {1e6 * mine / count / ceiling:.1f}"
+        if name == "P":
+            if by_numba is not None:
+                by_numba(*varied.values())
+                loops = cpu(lambda varied=varied: by_numba(*varied.values()))
+                line += f"; numba {1e6 * loops / count:.3f} us: ratio {loops / mine:.1f}"
+            line += f"; scipy a sample {1e6 * other:.0f} us: ratio {other / mine * count:.0f}"
+        print(line)
+
+
+def sparse_network(components: int, rounds: int) -> None:
+    """A network with five inputs each: CPU time beside that of its right-hand side alone."""
+    rng = np.random.default_rng(1)
+    weights = random_array((components, components), density=5 / components, rng=rng, format="csr")
+    weights.data = 0.6 * rng.normal(size=weights.nnz)
+    start = rng.normal(size=components)
+    alone = 0.0
+
+    def slope(t: Values, y: Values, z: Values) -> Values:
+        nonlocal alone
+        before = time.process_time()
+        found = np.tanh(weights @ z[0]) - y
+        alone += time.process_time() - before
+        return found
+
+    for tolerance in TARGETS:
+        best = (np.inf, np.inf)
+        for _ in range(rounds):
+            alone, before = 0.0, time.process_time()
+            found = dtm.solve_dde(
+                slope,
+                (0.0, 10.0),
+                start,
+                [1.0],
+                rtol=tolerance,
+                atol=tolerance,
+                t_eval=[10.0],
+                vectorized=True,
+            )
+            best = min(best, (time.process_time() - before, alone))
         print(
-            f"sweep of {sets} sets, {name}, one thread: {1e6 * mine / sets:.3f} us a trajectory; "
-            f"scipy a sample {1e6 * other:.0f} us: ratio {other / mine * sets:.0f}"
+            f"network of {components}, t = 10, {tolerance:.0e}: {1e3 * best[0]:.1f} ms of CPU time "
+            f"in {found.nfev} calls, which alone take {1e3 * best[1]:.1f} ms: "
+            f"ratio {best[0] / best[1]:.1f}"
         )
 
 
@@ -281,6 +394,7 @@ def main() -> None:
             for runs in (*problem.ours.values(), *problem.peers.values()):
                 runs[:] = runs[-3:-2] or runs[:1]
         compare(problem, 1 if quick else 7)
+    sparse_network(2000, 2 if quick else 8)
     sweeps(1000 if quick else 100_000, 1 if quick else 3)
 
 

@@ -637,7 +637,9 @@ class _LoopSets(Protocol):
     @property
     def states(self) -> int: ...
     @property
-    def rows(self) -> _Reals: ...
+    def size(self) -> int: ...
+    @property
+    def entries(self) -> Sequence[float | _Reals]: ...
     @property
     def amplitude(self) -> float: ...
     @property
@@ -656,7 +658,8 @@ class SweepResponses:
 def sweep_metrics(
     sets: _LoopSets,
     *,
-    steady_state: _Reals,
+    steady_state: float | _Reals,
+    slowest_time: float | _Reals,
     span: float,
     settling: float,
     rise: _Pair,

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import finite
-from deadtime.loops._batched_matrices import matrix, vector
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
+from deadtime.loops._entries import matrix, vector
 from deadtime.loops._given_plants import transfer_function_of
 from deadtime.systems import TransferFunction
 

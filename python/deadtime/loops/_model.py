@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import increasing, real_array
 from deadtime._deadtime import LinearLoop
-from deadtime.loops._batched_matrices import column, number, vector, zeros
 from deadtime.loops._controllers import Controller, FilterUpdate
+from deadtime.loops._entries import Each, number, vector, zeros
 from deadtime.loops._plants import Plant, StateSpace, realise, rest
 
 Vector = NDArray[np.float64]
@@ -66,7 +66,7 @@ class ReferenceJumps(NamedTuple):
 class LoopModel:
     """The matrices of a loop with numbers in the place of every parameter.
 
-    Where the numbers are arrays, the matrices of one loop an element are in the leading axes.
+    Entries may be `Each`: the numbers of many loops.
     """
 
     A: Vector
@@ -88,25 +88,31 @@ class LoopModel:
         """Close the loop around `plant`, numbers taken from `values`."""
         p = realise(*plant._polynomials(values))
         c = controller._equations(values)
-        if np.any(c.q != 0.0) and np.any(p.D != 0.0):
+        if c.q != 0.0 and p.D != 0.0:
             raise ValueError(
                 f"the plant passes its command straight to its output (D={p.D}), so its output "
                 "has no ideal derivative: give the controller a DerivativeFilter"
             )
-        n, m = p.B.shape[-1], c.B.shape[-1]
-        A = zeros((n + m, n + m), p.A, c.A, c.B[..., None])
-        A[..., :n, :n] = p.A
-        A[..., n:, :n] = c.B[..., None] * p.C
-        A[..., n:, n:] = c.A
-        feedback = column(c.p) * p.C + column(c.q) * (p.C @ p.A)
+        n, m = len(p.B), len(c.B)
+        K, L = c.p * p.C, c.p * p.D
+        if c.q != 0.0:
+            K, L = K + c.q * (p.C @ p.A), L + c.q * (p.B @ p.C)
+        A, B, E, C = p.A, p.B, np.zeros(n), p.C
+        if m > 0:
+            A = zeros((n + m, n + m), p.A, c.A, c.B)
+            A[:n, :n] = p.A
+            A[n:, :n] = c.B[:, None] * p.C
+            A[n:, n:] = c.A
+            B, E = np.concatenate([p.B, c.B * p.D]), np.concatenate([E, c.E])
+            K, C = np.concatenate([K, c.C]), np.concatenate([p.C, np.zeros(m)])
         return cls(
             A=A,
-            B=_joined(p.B, c.B * column(p.D)),
-            E=_joined(np.zeros(n), c.E),
-            K=_joined(feedback, c.C),
-            L=number(c.p * p.D + c.q * (p.B @ p.C)),
+            B=B,
+            E=E,
+            K=K,
+            L=number(L),
             M=number(c.M),
-            C=np.concatenate([p.C, np.zeros(m)]),
+            C=C,
             D=p.D,
             impulse=number(c.impulse),
             update=None if c.update is None else _update(p, c.update, n + m),
@@ -114,19 +120,25 @@ class LoopModel:
         )
 
     def row(self, delay: Any, sample_time: Any = None, limit: Any = None) -> NDArray[Any]:
-        """Write the loop, or each of many, as one row of numbers for the native part.
+        """Write the loop as one row of numbers for the native part.
 
         Returns
         -------
-        ndarray, shape (..., n * n + 4 n + 7)
+        ndarray, shape (n * n + 4 n + 7,)
             A, B, E, K, C, L, M, D, impulse, the delay, the sample time (0 for none) and the limit
             (infinite for none).
         """
-        flat = self.A.reshape(*self.A.shape[:-2], -1)
         period = 0.0 if sample_time is None else sample_time
         bound = np.inf if limit is None else limit
         numbers = vector([self.L, self.M, self.D, self.impulse, delay, period, bound])
-        return _joined(flat, self.B, self.E, self.K, self.C, numbers)
+        return np.concatenate([self.A.ravel(), self.B, self.E, self.K, self.C, numbers])
+
+    def entries(
+        self, delay: Any, sample_time: Any = None, limit: Any = None
+    ) -> list[float | Vector]:
+        """`row` for many loops: each entry one number for all, or an array of one for each."""
+        row = self.row(delay, sample_time, limit).tolist()
+        return [entry.numbers if isinstance(entry, Each) else entry for entry in row]
 
     def native(
         self, delay: float, sample_time: float | None = None, limit: float | None = None
@@ -178,16 +190,6 @@ def refuse_discretised(controller: Controller, sample_time: float | None, what: 
             f"{what} cannot run a filter in samples (discretisation={smooth.discretisation!r}): "
             "leave its discretisation out, or take loops one by one"
         )
-
-
-def _joined(*parts: NDArray[Any]) -> NDArray[Any]:
-    """Concatenate vectors whose leading axes broadcast."""
-    if all(part.ndim == 1 for part in parts):
-        return np.concatenate(parts)
-    leading = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
-    return np.concatenate(
-        [np.broadcast_to(part, leading + part.shape[-1:]) for part in parts], axis=-1
-    )
 
 
 def rest_of(plant: Plant, controller: Controller, values: Mapping[str, Any]) -> tuple[Any, Any]:

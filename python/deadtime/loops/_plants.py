@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import finite, non_negative, non_zero, unmasked
-from deadtime.loops._batched_matrices import matrix, number, vector
+from deadtime.loops._entries import matrix, number, vector
 from deadtime.roots import s
 from deadtime.systems import TransferFunction
 
@@ -304,10 +304,13 @@ def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
     b = [0.0] * (len(a) - len(b)) + b
     direct, n = b[0] / a[0], len(a) - 1
     poles, gains = ([c / a[0] for c in part[1:]] for part in (a, b))
-    chain = np.eye(n, k=1)
-    rows = [[0.0 - pole, *chain[i, 1:]] for i, pole in enumerate(poles)]
+    rows = [
+        [0.0 - pole, *(1.0 if j == i + 1 else 0.0 for j in range(1, n))]
+        for i, pole in enumerate(poles)
+    ]
     drive = [gain - pole * direct for gain, pole in zip(gains, poles, strict=True)]
-    return StateSpace(matrix(rows), vector(drive), np.eye(1, n)[0], number(direct))
+    first = np.array([1.0, *[0.0] * (n - 1)][:n])
+    return StateSpace(matrix(rows), vector(drive), first, number(direct))
 
 
 def rest(
@@ -339,8 +342,10 @@ def rest(
 
 def _led(coefficients: Sequence[Any]) -> list[Any]:
     """Drop leading entries that are zero throughout, keep at least one."""
-    first = next((i for i, c in enumerate(coefficients) if _is_something(c)), -1)
-    return list(coefficients)[first:]
+    for first, c in enumerate(coefficients):
+        if _is_something(c):
+            return list(coefficients[first:])
+    return list(coefficients[-1:])
 
 
 def _is_something(coefficient: Any) -> bool:

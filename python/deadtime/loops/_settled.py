@@ -45,21 +45,25 @@ def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None
     return found
 
 
-def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any], count: int) -> Vector:
+def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Vector:
     """Upper bound in s on 1/abs(root) of plant and controller, except for roots at zero.
 
     1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... (Fujiwara 1916).
     """
-    longest = np.zeros(count)
+    longest: Any = 0.0
     parts = (*loop.plant._polynomials(numbers), *loop.controller._feedback(numbers))
     for coefficients in parts:
-        rising = [np.abs(np.broadcast_to(c, count)) for c in coefficients[::-1]]
-        open_ = np.ones(count, dtype=bool)
+        rising = [np.abs(c) for c in coefficients[::-1]]
+        open_: Any = True
         for low, c in enumerate(rising[:-1]):
             # c_0 is the first coefficient that is not zero: lower powers are roots at zero.
             here = open_ & (c > 0.0)
             for k, other in enumerate(rising[low + 1 :], 1):
-                ratio = np.divide(other, c, out=np.zeros(count), where=here)
+                if not np.any(other):
+                    continue
+                ratio = np.where(here, other, 0.0) / np.where(here, c, 1.0)
                 longest = np.maximum(longest, 2.0 * ratio ** (1.0 / k))
-            open_ &= c == 0.0
-    return longest
+            open_ = open_ & (c == 0.0)
+            if not np.any(open_):
+                break
+    return float(longest) if np.ndim(longest) == 0 else np.asarray(longest)

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,11 +30,14 @@ from deadtime._base.validation import (
 )
 from deadtime._deadtime import sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._entries import Each
 from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
 from deadtime.systems._response import first_duration
 
 Vector = NDArray[np.float64]
+
+_Places: TypeAlias = slice | NDArray[np.intp]
 
 #: Number of sets that are built and simulated together: more take more memory, fewer more calls.
 _BLOCK = 1 << 15
@@ -55,8 +58,8 @@ _TO_SETTLE = 8.0
 # time too short.
 _STEP_ROUNDING = 1e-6
 
-# Status given by the native part to a response that is inside its band at the end, without evidence
-# that it stays there.
+# Status given by the native part to a response that is inside its band at the end, of which neither
+# itself nor a test of the poles shows whether it stays there.
 _DOUBTFUL = 4
 
 #: Metrics of a step response.
@@ -241,7 +244,7 @@ def sweep(
     to a twentieth of the band and neither plant nor controller has a slow pole or zero. This is
     evidence, not a proof; `design` proves the stability of its result.
 
-    Sampled loops with a plain integrator are computed with SIMD instructions, several sets at once;
+    Sampled loops with up to four states are computed with SIMD instructions, several sets at once;
     the others one at a time on each thread. The result for a set does not depend on the other sets,
     on the number of threads or on the machine's instruction set.
 
@@ -282,10 +285,12 @@ def sweep(
 
 
 class LoopSets(NamedTuple):
-    """Loops with the same states, one row of `rows` each, and the step of their reference."""
+    """Loops with the same states, and the step of their reference."""
 
     states: int
-    rows: Vector
+    size: int
+    #: `LoopModel.entries`.
+    entries: list[float | Vector]
     amplitude: float
     #: Whether the output is ahead of the time of the native simulation by the delay.
     is_ahead: bool
@@ -313,19 +318,21 @@ class _Sets:
 
     def blocks(
         self, progress: Report | None
-    ) -> Iterator[tuple[NDArray[np.intp], dict[str, Any], LoopSets, Any]]:
+    ) -> Iterator[tuple[_Places, dict[str, Any], LoopSets, Any]]:
         """Yield for each block its places, numbers, native sets and progress function."""
-        flat = {name: np.broadcast_to(a, self.shape).ravel() for name, a in self.arrays.items()}
+        flat = {name: np.broadcast_to(a, self.shape).reshape(-1) for name, a in self.arrays.items()}
         loop, done = self.loop, 0
         for place, part in _blocks(loop, flat, math.prod(self.shape)):
             numbers: dict[str, Any] = loop.parameters | part
-            model = loop.specification.model_at(numbers)
-            row = model.row(*(numbers.get(name) for name in ("delay", "sample_time", "limit")))
-            rows = np.ascontiguousarray(np.broadcast_to(row, (len(place), row.shape[-1])))
+            each = numbers | {name: Each(array) for name, array in part.items()}
+            model = loop.specification.model_at(each)
+            entries = model.entries(*(each.get(name) for name in ("delay", "sample_time", "limit")))
             ahead = loop.delay_path == "measurement"
             report = None if progress is None else lambda n, done=done: progress(done + n)
-            yield place, numbers, LoopSets(model.B.shape[-1], rows, self.amplitude, ahead), report
-            done += len(place)
+            size = len(next(iter(part.values())))
+            sets = LoopSets(len(model.B), size, entries, self.amplitude, ahead)
+            yield place, numbers, sets, report
+            done += size
 
     def outputs(self, times: Vector, progress: Report | None) -> Sweep:
         """Outputs at given times."""
@@ -338,24 +345,22 @@ class _Sets:
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
     def measured(self, times: Vector, progress: Report | None = None) -> Sweep:
-        """Metrics; sets that are in the band but may leave it later have the status _DOUBTFUL."""
+        """Metrics; sets of which the poles have to tell whether they have settled are _DOUBTFUL."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
-        metrics = {name: np.full(count, np.nan) for name in _METRICS}
+        metrics = {name: np.empty(count) for name in _METRICS}
         status = np.empty(count, dtype=np.uint8)
         for place, numbers, sets, report in self.blocks(progress):
-            steady = np.broadcast_to(_steady(self.loop, numbers, self.amplitude), (len(place),))
             part = sweep_metrics(
                 sets,
-                steady_state=steady,
+                steady_state=_steady(self.loop, numbers, self.amplitude),
+                slowest_time=slowest_times(self.loop, numbers),
                 span=span,
                 settling=self.settling,
                 rise=self.rise,
                 threads=self.threads,
                 progress=report,
             )
-            inside = span - part.metrics["settling_time"]
-            slow = TIME_CONSTANTS * slowest_times(self.loop, numbers, len(place)) > inside
-            status[place] = np.where(slow & (part.status == SweepStatus.OK), _DOUBTFUL, part.status)
+            status[place] = part.status
             for name, values in part.metrics.items():
                 metrics[name][place] = values
         shaped = {name: values.reshape(self.shape) for name, values in metrics.items()}
@@ -419,11 +424,11 @@ class _Sets:
         self, found: Sweep, times: Vector, metrics: dict[str, Vector], status: NDArray[np.uint8]
     ) -> Sweep:
         """The result: doubtful sets count as unsettled, and these have no settling time."""
-        status = np.where(status == _DOUBTFUL, SweepStatus.UNSETTLED, status).astype(np.uint8)
         status = status.reshape(self.shape)
-        late = status == SweepStatus.UNSETTLED
-        shaped = {name: np.array(array).reshape(self.shape) for name, array in metrics.items()}
-        shaped["settling_time"][late] = np.nan
+        status[status == _DOUBTFUL] = SweepStatus.UNSETTLED
+        shaped = {name: array.reshape(self.shape) for name, array in metrics.items()}
+        settling = np.where(status == SweepStatus.UNSETTLED, np.nan, shaped["settling_time"])
+        shaped["settling_time"] = settling
         return replace(found, time=times, metrics=shaped, status=status)
 
     def rates(self) -> Vector:
@@ -509,25 +514,34 @@ def _times(time: ArrayLike | None, responses: bool) -> Vector:
 
 def _blocks(
     loop: ControlLoop, flat: Mapping[str, Vector], count: int
-) -> Iterator[tuple[NDArray[np.intp], dict[str, Vector]]]:
+) -> Iterator[tuple[_Places, dict[str, Vector]]]:
     """Yield places and numbers of at most `_BLOCK` sets that have the same number of states."""
     for first in range(0, count, _BLOCK):
-        places = np.arange(first, min(first + _BLOCK, count))
+        places = slice(first, min(first + _BLOCK, count))
         part = {name: array[places] for name, array in flat.items()}
         # A leading coefficient of zero, for example with a lag of zero, removes a state.
-        orders = np.zeros(len(places), dtype=np.int64)
+        orders: Any = 0
         for coefficients in loop.plant._polynomials(loop.parameters | part):
-            leads = np.ones(len(places), dtype=bool)
+            leads: Any = True
             for c in coefficients:
-                leads = leads & (c == 0.0)
+                leads = leads & np.equal(c, 0.0)
                 orders = 2 * orders + leads
+                if not np.any(leads):
+                    leads = False
+        if np.ndim(orders) == 0:
+            yield places, part
+            continue
         for order in np.unique(orders):
             chosen = np.flatnonzero(orders == order)
-            yield places[chosen], {name: array[chosen] for name, array in part.items()}
+            if len(chosen) == len(orders):
+                yield places, part
+            else:
+                yield first + chosen, {name: array[chosen] for name, array in part.items()}
 
 
-def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> Any:
+def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> float | Vector:
     """Steady output of every set; NaN if the command it needs exceeds the limit."""
     output, command = rest_of(loop.plant, loop.controller, numbers)
     limit = numbers.get("limit", np.inf)
-    return np.where(np.abs(command * amplitude) <= limit, output * amplitude, np.nan)
+    steady = np.where(np.abs(command * amplitude) <= limit, output * amplitude, np.nan)
+    return float(steady) if steady.ndim == 0 else steady

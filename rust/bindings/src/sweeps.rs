@@ -1,5 +1,7 @@
 //! Bindings of `deadtime::dde::{ensemble, sensitivity}`.
 
+use std::borrow::Cow;
+
 use deadtime::dde::ensemble::{self, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
 use deadtime::dde::{Criteria, Metrics};
@@ -7,7 +9,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn}
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{column, in_order};
+use crate::arrays::{column, converted, in_order};
 use crate::dde::LoopRun;
 use crate::runtime::{run, run_here};
 
@@ -28,23 +30,47 @@ const METRICS: [(&str, Metric); 9] = [
     ("steady_state", |metrics| metrics.steady_state),
 ];
 
-/// Loops of one structure, a row a loop, and the step of their reference.
+/// Loops of one structure, and the step of their reference.
 #[derive(FromPyObject)]
 pub(crate) struct LoopSets<'py> {
     states: usize,
-    rows: Floats<'py>,
+    /// How many loops.
+    size: usize,
+    /// Numbers in the order of a row: one number for all loops, or an array of one for each.
+    entries: Vec<Entry<'py>>,
     amplitude: f64,
     is_ahead: bool,
 }
 
-impl LoopSets<'_> {
-    fn read<'a>(&self, rows: &'a [f64]) -> Sets<'a> {
-        Sets {
-            states: self.states,
-            rows,
-            amplitude: self.amplitude,
-            is_ahead: self.is_ahead,
+/// One number for all loops, or one for each.
+#[derive(FromPyObject)]
+pub(crate) enum Entry<'py> {
+    Shared(f64),
+    Each(Floats<'py>),
+}
+
+impl<'py> Entry<'py> {
+    fn numbers(&self) -> PyResult<Cow<'_, [f64]>> {
+        match self {
+            Self::Shared(number) => Ok(Cow::Borrowed(std::slice::from_ref(number))),
+            Self::Each(numbers) => in_order(numbers),
         }
+    }
+}
+
+impl LoopSets<'_> {
+    fn numbers(&self) -> PyResult<Vec<Cow<'_, [f64]>>> {
+        self.entries.iter().map(Entry::numbers).collect()
+    }
+
+    fn read<'a>(&self, entries: &'a [&'a [f64]]) -> PyResult<Sets<'a>> {
+        converted(Sets::new(
+            self.states,
+            self.size,
+            entries,
+            self.amplitude,
+            self.is_ahead,
+        ))
     }
 }
 
@@ -71,7 +97,7 @@ pub(crate) struct LoopSensitivities {
 
 /// Measure step responses of `span` seconds.
 #[pyfunction]
-#[pyo3(signature = (sets, *, steady_state, span, settling, rise, threads=None, progress=None))]
+#[pyo3(signature = (sets, *, steady_state, slowest_time, span, settling, rise, threads=None, progress=None))]
 #[expect(
     clippy::too_many_arguments,
     reason = "keywords with the names of the public function"
@@ -79,18 +105,21 @@ pub(crate) struct LoopSensitivities {
 pub(crate) fn sweep_metrics<'py>(
     py: Python<'py>,
     sets: LoopSets<'py>,
-    steady_state: Floats<'py>,
+    steady_state: Entry<'py>,
+    slowest_time: Entry<'py>,
     span: f64,
     settling: f64,
     rise: (f64, f64),
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SweepMetrics> {
-    let (rows, steady) = (in_order(&sets.rows)?, in_order(&steady_state)?);
-    let sets = sets.read(&rows);
+    let (numbers, steady) = (sets.numbers()?, steady_state.numbers()?);
+    let slowest = slowest_time.numbers()?;
+    let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
+    let sets = sets.read(&entries)?;
     let criteria = Criteria { rise, settling };
     let found = run(py, threads, progress.as_ref(), |task| {
-        ensemble::metrics(&sets, &steady, span, &criteria, task)
+        ensemble::metrics(&sets, (&steady, &slowest), span, &criteria, task)
     })?;
     let metrics = PyDict::new(py);
     for (name, metric) in METRICS {
@@ -114,8 +143,9 @@ pub(crate) fn sweep_responses<'py>(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SweepResponses> {
-    let (rows, times) = (in_order(&sets.rows)?, in_order(&time)?);
-    let sets = sets.read(&rows);
+    let (numbers, times) = (sets.numbers()?, in_order(&time)?);
+    let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
+    let sets = sets.read(&entries)?;
     let (outputs, found) = run(py, threads, progress.as_ref(), |task| {
         ensemble::responses(&sets, &times, task)
     })?;

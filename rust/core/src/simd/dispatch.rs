@@ -79,3 +79,28 @@ impl Instructions {
         }
     }
 }
+
+/// A part of a kernel that is compiled once and called, where inlining it everywhere would make the
+/// kernel too large for the compiler. Implementations of `run` are `#[inline(always)]`.
+pub(crate) trait Outlined {
+    type Output;
+
+    fn run(self) -> Self::Output;
+}
+
+struct Call<T>(T);
+
+impl<T: Outlined> WithSimd for Call<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> T::Output {
+        self.0.run()
+    }
+}
+
+/// Run `part` with the instructions of `simd`, in a function of its own.
+#[inline(never)]
+pub(crate) fn outlined<S: Simd, T: Outlined>(simd: S, part: T) -> T::Output {
+    simd.vectorize(Call(part))
+}

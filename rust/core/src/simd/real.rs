@@ -15,6 +15,21 @@ pub(crate) struct Real<S: Simd> {
     pub(super) lanes: [S::f64s; 2],
 }
 
+/// Two vectors.
+pub(crate) type Lanes<S> = [<S as Simd>::f64s; 2];
+
+/// The numbers of vectors one after the other.
+#[inline(always)]
+pub(crate) fn flat<S: Simd>(lanes: &[Lanes<S>]) -> &[f64] {
+    cast_slice(lanes.as_flattened())
+}
+
+/// The same for writing.
+#[inline(always)]
+pub(crate) fn flat_mut<S: Simd>(lanes: &mut [Lanes<S>]) -> &mut [f64] {
+    cast_slice_mut(lanes.as_flattened_mut())
+}
+
 /// A truth value for each lane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mask<S: Simd> {
@@ -44,6 +59,12 @@ impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn splat(simd: S, value: f64) -> Self {
         Self::new(simd, [simd.splat_f64s(value); 2])
+    }
+
+    /// The instructions that compute with it.
+    #[inline(always)]
+    pub(crate) fn simd(self) -> S {
+        self.simd
     }
 
     #[inline(always)]
@@ -116,6 +137,26 @@ impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn ge(self, other: impl Operand<S>) -> Mask<S> {
         other.spread(self).le(self)
+    }
+
+    /// The larger of two numbers neither of which is NaN; of two zeros, either.
+    #[inline(always)]
+    pub(crate) fn max(self, other: Self) -> Self {
+        let ([a, b], [c, d]) = (self.lanes, other.lanes);
+        Self::new(
+            self.simd,
+            [self.simd.max_f64s(a, c), self.simd.max_f64s(b, d)],
+        )
+    }
+
+    /// The smaller of two numbers neither of which is NaN; of two zeros, either.
+    #[inline(always)]
+    pub(crate) fn min(self, other: Self) -> Self {
+        let ([a, b], [c, d]) = (self.lanes, other.lanes);
+        Self::new(
+            self.simd,
+            [self.simd.min_f64s(a, c), self.simd.min_f64s(b, d)],
+        )
     }
 
     /// The larger of two numbers neither of which is NaN.

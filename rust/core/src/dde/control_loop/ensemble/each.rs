@@ -4,17 +4,22 @@ use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::metrics::{Criteria, Metrics};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
+use crate::dde::control_loop::row::Row;
 use crate::dde::control_loop::step_metrics::StepMetrics;
 use crate::memory::collected;
 use crate::{Error, Task};
 
 use super::sets::{Outcome, Sets};
 
-/// Metrics of one set.
+/// A response has settled if it was inside its band for so many of the slowest time constants of the
+/// loop.
+pub(super) const TIME_CONSTANTS: f64 = 3.0;
+
+/// Metrics of one set, with its steady state and the slowest time constant of plant and controller.
 pub(super) fn metrics(
     sets: &Sets<'_>,
     set: usize,
-    steady: f64,
+    (steady, slowest): (f64, f64),
     span: f64,
     criteria: &Criteria,
     task: &Task,
@@ -30,12 +35,21 @@ pub(super) fn metrics(
             Err(outcome) => return Ok((Metrics::UNKNOWN, outcome)),
         }
     }
-    let row = sets.row(set)?;
+    let row = sets.row(set);
+    let row = Row::new(sets.states(), &row)?;
     let wait = row.delay + row.sample_time;
     let mut metrics = StepMetrics::new(ahead, ahead + span, steady, *criteria);
     let requested = RequestedOutput::new(&end, &[], 0.0)?.measured_by(&mut metrics);
     Ok(match run(sets, &plant, requested, task)? {
-        Ok(_) => judged(metrics.metrics(), metrics.stays_settled(wait)),
+        Ok(_) => {
+            let (metrics, outcome) = judged(metrics.metrics(), metrics.stays_settled(wait));
+            let inside = span - metrics.settling_time;
+            if outcome == Outcome::Ok && TIME_CONSTANTS * slowest > inside {
+                (metrics, Outcome::Doubtful)
+            } else {
+                (metrics, outcome)
+            }
+        }
         Err(outcome) => (Metrics::UNKNOWN, outcome),
     })
 }
@@ -74,8 +88,12 @@ pub(super) fn judged(metrics: Metrics, stays_settled: bool) -> (Metrics, Outcome
 /// The loop and the time by which its output is read ahead; none where the numbers are not those of
 /// a loop.
 fn loop_of(sets: &Sets<'_>, set: usize) -> Result<Option<(LinearLoop, f64)>, Error> {
-    let row = sets.row(set)?;
-    Ok(row.checked().ok().map(|plant| (plant, sets.ahead(&row))))
+    let row = sets.row(set);
+    let row = Row::new(sets.states(), &row)?;
+    Ok(row
+        .checked()
+        .ok()
+        .map(|plant| (plant, sets.ahead(row.delay))))
 }
 
 fn run(
@@ -85,7 +103,7 @@ fn run(
     task: &Task,
 ) -> Result<Result<Trajectory, Outcome>, Error> {
     let start = Start {
-        state: vec![0.0; sets.states],
+        state: vec![0.0; sets.states()],
         ..Start::default()
     };
     let reference = Reference::step(0.0, sets.amplitude)?;

@@ -1,7 +1,7 @@
-//! Loops of one structure, one in each row of an array.
+//! Loops of one structure, one set of numbers for each.
 
 use crate::Error;
-use crate::dde::control_loop::row::{Row, width};
+use crate::dde::control_loop::row::width;
 
 /// Outcome of one set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -24,30 +24,82 @@ pub enum Outcome {
 #[derive(Debug, Clone, Copy)]
 pub struct Sets<'a> {
     /// Number of states.
-    pub states: usize,
-    /// One row for each set: A, B, E, K, C, L, M, D, impulse, delay, sample time (0 for none),
-    /// limit (∞ for none).
-    pub rows: &'a [f64],
+    states: usize,
+    count: usize,
+    entries: &'a [&'a [f64]],
     /// Height of the step.
-    pub amplitude: f64,
+    pub(super) amplitude: f64,
     /// Is the delay in the measurement, so that the output is read ahead by it?
-    pub is_ahead: bool,
+    pub(super) is_ahead: bool,
 }
 
 impl<'a> Sets<'a> {
+    /// `count` loops with `states` states. `entries` are their numbers in the order of a row: A, B,
+    /// E, K, C, L, M, D, impulse, delay, sample time (0 for none), limit (∞ for none), each of them
+    /// one number for all loops or one for each.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there are other numbers of entries, or entries of other lengths.
+    pub fn new(
+        states: usize,
+        count: usize,
+        entries: &'a [&'a [f64]],
+        amplitude: f64,
+        is_ahead: bool,
+    ) -> Result<Self, Error> {
+        refuse_if!(
+            entries.len() != width(states),
+            "{} entries: a loop with {states} states has {}",
+            entries.len(),
+            width(states)
+        );
+        for entry in entries {
+            refuse_if!(
+                entry.len() != 1 && entry.len() != count,
+                "an entry has {} numbers: give one, or one for each of {count} loops",
+                entry.len()
+            );
+        }
+        Ok(Self {
+            states,
+            count,
+            entries,
+            amplitude,
+            is_ahead,
+        })
+    }
+
     /// Number of sets.
     pub(super) fn len(&self) -> usize {
-        self.rows.len() / width(self.states)
+        self.count
     }
 
-    pub(super) fn row(&self, set: usize) -> Result<Row<'a>, Error> {
-        let width = width(self.states);
-        let row = self.rows.get(set * width..(set + 1) * width);
-        Row::new(self.states, row.unwrap_or_default())
+    /// Number of states.
+    pub(super) fn states(&self) -> usize {
+        self.states
     }
 
-    /// Time by which the output is read ahead of the simulation.
-    pub(super) fn ahead(&self, row: &Row<'_>) -> f64 {
-        if self.is_ahead { row.delay } else { 0.0 }
+    /// The entries in the order of a row.
+    pub(super) fn entries(&self) -> &'a [&'a [f64]] {
+        self.entries
+    }
+
+    /// The numbers of a set.
+    pub(super) fn row(&self, set: usize) -> Vec<f64> {
+        self.entries.iter().map(|entry| of(entry, set)).collect()
+    }
+
+    /// Time by which the output of a loop with `delay` is read ahead of the simulation.
+    pub(super) fn ahead(&self, delay: f64) -> f64 {
+        if self.is_ahead { delay } else { 0.0 }
+    }
+}
+
+/// The number of `set` in an entry.
+#[inline]
+pub(super) fn of(entry: &[f64], set: usize) -> f64 {
+    match entry {
+        [shared] => *shared,
+        each => each.get(set).copied().unwrap_or(f64::NAN),
     }
 }

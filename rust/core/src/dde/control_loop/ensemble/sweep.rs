@@ -2,11 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::block::Block;
-use super::sets::{Outcome, Sets};
-use super::{block, corners, each, measured};
+use super::block::{Column, SETS};
+use super::each;
+use super::metrics::MetricsJob;
+use super::responses::ResponsesJob;
+use super::sets::{Outcome, Sets, of};
+use super::shape::{Shapes, plant_states};
+use super::through::{Job, Member, through};
+use super::trace::SAMPLES;
 use crate::dde::control_loop::metrics::{Criteria, Metrics};
-use crate::memory::{filled, push, reserved, room};
+use crate::memory::{filled, reserved, room};
 use crate::{Error, Task};
 
 /// What memory is requested for, in errors.
@@ -15,51 +20,40 @@ const SWEEP: &str = "the sweep";
 /// Results held before they are written to their places: enough to keep all threads busy.
 const AT_ONCE: usize = 1 << 14;
 
+/// Blocks in one task of a thread: few enough to share small sweeps, and enough to make the trace
+/// of a task seldom.
+const BLOCKS: usize = 8;
+
 /// Upper limit on the values of responses held at a time (bounds memory to a share of the result).
 const VALUES_AT_ONCE: usize = 1 << 22;
 
-/// The number of whole samples in the delay of a set, and the index of the set.
-type Alike = (usize, usize);
-
 impl Sets<'_> {
-    /// The sets for the vectorised code, ordered by the number of whole samples in their delay, and
-    /// the remaining sets, for responses of `span` seconds.
-    fn sorted(&self, span: f64) -> Result<(Vec<Alike>, Vec<usize>), Error> {
-        let mut fit = Vec::new();
-        let mut left = Vec::new();
-        for set in 0..self.len() {
-            match block::samples_in_delay(&self.row(set)?, span) {
-                Some(samples) => push(SWEEP, &mut fit, (samples, set))?,
-                None => push(SWEEP, &mut left, set)?,
-            }
-        }
-        fit.sort_unstable();
-        Ok((fit, left))
-    }
-
-    /// Process all sets, blocks with `side_by_side` and single sets with `alone`. `keep` receives
-    /// every set with its result; at most `at_once` results are held before.
-    fn each<T: Send>(
+    /// Process all sets, blocks with `job` and single sets with `alone`. `keep` receives every set
+    /// with its result; at most `at_once` results are held before.
+    fn each<J: Job>(
         &self,
         (span, at_once): (f64, usize),
         task: &Task,
-        side_by_side: impl Fn(&Block, &[usize]) -> Result<Vec<T>, Error> + Sync,
-        alone: impl Fn(usize) -> Result<T, Error> + Sync,
-        mut keep: impl FnMut(usize, T),
+        job: &J,
+        alone: impl Fn(usize) -> Result<J::Found, Error> + Sync,
+        mut keep: impl FnMut(usize, J::Found),
     ) -> Result<(), Error> {
-        let (fit, left) = self.sorted(span)?;
-        let alike = fit.chunk_by(|one, other| one.0 == other.0);
-        let mut blocks = reserved(SWEEP, fit.len())?;
-        blocks.extend(alike.flat_map(|group| group.chunks(block::SETS)));
-        for group in blocks.chunks(at_once.div_ceil(block::SETS)) {
-            let work = |members: &&[Alike]| {
+        let (alike, left) = Shapes::new(self)?.sorted(span)?;
+        let plant = plant_states(self);
+        let mut blocks: Vec<&[Member]> = reserved(SWEEP, alike.len())?;
+        let groups = alike.chunk_by(|one, other| one.0 == other.0);
+        blocks.extend(groups.flat_map(|group| group.chunks(SETS)));
+        for group in blocks.chunks(at_once.div_ceil(SETS)) {
+            let work = |blocks: &[&[Member]]| {
                 task.check()?;
-                let sets: Vec<usize> = members.iter().map(|&(_, set)| set).collect();
-                let found = side_by_side(&Block::new(self, &sets)?, &sets)?;
-                task.advance(sets.len() as u64);
+                let longest = blocks.iter().flat_map(|block| block.first());
+                let samples = longest.map(|(shape, _)| shape.samples).max();
+                room::<Column>(SWEEP, samples.unwrap_or(0) as usize + SAMPLES)?;
+                let found = through(self, plant, blocks, span, job);
+                task.advance(found.len() as u64);
                 Ok(found)
             };
-            let found: Result<Vec<_>, Error> = group.par_iter().map(work).collect();
+            let found: Result<Vec<_>, Error> = group.par_chunks(BLOCKS).map(work).collect();
             let members = group.iter().copied().flatten();
             let found = found?.into_iter().flatten();
             members
@@ -85,25 +79,30 @@ impl Sets<'_> {
 
 /// Metrics of every response from its start to `span` seconds after it.
 ///
-/// `steady` holds the steady state of each set, NaN where its last output is to count as that.
+/// `steady` holds the steady state of each set, or one for all, NaN where its last output is to
+/// count as that; `slowest` the slowest time constant of its plant and controller.
 pub fn metrics(
     sets: &Sets<'_>,
-    steady: &[f64],
+    (steady, slowest): (&[f64], &[f64]),
     span: f64,
     criteria: &Criteria,
     task: &Task,
 ) -> Result<Vec<(Metrics, Outcome)>, Error> {
-    let goal = |set: usize| steady.get(set).copied().unwrap_or(f64::NAN);
     let mut found = filled(SWEEP, (Metrics::UNKNOWN, Outcome::Refused), sets.len())?;
+    let job = MetricsJob {
+        steady,
+        slowest,
+        span,
+        criteria: *criteria,
+    };
     sets.each(
         (span, AT_ONCE),
         task,
-        |block, members| {
-            let goals: Vec<f64> = members.iter().map(|&set| goal(set)).collect();
-            room::<block::Column>(SWEEP, block.samples)?;
-            Ok(measured::metrics(block, &goals, span, criteria))
+        &job,
+        |set| {
+            let numbers = (of(steady, set), of(slowest, set));
+            each::metrics(sets, set, numbers, span, criteria, task)
         },
-        |set| each::metrics(sets, set, goal(set), span, criteria, task),
         |set, result| {
             if let Some(place) = found.get_mut(set) {
                 *place = result;
@@ -127,7 +126,7 @@ pub fn responses(
     sets.each(
         (span, (VALUES_AT_ONCE / length.max(1)).clamp(1, AT_ONCE)),
         task,
-        |block, members| corners::responses(block, members.len(), times),
+        &ResponsesJob { times },
         |set| each::response(sets, set, times, task),
         |set, (values, outcome)| {
             if let Some(row) = outputs.get_mut(set * length..(set + 1) * length)

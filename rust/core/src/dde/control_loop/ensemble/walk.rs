@@ -1,193 +1,336 @@
-//! Sample by sample through a block, one set in each lane.
-//!
-//! Between a sample and the arrival of a command, and from there to the next sample, every output
-//! of a block is a line; a [`Sink`] receives each of them once.
+//! Sample by sample through the loops of two vectors.
+
+#![expect(
+    clippy::manual_memcpy,
+    reason = "indices as in the formulas; closures would not be compiled for the vectors"
+)]
 
 use crate::dde::limits::DIVERGED;
-use crate::simd::{Mask, Real, Simd};
+use crate::simd::{Mask, Outlined, Real, Simd, outlined};
 
-use super::block::{Block, Column, Hold};
+use super::decay::{Decay, Within};
+use super::loops::Loops;
+use super::trace::{CHUNK, SAMPLES, Summary, Trace};
+use super::transition::row;
 
-/// A line from (`begin`, `first`) to (`end`, `last`).
-#[derive(Clone, Copy)]
-pub(super) struct Line<S: Simd> {
-    pub(super) begin: Real<S>,
-    pub(super) end: Real<S>,
-    pub(super) first: Real<S>,
-    pub(super) last: Real<S>,
+/// Runs of loops with any number of states.
+pub(super) trait Run<S: Simd> {
+    /// Begin again, with a sample at the end of the run if that is closed.
+    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool);
+
+    /// Run on for as many samples as a trace holds. False, if the runs of all loops are over.
+    fn advance(&mut self, trace: &mut Trace<S>) -> bool;
+
+    /// Are the runs of all loops over?
+    fn is_over(&self) -> bool;
+
+    /// The loops whose response exceeds all limits before its end.
+    fn lost(&self) -> Mask<S>;
+
+    /// Are all poles of the loops without their limits within `radius` of zero?
+    fn decay(&self, radius: Real<S>) -> Decay<S>;
 }
 
-impl<S: Simd> Line<S> {
-    /// Remove the part after `end`.
+/// A run from rest.
+pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
+    loops: &'a Loops<S, N, P>,
+    x: [Real<S>; N],
+    output: Real<S>,
+    /// The output at the last corner inside of the run.
+    inside: Real<S>,
+    /// Number of the next sample.
+    number: usize,
+    /// Does the run include a sample at its end?
+    is_closed: bool,
+    lost: Mask<S>,
+}
+
+impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
     #[inline(always)]
-    pub(super) fn until(self, end: Real<S>) -> Self {
-        let beyond = self.end.gt(end);
-        if !beyond.any() {
-            return self;
-        }
-        let part = (end - self.begin) / (self.end - self.begin);
-        let last = (self.last - self.first).mul_add(part, self.first);
+    pub(super) fn new(loops: &'a Loops<S, N, P>) -> Self {
+        let plants = &loops.plants;
         Self {
-            end: beyond.select(end, self.end),
-            last: beyond.select(last, self.last),
-            ..self
+            loops,
+            x: [plants.zero; N],
+            output: plants.first_output,
+            inside: plants.first_output,
+            number: 0,
+            is_closed: false,
+            lost: plants.no_lane,
         }
     }
 
-    /// The time at which the line reaches `level`, which lies between its ends.
+    /// Time of sample `number`.
     #[inline(always)]
-    pub(super) fn time_of(self, level: Real<S>) -> Real<S> {
-        let part = (level - self.first) / (self.last - self.first);
-        (self.end - self.begin).mul_add(part, self.begin)
+    fn time(&self, number: usize) -> Real<S> {
+        self.loops.plants.sample_time * number as f64
     }
-}
 
-/// Receives the lines of a response.
-pub(super) trait Sink<S: Simd> {
-    fn line(&mut self, line: Line<S>);
-}
-
-/// Vector pair number `pair` of a column.
-#[inline(always)]
-pub(super) fn load<S: Simd>(simd: S, column: &Column, pair: usize) -> Real<S> {
-    match S::as_simd_f64s(column).0.as_chunks().0.get(pair) {
-        Some([a, b]) => Real::new(simd, [*a, *b]),
-        None => Real::splat(simd, 0.0),
-    }
-}
-
-/// Store a vector pair in its place in a column.
-#[inline(always)]
-pub(super) fn store<S: Simd>(column: &mut Column, pair: usize, value: Real<S>) {
-    if let Some(place) = S::as_mut_simd_f64s(column)
-        .0
-        .as_chunks_mut()
-        .0
-        .get_mut(pair)
-    {
-        *place = value.lanes();
-    }
-}
-
-/// One part of a sample, in all lanes.
-struct Step<S: Simd, const N: usize> {
-    growth: [[Real<S>; N]; N],
-    drive: [Real<S>; N],
-    push: [Real<S>; N],
-}
-
-impl<S: Simd, const N: usize> Step<S, N> {
+    /// Are the runs of all loops over?
     #[inline(always)]
-    fn new(simd: S, hold: &Hold, pair: usize) -> Self {
-        let zero = Real::splat(simd, 0.0);
-        let mut step = Self {
-            growth: [[zero; N]; N],
-            drive: [zero; N],
-            push: [zero; N],
-        };
-        let rows = step.growth.iter_mut().flatten().zip(&hold.growth);
-        rows.for_each(|(place, column)| *place = load(simd, column, pair));
-        let drive = step.drive.iter_mut().zip(&hold.drive);
-        drive.for_each(|(place, column)| *place = load(simd, column, pair));
-        let push = step.push.iter_mut().zip(&hold.push);
-        push.for_each(|(place, column)| *place = load(simd, column, pair));
-        step
+    fn ends(&self) -> bool {
+        let now = self.time(self.number);
+        let plants = &self.loops.plants;
+        !if self.is_closed {
+            // Rounding errors do not part the last sample from the end.
+            let rounding = (plants.end + plants.sample_time) * (32.0 * f64::EPSILON);
+            now.le(plants.end + rounding).any()
+        } else {
+            now.lt(self.loops.plants.end).any()
+        }
     }
 
+    /// See [`Run::advance`].
     #[inline(always)]
-    fn apply(&self, x: &mut [Real<S>; N], w: Real<S>) {
-        let old = *x;
-        for (i, x) in x.iter_mut().enumerate() {
-            let mut change = self.drive[i].mul_add(w, self.push[i]);
-            for (growth, x) in self.growth[i].iter().zip(&old) {
-                change = growth.mul_add(*x, change);
+    fn go_on(&mut self, trace: &mut Trace<S>) -> bool {
+        let loops = &self.loops.plants;
+        if self.ends() {
+            return false;
+        }
+        let zero = loops.d.constant(0.0);
+        if self.number > 0 {
+            // The commands that have not arrived yet.
+            let history = trace.samples..=trace.samples + loops.samples;
+            trace.commands.copy_within(history, 0);
+        }
+        longer(&mut trace.outputs, SAMPLES * trace.per_sample, zero.lanes());
+        if loops.is_curved {
+            longer(&mut trace.states, SAMPLES * P, zero);
+            longer(&mut trace.bulges, SAMPLES, zero.lanes());
+        }
+        trace.chunks.clear();
+        (trace.first, trace.samples, trace.begin) = (self.number, 0, self.output);
+        trace.count = zero;
+        trace.is_cut = zero.lt(0.0);
+        while trace.samples < SAMPLES && !self.ends() {
+            let is_whole = self.time(self.number + CHUNK).le(loops.end);
+            if (!is_whole).any() {
+                self.chunk::<true>(trace);
+            } else {
+                self.chunk::<false>(trace);
             }
-            *x = old[i] + change;
         }
+        true
+    }
+
+    /// Advance by [`CHUNK`] samples; if `ENDS`, some run ends within them.
+    #[inline(always)]
+    fn chunk<const ENDS: bool>(&mut self, trace: &mut Trace<S>) {
+        let feedback = self.loops;
+        let loops = &feedback.plants;
+        let mut summary = Summary {
+            most: self.inside,
+            least: self.inside,
+            bulge: loops.zero,
+        };
+        let mut ends = Ends {
+            count: trace.count,
+            is_cut: trace.is_cut,
+            inside: self.inside,
+            run_end: loops.end,
+        };
+        let is_late = loops.parts.first().is_some_and(|part| part.is_after);
+        let (mut x, mut output, mut number) = (self.x, self.output, self.number);
+        let (mut lost, lowest) = (self.lost, -loops.limit);
+        let first_sample = trace.samples;
+        for sample in first_sample..first_sample + CHUNK {
+            let now = loops.sample_time * number as f64;
+            let Some(commands) = trace.commands.get_mut(sample..=sample + loops.samples + 1) else {
+                break;
+            };
+            let before = commands.first().copied().unwrap_or(loops.zero);
+            let u = row(&feedback.k, &x, feedback.l.mul_add(before, loops.command));
+            if ENDS {
+                lost = lost | (now.lt(loops.end) & !is_sound(&x, u));
+            }
+            let w = u.min(loops.limit).max(lowest);
+            if let Some(place) = commands.last_mut() {
+                *place = w;
+            }
+            let after = commands.get(1).copied().unwrap_or(w);
+            if loops.is_curved {
+                let held = if is_late { after } else { before };
+                let mut bulge = (after - before).abs() * loops.bulge_of_jump;
+                for i in 0..P {
+                    let forced = loops.b[i].mul_add(held, loops.e[i]);
+                    let slope = row(&loops.a[i], &first(&x), forced);
+                    bulge = slope.abs().mul_add(loops.bulge[i], bulge);
+                }
+                summary.bulge = summary.bulge.max(bulge);
+                if let Some(place) = trace.bulges.get_mut(sample) {
+                    *place = bulge.lanes();
+                }
+                if let Some(places) = trace.states.get_mut(sample * P..(sample + 1) * P) {
+                    for i in 0..P {
+                        places[i] = x[i];
+                    }
+                }
+            }
+            let corners = sample * trace.per_sample..(sample + 1) * trace.per_sample;
+            let Some((last, places)) = trace
+                .outputs
+                .get_mut(corners)
+                .and_then(<[_]>::split_last_mut)
+            else {
+                break;
+            };
+            let is_hidden = loops.hides && number <= loops.samples;
+            let mut begin = now;
+            for (corner, place) in loops.corners.iter().zip(places) {
+                let mut forced = corner.before * before;
+                if corner.is_after {
+                    forced = corner.after.mul_add(after, forced);
+                }
+                if loops.is_pushed {
+                    forced = forced + corner.constant;
+                }
+                output = row(&corner.states, &first(&x), forced);
+                if is_hidden && !(corner.is_after && number == loops.samples) {
+                    output = loops.first_output;
+                }
+                *place = output.lanes();
+                if ENDS {
+                    let end = now + corner.offset;
+                    ends.corner(&mut summary, output, begin, end);
+                    begin = end;
+                } else {
+                    summary.most = summary.most.max(output);
+                    summary.least = summary.least.min(output);
+                }
+            }
+            x = feedback.step.apply(&x, before, after);
+            output = x[0];
+            if !loops.is_first {
+                output = row(&loops.c, &first(&x), loops.zero);
+            }
+            if loops.is_direct {
+                output = loops.d.mul_add(after, output);
+            }
+            if is_hidden && number < loops.samples {
+                output = loops.first_output;
+            }
+            *last = output.lanes();
+            number += 1;
+            if ENDS {
+                let end = loops.sample_time * number as f64;
+                ends.corner(&mut summary, output, begin, end);
+            } else {
+                summary.most = summary.most.max(output);
+                summary.least = summary.least.min(output);
+            }
+        }
+        if ENDS {
+            (trace.count, trace.is_cut) = (ends.count, ends.is_cut);
+            self.inside = ends.inside;
+        } else {
+            trace.count = trace.count + (CHUNK * trace.per_sample) as f64;
+            self.inside = output;
+            lost = lost | !is_sound(&x, loops.zero);
+        }
+        (self.x, self.output, self.number, self.lost) = (x, output, number, lost);
+        trace.samples = first_sample + CHUNK;
+        trace.chunks.push(summary);
     }
 }
 
-/// Run to `end`, a time for each lane. Returns the lanes whose response exceeds all limits before.
+/// Are all states, and `u`, within all limits?
 #[inline(always)]
-pub(super) fn walk<S: Simd, const N: usize>(
-    simd: S,
-    block: &Block,
-    pair: usize,
-    end: Real<S>,
-    sink: &mut impl Sink<S>,
-) -> Mask<S> {
-    let zero = Real::splat(simd, 0.0);
-    let columns = |from: &[Column]| {
-        let mut out = [zero; N];
-        for (place, column) in out.iter_mut().zip(from) {
-            *place = load(simd, column, pair);
-        }
-        out
-    };
-    let (k, c) = (columns(&block.k), columns(&block.c));
-    let (l, command) = (load(simd, &block.l, pair), load(simd, &block.command, pair));
-    let limit = load(simd, &block.limit, pair);
-    let sample_time = load(simd, &block.sample_time, pair);
-    let arrival = load(simd, &block.arrival, pair);
-    let early = Step::<S, N>::new(simd, &block.early, pair);
-    let late = Step::<S, N>::new(simd, &block.late, pair);
-    let row = |row: &[Real<S>; N], x: &[Real<S>; N], start: Real<S>| {
-        row.iter()
-            .zip(x)
-            .fold(start, |sum, (k, x)| k.mul_add(*x, sum))
-    };
-
-    // Commands by sample number, modulo the length; zero before the start.
-    let length = block.samples + 2;
-    let mut commands = vec![zero; length];
-    let mut x = [zero; N];
-    let mut lost = zero.lt(0.0);
-    let mut number = 0_usize;
-    let mut now = zero;
-    let mut output = zero;
-    loop {
-        let running = now.lt(end);
-        if !running.any() {
-            return lost;
-        }
-        // Index of m + 1 samples ago: one place ahead in a ring of length m + 2.
-        let place = number % length;
-        let before = commands.get((place + 1) % length).copied().unwrap_or(zero);
-        let u = row(&k, &x, l.mul_add(before, command));
-        let mut largest = u.abs();
-        for x in &x {
-            largest = largest.larger(x.abs());
-        }
-        lost = lost | (running & !(largest.le(DIVERGED) & u.abs().le(DIVERGED)));
-        let u = u.smaller(limit).larger(-limit);
-        if let Some(place) = commands.get_mut(place) {
-            *place = u;
-        }
-        let after = commands.get((place + 2) % length).copied().unwrap_or(u);
-        let next = sample_time * (number + 1) as f64;
-        let mut switch = now;
-        if block.is_split {
-            switch = now + arrival;
-            early.apply(&mut x, before);
-            let last = row(&c, &x, zero);
-            sink.line(Line {
-                begin: now,
-                end: switch,
-                first: output,
-                last,
-            });
-            output = last;
-        }
-        late.apply(&mut x, after);
-        let last = row(&c, &x, zero);
-        sink.line(Line {
-            begin: switch,
-            end: next,
-            first: output,
-            last,
-        });
-        output = last;
-        now = next;
-        number += 1;
+fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
+    let mut sound = u.abs().le(DIVERGED);
+    for x in x {
+        sound = sound & x.abs().le(DIVERGED);
     }
+    sound
+}
+
+/// Corners of runs that end.
+struct Ends<S: Simd> {
+    count: Real<S>,
+    is_cut: Mask<S>,
+    inside: Real<S>,
+    run_end: Real<S>,
+}
+
+impl<S: Simd> Ends<S> {
+    /// The output at the end of a part between two times.
+    #[inline(always)]
+    fn corner(&mut self, summary: &mut Summary<S>, output: Real<S>, begin: Real<S>, end: Real<S>) {
+        let running = begin.lt(self.run_end);
+        let inside = running & end.le(self.run_end);
+        self.count = inside.select(self.count + 1.0, self.count);
+        self.is_cut = self.is_cut | (running & !inside);
+        summary.most = inside.select(summary.most.max(output), summary.most);
+        summary.least = inside.select(summary.least.min(output), summary.least);
+        self.inside = inside.select(output, self.inside);
+    }
+}
+
+impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
+    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool) {
+        let plants = &self.loops.plants;
+        let zero = plants.zero;
+        self.x = [zero; N];
+        (self.output, self.inside) = (plants.first_output, plants.first_output);
+        self.number = 0;
+        self.is_closed = is_closed;
+        self.lost = plants.no_lane;
+        let history = plants.samples + 1;
+        longer(&mut trace.commands, history + SAMPLES, zero);
+        trace
+            .commands
+            .iter_mut()
+            .take(history)
+            .for_each(|u| *u = zero);
+        trace.per_sample = plants.parts.len();
+    }
+
+    fn advance(&mut self, trace: &mut Trace<S>) -> bool {
+        let simd = self.output.simd();
+        outlined(simd, Advance { walk: self, trace })
+    }
+
+    fn is_over(&self) -> bool {
+        self.ends()
+    }
+
+    fn lost(&self) -> Mask<S> {
+        self.lost
+    }
+
+    fn decay(&self, radius: Real<S>) -> Decay<S> {
+        let loops = self.loops;
+        outlined(radius.simd(), Within { loops, radius })
+    }
+}
+
+/// See [`Run::advance`].
+struct Advance<'a, 'b, S: Simd, const N: usize, const P: usize> {
+    walk: &'a mut Walk<'b, S, N, P>,
+    trace: &'a mut Trace<S>,
+}
+
+impl<S: Simd, const N: usize, const P: usize> Outlined for Advance<'_, '_, S, N, P> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        self.walk.go_on(self.trace)
+    }
+}
+
+/// Bring `numbers` to at least `length`.
+fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
+    if numbers.len() < length {
+        numbers.resize(length, zero);
+    }
+}
+
+/// The states of the plant.
+#[inline(always)]
+fn first<S: Simd, const N: usize, const P: usize>(x: &[Real<S>; N]) -> [Real<S>; P] {
+    let mut out = [x[0]; P];
+    for i in 0..P.min(N) {
+        out[i] = x[i];
+    }
+    out
 }

@@ -1,0 +1,102 @@
+"""Vectors and matrices whose entries are numbers, or the numbers of many loops.
+
+The equations of a loop are written down once. With `Each` in the place of its numbers they give the
+entries of the matrices of many loops; with complex numbers, slopes by the complex step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Each:
+    """One number for each of many loops, which counts as a single number in a matrix.
+
+    Zero and one, of which matrices are full, cost nothing.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (n,)
+    """
+
+    __slots__ = ("numbers",)
+
+    def __init__(self, numbers: NDArray[np.float64]) -> None:
+        self.numbers = numbers
+
+    def _with(self, other: Any, operation: Callable[..., Any]) -> Any:
+        if isinstance(other, np.ndarray):
+            # An array of entries, each of which meets these numbers.
+            return NotImplemented
+        return Each(operation(self.numbers, other.numbers if isinstance(other, Each) else other))
+
+    def __add__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else self._with(other, np.add)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return self if _is(other, 0.0) else self._with(other, np.subtract)
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self if _is(other, 0.0) else self._with(other, lambda mine, its: its - mine)
+
+    def __mul__(self, other: Any) -> Any:
+        if _is(other, 0.0):
+            return 0.0
+        return self if _is(other, 1.0) else self._with(other, np.multiply)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        return self if _is(other, 1.0) else self._with(other, np.divide)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self._with(other, lambda mine, its: its / mine)
+
+    def __neg__(self) -> Each:
+        return Each(-self.numbers)
+
+    def __ne__(self, other: object) -> bool:
+        """Whether it is other than a number in any loop."""
+        return bool(np.any(self.numbers != other))
+
+    def __eq__(self, other: object) -> bool:
+        return not self != other
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _is(other: Any, number: float) -> bool:
+    return isinstance(other, (int, float)) and other == number
+
+
+def vector(entries: Sequence[Any]) -> NDArray[Any]:
+    """Array of the entries."""
+    if all(type(entry) is float for entry in entries):
+        return np.array(entries, dtype=np.float64)
+    if any(isinstance(entry, Each) for entry in entries):
+        return np.array(entries, dtype=object)
+    return np.array(entries, dtype=np.result_type(np.float64, *(type(e) for e in entries)))
+
+
+def matrix(rows: Sequence[Sequence[Any]]) -> NDArray[Any]:
+    """Array of shape (m, n) from m rows of n entries."""
+    flat = vector([entry for row in rows for entry in row])
+    return flat.reshape(len(rows), -1 if rows else 0)
+
+
+def zeros(shape: tuple[int, ...], *like: NDArray[Any]) -> NDArray[Any]:
+    """Zeros of the type of what is to be put among them."""
+    return np.full(shape, 0.0, dtype=np.result_type(np.float64, *like))
+
+
+def number(value: Any) -> Any:
+    """Return a plain float where `value` is one real number."""
+    if type(value) is float:
+        return value
+    return value if isinstance(value, Each) or np.iscomplexobj(value) else float(value)

@@ -1,0 +1,310 @@
+//! The loops of a block in SIMD lanes: their equations, and the parts of their samples.
+//!
+//! `N` is the number of states, of which the first `P` are those of the plant.
+
+use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+
+use super::block::{Block, Number};
+use super::transition::{Map, Matrix, Over, row, scaled};
+
+/// Terms of the bound on the second derivative: as many as the series of a part needs.
+const TERMS: u32 = 20;
+
+/// A part of a sample, on which the command that reaches the plant is constant.
+#[derive(Clone, Copy)]
+pub(super) struct Part<S: Simd, const P: usize> {
+    /// From the sample to the start of the part.
+    pub(super) start: Map<S, P>,
+    /// Time from the sample to the start of the part.
+    pub(super) offset: Real<S>,
+    /// Zero for the jump of the output at the arrival of a command.
+    pub(super) length: Real<S>,
+    /// Has the command of the sample arrived?
+    pub(super) is_after: bool,
+    pub(super) is_jump: bool,
+}
+
+/// y = coefficients · x + …, at the end of a part.
+#[derive(Clone, Copy)]
+pub(super) struct Corner<S: Simd, const P: usize> {
+    pub(super) states: [Real<S>; P],
+    pub(super) before: Real<S>,
+    pub(super) after: Real<S>,
+    pub(super) constant: Real<S>,
+    /// Has the command of the sample arrived?
+    pub(super) is_after: bool,
+    /// Time since the sample.
+    pub(super) offset: Real<S>,
+}
+
+/// Loops in lanes.
+pub(super) struct Loops<S: Simd, const N: usize, const P: usize> {
+    pub(super) plants: Plants<S, P>,
+    pub(super) k: [Real<S>; N],
+    pub(super) l: Real<S>,
+    /// Over one sample.
+    pub(super) step: Map<S, N>,
+}
+
+/// Their plants, and what is the same for any controller.
+pub(super) struct Plants<S: Simd, const P: usize> {
+    pub(super) samples: usize,
+    pub(super) is_curved: bool,
+    pub(super) is_long: bool,
+    /// Is the output before the first arrival of a command hidden, and jumps there? It is if it is
+    /// read ahead by the delay.
+    pub(super) hides: bool,
+    /// A, B, E r, C of the plant.
+    pub(super) a: Matrix<S, P>,
+    pub(super) b: [Real<S>; P],
+    pub(super) e: [Real<S>; P],
+    pub(super) c: [Real<S>; P],
+    pub(super) d: Real<S>,
+    /// M r.
+    pub(super) command: Real<S>,
+    pub(super) limit: Real<S>,
+    pub(super) sample_time: Real<S>,
+    /// Time by which the output is read ahead.
+    pub(super) ahead: Real<S>,
+    /// Time at which the run ends.
+    pub(super) end: Real<S>,
+    pub(super) parts: Vec<Part<S, P>>,
+    /// All corners of a sample but the last one.
+    pub(super) corners: Vec<Corner<S, P>>,
+    /// The output at the start, after a jump at once.
+    pub(super) first_output: Real<S>,
+    pub(super) zero: Real<S>,
+    pub(super) no_lane: Mask<S>,
+    /// Is D not zero?
+    pub(super) is_direct: bool,
+    /// Is the output the first state, D left out?
+    pub(super) is_first: bool,
+    /// Does the reference reach the plant other than through the command?
+    pub(super) is_pushed: bool,
+    /// The output exceeds its values at both ends of a part by at most bulge · |x′| at the sample,
+    /// plus `bulge_of_jump` times the change of the command that reaches the plant.
+    pub(super) bulge: [Real<S>; P],
+    pub(super) bulge_of_jump: Real<S>,
+}
+
+impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
+    /// The loops of pair number `pair` of vectors, run for `span` seconds of their output.
+    #[inline(always)]
+    pub(super) fn new(simd: S, block: &Block, pair: usize, span: f64) -> Self {
+        let zero = Real::splat(simd, 0.0);
+        let mut full = [[zero; N]; N];
+        for (i, row) in full.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = block.load(simd, i * N + j, pair);
+            }
+        }
+        let drive = block.column(simd, N * N, pair);
+        let push = block.column(simd, N * N + N, pair);
+        let push = scaled(&push, zero.constant(block.amplitude));
+        let sample_time = block.number(simd, Number::SampleTime, pair);
+        let delay = block.number(simd, Number::Delay, pair);
+        let shape = block.shape;
+        let (late, early) = if shape.early == 0 {
+            (sample_time, zero)
+        } else {
+            let whole = zero.constant(-f64::from(shape.samples));
+            let early = whole.mul_add(sample_time, delay);
+            let early = early.larger(zero).smaller(sample_time);
+            (sample_time - early, early)
+        };
+        let ahead = if block.is_ahead { delay } else { zero };
+        let mut plants = Plants {
+            samples: shape.samples as usize,
+            is_curved: shape.is_curved,
+            is_long: shape.is_long,
+            hides: shape.jumps && block.is_ahead,
+            a: leading(&full, zero),
+            b: first(&drive, zero),
+            e: first(&push, zero),
+            c: first(&block.column::<S, N>(simd, N * N + 3 * N, pair), zero),
+            d: block.number(simd, Number::D, pair),
+            command: block.number(simd, Number::M, pair) * block.amplitude,
+            limit: block.number(simd, Number::Limit, pair),
+            sample_time,
+            ahead,
+            end: ahead + span,
+            parts: Vec::with_capacity(shape.corners()),
+            corners: Vec::with_capacity(shape.corners()),
+            first_output: zero,
+            zero,
+            no_lane: zero.lt(0.0),
+            is_direct: shape.jumps,
+            is_first: shape.is_first,
+            is_pushed: shape.is_pushed,
+            bulge: [zero; P],
+            bulge_of_jump: zero,
+        };
+        let mut step = Map::nothing(zero);
+        let mut offset = zero;
+        for (parts, length, is_after) in [(shape.early, early, false), (shape.late, late, true)] {
+            let mut part = Part {
+                start: step.leading(zero),
+                offset,
+                length: zero,
+                is_after,
+                is_jump: true,
+            };
+            if is_after && shape.jumps {
+                plants.parts.push(part);
+            }
+            if parts == 0 {
+                continue;
+            }
+            (part.length, part.is_jump) = (length / f64::from(parts), false);
+            let over = Over {
+                a: &full,
+                drive: &drive,
+                push: &push,
+                h: part.length,
+            };
+            let held = over.held();
+            for _ in 0..parts {
+                (part.start, part.offset) = (step.leading(zero), offset);
+                plants.parts.push(part);
+                step = step.then(&held, !is_after);
+                offset = offset + part.length;
+            }
+        }
+        if plants.hides || (shape.jumps && shape.samples == 0 && shape.early == 0) {
+            plants.first_output = plants.d * plants.command.min(plants.limit).max(-plants.limit);
+        }
+        for place in 1..plants.parts.len() {
+            let corner = plants.corner(place - 1);
+            plants.corners.push(corner);
+        }
+        if plants.is_curved {
+            outlined(simd, Bulges(&mut plants));
+        }
+        Self {
+            plants,
+            k: block.column(simd, N * N + 2 * N, pair),
+            l: block.number(simd, Number::L, pair),
+            step,
+        }
+    }
+}
+
+/// A function with |y″| ≤ M stays within M h²/8 of its chord, and y″ = c A e^{A t} x′.
+struct Bulges<'a, S: Simd, const P: usize>(&'a mut Plants<S, P>);
+
+impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let plants = self.0;
+        let zero = plants.d.constant(0.0);
+        let slope = along(&plants.c, &plants.a);
+        let (mut most, mut longest) = ([zero; P], zero);
+        for part in &plants.parts {
+            if part.is_jump {
+                continue;
+            }
+            longest = longest.larger(part.length);
+            // c A e^{A t} at the start of the part, and the sum of its Taylor terms.
+            let mut term = along(&slope, &part.start.growth);
+            for (term, start) in term.iter_mut().zip(&slope) {
+                *term = *term + *start;
+            }
+            let mut sum = absolute(&term);
+            for j in 1..=TERMS {
+                let factor = part.length * (1.0 / f64::from(j));
+                term = scaled(&along(&term, &plants.a), factor);
+                for (sum, term) in sum.iter_mut().zip(&term) {
+                    *sum = *sum + term.abs();
+                }
+            }
+            for (most, sum) in most.iter_mut().zip(&sum) {
+                *most = most.larger(*sum);
+            }
+        }
+        let share = longest * longest * 0.125;
+        plants.bulge = scaled(&most, share);
+        plants.bulge_of_jump = row(&plants.bulge, &absolute(&plants.b), zero);
+    }
+}
+
+impl<S: Simd, const P: usize> Plants<S, P> {
+    /// The output at the end of a part other than the last one.
+    #[inline(always)]
+    fn corner(&self, place: usize) -> Corner<S, P> {
+        let (part, next) = (&self.parts[place], &self.parts[place + 1]);
+        let map = &next.start;
+        let mut states = self.c;
+        for (j, state) in states.iter_mut().enumerate() {
+            for i in 0..P {
+                *state = self.c[i].mul_add(map.growth[i][j], *state);
+            }
+        }
+        let mut before = row(&self.c, &map.before, self.zero);
+        let mut after = row(&self.c, &map.after, self.zero);
+        let direct = if part.is_after {
+            &mut after
+        } else {
+            &mut before
+        };
+        *direct = *direct + self.d;
+        Corner {
+            states,
+            before,
+            after,
+            constant: row(&self.c, &map.push, self.zero),
+            is_after: part.is_after,
+            offset: next.offset,
+        }
+    }
+}
+
+#[inline(always)]
+fn absolute<S: Simd, const P: usize>(column: &[Real<S>; P]) -> [Real<S>; P] {
+    let mut out = *column;
+    for entry in &mut out {
+        *entry = entry.abs();
+    }
+    out
+}
+
+/// row · A.
+#[inline(always)]
+fn along<S: Simd, const P: usize>(row: &[Real<S>; P], a: &Matrix<S, P>) -> [Real<S>; P] {
+    let mut out = *row;
+    for (j, out) in out.iter_mut().enumerate() {
+        let mut sum = row[0] * a[0][j];
+        for i in 1..P {
+            sum = row[i].mul_add(a[i][j], sum);
+        }
+        *out = sum;
+    }
+    out
+}
+
+#[inline(always)]
+fn leading<S: Simd, const N: usize, const P: usize>(
+    a: &Matrix<S, N>,
+    zero: Real<S>,
+) -> Matrix<S, P> {
+    let mut out = [[zero; P]; P];
+    for (row, from) in out.iter_mut().zip(a) {
+        for (entry, from) in row.iter_mut().zip(from) {
+            *entry = *from;
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn first<S: Simd, const N: usize, const P: usize>(
+    column: &[Real<S>; N],
+    zero: Real<S>,
+) -> [Real<S>; P] {
+    let mut out = [zero; P];
+    for (entry, from) in out.iter_mut().zip(column) {
+        *entry = *from;
+    }
+    out
+}

@@ -1,0 +1,164 @@
+//! The metrics of all loops of two vectors.
+
+use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics};
+use crate::simd::{Real, Simd};
+
+use super::each::{TIME_CONSTANTS, judged};
+use super::loops::Plants;
+use super::measured::Measured;
+use super::rounds::measure;
+use super::sets::{Outcome, of as number};
+use super::through::{Job, Member};
+use super::trace::{Trace, of};
+use super::view::View;
+use super::walk::Run;
+
+/// Measure every response between its start and `span` seconds later.
+pub(super) struct MetricsJob<'a> {
+    /// The steady state of each set, NaN where its last output is to count as that.
+    pub(super) steady: &'a [f64],
+    /// Slowest time constant of plant and controller of each set.
+    pub(super) slowest: &'a [f64],
+    pub(super) span: f64,
+    pub(super) criteria: Criteria,
+}
+
+impl Job for MetricsJob<'_> {
+    type Found = (Metrics, Outcome);
+
+    #[inline(always)]
+    fn found<S: Simd, const P: usize>(
+        &self,
+        loops: &Plants<S, P>,
+        run: &mut dyn Run<S>,
+        members: &[Member],
+        trace: &mut Trace<S>,
+        found: &mut Vec<Self::Found>,
+    ) {
+        let zero = loops.d.constant(0.0);
+        let mut steady = zero;
+        for (lane, place) in steady.numbers_mut().iter_mut().enumerate() {
+            *place = members
+                .get(lane)
+                .map_or(0.0, |&(_, set)| number(self.steady, set));
+        }
+        run.begin(trace, false);
+        let mut runs = run.advance(trace);
+        close(loops, trace);
+        let is_known = steady.eq(steady);
+        if (!is_known).any() {
+            let mut last = last_output(trace, zero);
+            if !run.is_over() {
+                while run.advance(trace) {
+                    close(loops, trace);
+                    last = last_output(trace, last);
+                }
+                run.begin(trace, false);
+                runs = run.advance(trace);
+                close(loops, trace);
+            }
+            steady = is_known.select(steady, last);
+        }
+        let first = loops.first_output;
+        let mut lanes: Vec<Measured> = members
+            .iter()
+            .enumerate()
+            .map(|(lane, _)| {
+                let first = of(&first, lane);
+                let levels = Levels::new(first, of(&steady, lane), &self.criteria);
+                Measured::new(levels, first)
+            })
+            .collect();
+        while runs {
+            measure(&View { loops, trace }, &mut lanes);
+            runs = run.advance(trace);
+            if runs {
+                close(loops, trace);
+            }
+        }
+        let lost = run.lost().select(1.0, zero);
+        let begin = found.len();
+        let mut radius = zero;
+        let mut is_doubtful = false;
+        for (lane, measured) in lanes.into_iter().enumerate() {
+            if of(&lost, lane) > 0.0 {
+                found.push((Metrics::UNKNOWN, Outcome::Diverged));
+                continue;
+            }
+            let ahead = of(&loops.ahead, lane);
+            let levels = measured.levels;
+            let mut record = measured.finished().record;
+            for time in [&mut record.top.1, &mut record.bottom.1] {
+                *time = (*time - ahead).max(0.0);
+            }
+            record.risen = (since(record.risen.0, ahead), since(record.risen.1, ahead));
+            record.inside_since = since(record.inside_since, ahead);
+            record.unsettled_until -= ahead;
+            let sample_time = of(&loops.sample_time, lane);
+            let stays = record.stays_settled(self.span, sample_time * (loops.samples + 2) as f64);
+            let (metrics, mut outcome) = judged(record.metrics(&levels), stays);
+            let inside = self.span - metrics.settling_time;
+            let slowest = members
+                .get(lane)
+                .map_or(0.0, |&(_, set)| number(self.slowest, set));
+            if outcome == Outcome::Ok && TIME_CONSTANTS * slowest > inside {
+                outcome = Outcome::Doubtful;
+            }
+            if outcome == Outcome::Doubtful && inside > 0.0 {
+                is_doubtful = true;
+                radius.numbers_mut()[lane] = libm::exp(-TIME_CONSTANTS * sample_time / inside);
+            }
+            found.push((metrics, outcome));
+        }
+        if !is_doubtful {
+            return;
+        }
+        let decay = run.decay(radius);
+        let (yes, no) = (decay.yes.select(1.0, zero), decay.no.select(1.0, zero));
+        for (lane, (_, outcome)) in found.iter_mut().skip(begin).enumerate() {
+            if *outcome == Outcome::Doubtful && of(&radius, lane) > 0.0 {
+                if of(&yes, lane) > 0.0 {
+                    *outcome = Outcome::Ok;
+                } else if of(&no, lane) > 0.0 {
+                    *outcome = Outcome::Unsettled;
+                }
+            }
+        }
+    }
+}
+
+/// A time since the start of the output.
+fn since(time: f64, ahead: f64) -> f64 {
+    if time > ahead {
+        time - ahead
+    } else {
+        // NaN remains.
+        0.0 * time
+    }
+}
+
+/// Store the outputs at the ends of runs that end inside a part.
+fn close<S: Simd, const P: usize>(loops: &Plants<S, P>, trace: &mut Trace<S>) {
+    if !trace.is_cut.any() {
+        return;
+    }
+    let (output, is_cut) = View { loops, trace }.cut();
+    let marks = is_cut.select(1.0, output.constant(0.0));
+    for lane in 0..marks.numbers().len() {
+        if of(&marks, lane) > 0.0 {
+            trace.set_last(lane, of(&output, lane));
+        }
+    }
+}
+
+/// The last output of the runs in a trace; `before` where it holds none.
+fn last_output<S: Simd>(trace: &Trace<S>, before: Real<S>) -> Real<S> {
+    let mut last = before;
+    for (lane, place) in last.numbers_mut().iter_mut().enumerate() {
+        let parts = trace.parts(lane);
+        if parts > 0 {
+            *place = trace.output(lane, parts);
+        }
+    }
+    last
+}

@@ -1,0 +1,205 @@
+//! What loops must have in common to run side by side, and which loops cannot.
+//!
+//! A sample is cut at the arrival of a command, and each half into equal parts on which the output
+//! is a short Taylor series. Loops whose delays hold the same number of whole samples and whose
+//! samples have the same parts share a block.
+
+use crate::Error;
+use crate::dde::control_loop::row::Row;
+use crate::dde::control_loop::sampled::Timing;
+use crate::memory::{push, reserved};
+
+use super::sets::{Sets, of};
+use super::transition;
+
+/// Most states of a loop in a block.
+pub(super) const MOST_STATES: usize = 4;
+
+/// Loops with more samples than this run one by one, so that they can be cancelled.
+const MOST_SAMPLES: f64 = 1e6;
+
+/// Most parts of one half of a sample.
+const MOST_PARTS: f64 = 64.0;
+
+/// Largest rate of the plant times the length of a part for the shorter series.
+const SHORT_REACH: f64 = 0.25;
+
+/// What memory is requested for, in errors.
+const SWEEP: &str = "the sweep";
+
+/// The parts of a sample, and how the output behaves on them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Shape {
+    /// Whole samples in the delay.
+    pub(super) samples: u32,
+    /// Parts from a sample to the arrival of a command; 0 where it arrives at the sample.
+    pub(super) early: u8,
+    /// Parts from there to the next sample.
+    pub(super) late: u8,
+    /// Does the output jump with the command that reaches the plant?
+    pub(super) jumps: bool,
+    /// Is the output not a line on every part (c A ≠ 0 or c E ≠ 0)?
+    pub(super) is_curved: bool,
+    /// Does the series of a part need more terms?
+    pub(super) is_long: bool,
+    /// Is the output the first state, but for D?
+    pub(super) is_first: bool,
+    /// Does the reference reach the plant other than through the command?
+    pub(super) is_pushed: bool,
+}
+
+impl Shape {
+    /// Outputs in the trace of one sample.
+    pub(super) fn corners(&self) -> usize {
+        usize::from(self.early) + usize::from(self.jumps) + usize::from(self.late)
+    }
+}
+
+/// The first states of all loops, on which the output depends: those of the plant. The others do not
+/// reach them except through the command.
+pub(super) fn plant_states(sets: &Sets<'_>) -> usize {
+    let n = sets.states();
+    let entries = sets.entries();
+    let is_nothing = |place: usize| entries.get(place).is_some_and(|entry| entry == &[0.0]);
+    let c = n * n + 3 * n;
+    (1..n)
+        .find(|&p| (p..n).all(|j| is_nothing(c + j) && (0..p).all(|i| is_nothing(i * n + j))))
+        .unwrap_or(n)
+}
+
+/// The shapes of the loops of a sweep.
+pub(super) struct Shapes<'a> {
+    sets: &'a Sets<'a>,
+    plant: usize,
+    /// Entries with one number for each loop, by their places in a row.
+    varying: Vec<(usize, &'a [f64])>,
+    /// The row of the last loop.
+    row: Vec<f64>,
+    /// What follows from A, C and E, where these are the same for all.
+    shared: Option<Plant>,
+}
+
+/// What follows from A, C and E.
+#[derive(Debug, Clone, Copy)]
+struct Plant {
+    is_curved: bool,
+    is_first: bool,
+    is_pushed: bool,
+    /// Bound on the rates of the plant, 1/s.
+    rate: f64,
+    /// ‖A‖₁, 1/s.
+    norm: f64,
+}
+
+impl<'a> Shapes<'a> {
+    pub(super) fn new(sets: &'a Sets<'a>) -> Result<Self, Error> {
+        let plant = plant_states(sets);
+        let places = sets.entries().iter().enumerate();
+        let varying: Vec<_> = places
+            .filter(|(_, entry)| entry.len() != 1)
+            .map(|(place, entry)| (place, *entry))
+            .collect();
+        let mut shapes = Self {
+            sets,
+            plant,
+            varying,
+            row: sets.row(0),
+            shared: None,
+        };
+        let n = sets.states();
+        let is_plant = |place: usize| {
+            place < n * n || (n * n + n..n * n + 2 * n).contains(&place) || {
+                (n * n + 3 * n..n * n + 4 * n).contains(&place)
+            }
+        };
+        if !shapes.varying.iter().any(|&(place, _)| is_plant(place)) {
+            shapes.shared = Some(plant_of(&Row::new(n, &shapes.row)?, plant));
+        }
+        Ok(shapes)
+    }
+
+    /// The shape of a loop in a block for `span` seconds of output; none if it runs alone.
+    fn of(&mut self, set: usize, span: f64) -> Option<Shape> {
+        for &(place, entry) in &self.varying {
+            if let Some(number) = self.row.get_mut(place) {
+                *number = of(entry, set);
+            }
+        }
+        let row = Row::new(self.sets.states(), &self.row).ok()?;
+        let (last, finite) = self.row.split_last()?;
+        let fits = finite.iter().all(|number| number.is_finite())
+            && *last > 0.0
+            && (1..=MOST_STATES).contains(&row.b.len())
+            && row.delay >= 0.0
+            && row.sample_time > 0.0
+            && (span + row.delay) / row.sample_time < MOST_SAMPLES;
+        if !fits {
+            return None;
+        }
+        let plant = self.shared.unwrap_or_else(|| plant_of(&row, self.plant));
+        let timing = Timing::new(row.delay, row.sample_time);
+        if plant.norm * row.sample_time > transition::MOST {
+            return None;
+        }
+        let (early, late) = if plant.is_curved {
+            let parts = |length: f64| (plant.rate * length).ceil();
+            let early = parts(timing.early).max(f64::from(timing.early > 0.0));
+            (early, parts(timing.late).max(1.0))
+        } else {
+            (f64::from(timing.early > 0.0), 1.0)
+        };
+        if early.max(late) > MOST_PARTS {
+            return None;
+        }
+        let longest = (timing.early / early.max(1.0)).max(timing.late / late);
+        Some(Shape {
+            samples: u32::try_from(timing.samples).ok()?,
+            early: early as u8,
+            late: late as u8,
+            jumps: row.d != 0.0,
+            is_curved: plant.is_curved,
+            is_long: plant.is_curved && plant.rate * longest > SHORT_REACH,
+            is_first: plant.is_first,
+            is_pushed: plant.is_pushed,
+        })
+    }
+
+    /// The sets that run in blocks, in the order of their shapes, and those that run alone.
+    #[expect(clippy::type_complexity, reason = "two lists")]
+    pub(super) fn sorted(mut self, span: f64) -> Result<(Vec<(Shape, usize)>, Vec<usize>), Error> {
+        let mut alike = reserved(SWEEP, self.sets.len())?;
+        let mut alone = Vec::new();
+        for set in 0..self.sets.len() {
+            match self.of(set, span) {
+                Some(shape) => alike.push((shape, set)),
+                None => push(SWEEP, &mut alone, set)?,
+            }
+        }
+        alike.sort_unstable();
+        Ok((alike, alone))
+    }
+}
+
+fn plant_of(row: &Row<'_>, p: usize) -> Plant {
+    let n = row.b.len();
+    let a = |i: usize, j: usize| row.a[i * n + j];
+    let is_line = (0..n).all(|i| row.c[i] == 0.0 || row.e[i] == 0.0)
+        && (0..n).all(|j| (0..n).all(|i| row.c[i] == 0.0 || a(i, j) == 0.0));
+    // The norm of |A|², whose root depends less on the units of the states than that of A.
+    let square = |j: usize| -> f64 {
+        let column = |i: usize| (0..p).map(|k| (a(i, k) * a(k, j)).abs()).sum::<f64>();
+        (0..p).map(column).sum()
+    };
+    let norm = |j: usize| (0..n).map(|i| a(i, j).abs()).sum::<f64>();
+    Plant {
+        is_curved: !is_line,
+        is_first: row
+            .c
+            .iter()
+            .enumerate()
+            .all(|(i, &c)| c == f64::from(u8::from(i == 0))),
+        is_pushed: row.e.iter().take(p).any(|&e| e != 0.0),
+        rate: (0..p).map(square).fold(0.0, f64::max).sqrt(),
+        norm: (0..n).map(norm).fold(0.0, f64::max),
+    }
+}

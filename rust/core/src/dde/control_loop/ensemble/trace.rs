@@ -1,0 +1,118 @@
+//! What a run leaves of some hundred samples: outputs where parts meet, and where they may be
+//! exceeded.
+
+use crate::simd::{Lanes, Mask, Real, Simd, flat, flat_mut};
+
+/// Samples in a chunk, whose extremes are known without reading its outputs.
+pub(super) const CHUNK: usize = 8;
+
+/// Most samples in a trace: enough for most runs, and few enough for the cache of a core.
+pub(super) const SAMPLES: usize = 256;
+
+/// Greatest and least output at the corners of a chunk and at the corner before it.
+#[derive(Clone, Copy)]
+pub(super) struct Summary<S: Simd> {
+    pub(super) most: Real<S>,
+    pub(super) least: Real<S>,
+    /// By how much the output may be outside of these between corners.
+    pub(super) bulge: Real<S>,
+}
+
+/// The trace of consecutive samples.
+///
+/// A corner is the end of a part. Only the first `count` corners of a loop belong to its run; where
+/// the run ends inside a part, the output there is stored as the last corner.
+pub(super) struct Trace<S: Simd> {
+    /// Number of the first sample.
+    pub(super) first: usize,
+    /// Samples in the trace.
+    pub(super) samples: usize,
+    /// Corners of one sample.
+    pub(super) per_sample: usize,
+    /// Output before the first corner.
+    pub(super) begin: Real<S>,
+    pub(super) outputs: Vec<Lanes<S>>,
+    /// States of the plant at samples, one after the other, if the output is curved.
+    pub(super) states: Vec<Real<S>>,
+    /// How far the output may exceed its corners, by samples.
+    pub(super) bulges: Vec<Lanes<S>>,
+    /// Commands by sample, from the first one that matters.
+    pub(super) commands: Vec<Real<S>>,
+    pub(super) chunks: Vec<Summary<S>>,
+    /// Complete corners of each loop.
+    pub(super) count: Real<S>,
+    /// The loops whose run ends inside the part after these.
+    pub(super) is_cut: Mask<S>,
+}
+
+impl<S: Simd> Trace<S> {
+    /// Lanes of two vectors.
+    const WIDTH: usize = 2 * S::F64_LANES;
+
+    pub(super) fn new(zero: Real<S>) -> Self {
+        Self {
+            first: 0,
+            samples: 0,
+            per_sample: 1,
+            begin: zero,
+            outputs: Vec::new(),
+            states: Vec::new(),
+            bulges: Vec::new(),
+            commands: Vec::new(),
+            chunks: Vec::new(),
+            count: zero,
+            is_cut: zero.lt(0.0),
+        }
+    }
+
+    /// Parts of the run of a loop in the trace.
+    #[inline]
+    pub(super) fn parts(&self, lane: usize) -> usize {
+        let cut = self.is_cut.select(1.0, self.begin.constant(0.0));
+        (of(&self.count, lane) + of(&cut, lane)) as usize
+    }
+
+    /// Store the output at the end of a run that ends inside a part.
+    pub(super) fn set_last(&mut self, lane: usize, output: f64) {
+        let part = of(&self.count, lane) as usize;
+        let chunk = part / (CHUNK * self.per_sample);
+        let put = |numbers: &mut Real<S>, new: &dyn Fn(f64) -> f64| {
+            if let Some(number) = numbers.numbers_mut().get_mut(lane) {
+                *number = new(*number);
+            }
+        };
+        let place = part * Self::WIDTH + lane;
+        if let Some(place) = flat_mut::<S>(&mut self.outputs).get_mut(place) {
+            *place = output;
+        }
+        if let Some(summary) = self.chunks.get_mut(chunk) {
+            put(&mut summary.most, &|most| most.max(output));
+            put(&mut summary.least, &|least| least.min(output));
+        }
+    }
+
+    /// The output of `lane` before (0) or at the end of a part (from 1 on).
+    #[inline]
+    pub(super) fn output(&self, lane: usize, place: usize) -> f64 {
+        let Some(corner) = place.checked_sub(1) else {
+            return of(&self.begin, lane);
+        };
+        let outputs = flat::<S>(&self.outputs);
+        let output = outputs.get(corner * Self::WIDTH + lane);
+        output.copied().unwrap_or(f64::NAN)
+    }
+
+    /// By how much an output of a sample may exceed its corners.
+    #[inline]
+    pub(super) fn bulge(&self, lane: usize, sample: usize) -> f64 {
+        let bulges = flat::<S>(&self.bulges);
+        let bulge = bulges.get(sample * Self::WIDTH + lane);
+        bulge.copied().unwrap_or(0.0)
+    }
+}
+
+/// The number of a lane.
+#[inline]
+pub(super) fn of<S: Simd>(numbers: &Real<S>, lane: usize) -> f64 {
+    numbers.numbers().get(lane).copied().unwrap_or(f64::NAN)
+}
