@@ -35,8 +35,10 @@ const TURNED: f64 = 1.6;
 /// Rounding of an angle, and of a delay relative to it.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// Upper limit on the delays of one frequency.
+/// Upper limits on the delays of one frequency, and on the turns in one of them, which are counted in
+/// doubles.
 const MOST: f64 = 1e5;
+const LARGEST: f64 = 1e15;
 
 /// The values of T in `range` at which a + e^(−s σ (T − T₀)) b has a root on the imaginary axis, σ
 /// the `slope`, T₀ the start of the range; `None` where they cannot be found.
@@ -136,8 +138,15 @@ impl Search<'_> {
         let turned = -(point.b * point.a.conj());
         let first = angle(turned.im, turned.re);
         let turns = |d: f64| (d * point.t - first) / TAU;
-        let (from, to) = (turns(range.0).floor(), turns(range.1).ceil());
-        if to - from > MOST {
+        // Those whose interval reaches into the range, too.
+        let most = (TURNED * error + ROUNDING + range.1 * radius) * ENLARGED / least;
+        let beyond = (most * point.t / TAU).ceil();
+        let (from, to) = (
+            turns(range.0).floor() - beyond,
+            turns(range.1).ceil() + beyond,
+        );
+        let usable = to - from <= MOST && from.abs().max(to.abs()) < LARGEST;
+        if !usable {
             return None;
         }
         let mut n = from;
