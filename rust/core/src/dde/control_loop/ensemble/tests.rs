@@ -103,28 +103,40 @@ fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Metrics {
     found.map_or(Metrics::UNKNOWN, |(metrics, _)| metrics)
 }
 
+/// Loops whose gains differ from those of `rows` by some rounding errors. A saturated loop may be
+/// chaotic, and is then known no better than these agree.
+fn moved(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut rows = rows.to_vec();
+    for row in &mut rows {
+        let n = states(row);
+        let k = n * n + 2 * n;
+        let gains = (k..k + n).chain([k + 2 * n, k + 2 * n + 1]);
+        gains.for_each(|place| row[place] *= 1.0 + 1e-14);
+    }
+    rows
+}
+
 /// Values of the output at the extremes agree in any case; times at which it is flat, or touches a
 /// level, are known to the root of rounding errors. An error e of the output is one of
-/// e (1 + share)/step in a share of the step.
-fn agree(found: Metrics, truth: Metrics) -> bool {
+/// e (1 + share)/step in a share of the step. `other` is what moved gains give.
+fn agree(found: Metrics, truth: Metrics, other: Metrics) -> bool {
     // A response that has not begun has neither peak nor steady state.
     let least = truth.steady_state.abs().clamp(f64::MIN_POSITIVE, 1.0);
     let size = 1.0 + truth.peak / least;
-    let shares = |metrics: Metrics| {
-        let [_, _, _, over, under, ..] = metrics.to_array();
-        [over / 100.0, under / 100.0]
-    };
-    let values = |metrics: Metrics| {
-        let [_, _, _, _, _, values @ ..] = metrics.to_array();
-        values
-    };
-    let close = |a: f64, b: f64, by: f64| (a - b).abs() <= by || (a.is_nan() && b.is_nan());
-    let in_shares = |(a, b): (f64, f64)| close(a, b, 1e-11 * size / least * (1.0 + b.abs()));
-    let in_values = |(a, b): (f64, f64)| close(a, b, 1e-11 * size);
-    shares(found).into_iter().zip(shares(truth)).all(in_shares)
-        && values(found).into_iter().zip(values(truth)).all(in_values)
-        && close(found.rise_time, truth.rise_time, 1e-8)
-        && close(found.settling_time, truth.settling_time, 1e-7)
+    let (found, truth, other) = (found.to_array(), truth.to_array(), other.to_array());
+    (0..found.len()).all(|i| {
+        let by = match i {
+            0 => 1e-8,
+            1 => 1e-7,
+            // Two peaks may be equal but for rounding errors.
+            2 => return true,
+            3 | 4 => 1e-11 * size / least * (100.0 + truth[i].abs()),
+            _ => 1e-11 * size,
+        };
+        // NaN counts as zero.
+        let unknown = (4.0 * (other[i] - truth[i]).abs()).max(0.0);
+        (found[i] - truth[i]).abs() <= by + unknown || (found[i].is_nan() && truth[i].is_nan())
+    })
 }
 
 fn loops() -> impl Strategy<Value = (Vec<Vec<f64>>, bool, f64)> {
@@ -164,11 +176,13 @@ fn states(row: &[f64]) -> usize {
 
 /// The first set whose metrics differ from those of the code for single loops.
 fn unlike(rows: &[Vec<f64>], is_ahead: bool, span: f64) -> Option<String> {
-    let columns = columns(rows);
-    let entries: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    let sets = match Sets::new(states(&rows[0]), rows.len(), &entries, 1.0, is_ahead) {
-        Ok(sets) => sets,
-        Err(error) => return Some(error.to_string()),
+    let (given, moved) = (columns(rows), columns(&moved(rows)));
+    let sets = |columns| Sets::new(states(&rows[0]), rows.len(), columns, 1.0, is_ahead);
+    let entries: Vec<&[f64]> = given.iter().map(Vec::as_slice).collect();
+    let others: Vec<&[f64]> = moved.iter().map(Vec::as_slice).collect();
+    let (sets, others) = match (sets(&entries), sets(&others)) {
+        (Ok(sets), Ok(others)) => (sets, others),
+        (Err(error), _) | (_, Err(error)) => return Some(error.to_string()),
     };
     let numbers: (&[f64], &[f64]) = (&[f64::NAN], &[0.0]);
     let found = match metrics(&sets, numbers, span, &CRITERIA, &Task::new()) {
@@ -176,8 +190,8 @@ fn unlike(rows: &[Vec<f64>], is_ahead: bool, span: f64) -> Option<String> {
         Err(error) => return Some(error.to_string()),
     };
     found.into_iter().enumerate().find_map(|(set, (found, _))| {
-        let truth = alone(&sets, set, span);
-        (!agree(found, truth))
+        let (truth, other) = (alone(&sets, set, span), alone(&others, set, span));
+        (!agree(found, truth, other))
             .then(|| format!("{found:?} is not {truth:?} in set {set} of {rows:?}"))
     })
 }
@@ -205,22 +219,23 @@ proptest! {
         let Ok((found, _)) = responses(&sets, &times, &task) else {
             return Err(TestCaseError::fail("a run failed"));
         };
-        for (set, found) in found.chunks(times.len()).enumerate() {
-            let row = sets.row(set);
-            let Ok(row) = Row::new(n, &row) else {
-                return Err(TestCaseError::fail("no row"));
-            };
+        let single = |row: &[f64]| {
+            let row = Row::new(n, row)?;
             let start = Start { state: vec![0.0; n], ..Start::default() };
             let read: Vec<f64> = times.iter().map(|t| t + sets.ahead(row.delay)).collect();
-            let truth = row.checked().and_then(|plant| {
-                plant.simulate(&start, &Reference::step(0.0, 1.0)?, &read, &[], &task)
-            });
-            let Ok(truth) = truth else {
+            let step = Reference::step(0.0, 1.0)?;
+            let found = row.checked()?.simulate(&start, &step, &read, &[], &task)?;
+            Ok::<_, crate::Error>(found.outputs)
+        };
+        let others = moved(&rows);
+        for (set, found) in found.chunks(times.len()).enumerate() {
+            let (Ok(truth), Ok(other)) = (single(&rows[set]), single(&others[set])) else {
                 return Err(TestCaseError::fail("a single run failed"));
             };
-            let size = truth.outputs.iter().fold(1.0_f64, |m, y| m.max(y.abs()));
-            for (found, truth) in found.iter().zip(&truth.outputs) {
-                prop_assert!((found - truth).abs() < 1e-12 * size, "{found} is not {truth}");
+            let size = truth.iter().fold(1.0_f64, |m, y| m.max(y.abs()));
+            for ((found, truth), other) in found.iter().zip(&truth).zip(&other) {
+                let by = 1e-12 * size + 4.0 * (other - truth).abs();
+                prop_assert!((found - truth).abs() < by, "{found} is not {truth}");
             }
         }
     }
@@ -326,4 +341,20 @@ fn a_run_that_is_over_keeps_its_record_in_later_traces() {
             assert_eq!(unlike(&pair, false, span), None);
         }
     }
+}
+
+/// Arithmetic with forty digits lies between both codes here, and moves as far if the gains are
+/// moved by 1e-15 of themselves.
+#[test]
+fn a_chaotic_loop_agrees_as_far_as_it_is_known() {
+    let lag = 0.3 / 3.462089958274656;
+    let law = controller(2, 1.81229235295028, 0.4);
+    let rows = [row(
+        &plant(5, 1.0, lag),
+        &law,
+        0.0,
+        0.11445971360585044,
+        1.347836762890999,
+    )];
+    assert_eq!(unlike(&rows, false, 10.11026738622043), None);
 }
