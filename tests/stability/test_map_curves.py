@@ -10,7 +10,7 @@ from deadtime import delay, s
 from deadtime.stability import MapStatus
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from map_families import FAMILIES, LAG, OMEGA, ZETA
+from map_families import FAMILIES, LAG, OMEGA, ZETA, assert_roots_on_the_axis
 
 names = pytest.mark.parametrize("name", FAMILIES)
 
@@ -98,12 +98,7 @@ def test_boundaries_are_roots_on_the_axis(name):
     family, ranges = FAMILIES[name]
     chart = dtm.stability_map(family, ranges, (80, 79), abscissa=False)
     assert chart.boundaries
-    for curve in chart.boundaries:
-        for index in range(0, len(curve), 7):
-            values = {key: float(value[index]) for key, value in curve.values.items()}
-            h = family.at(**values)
-            size = np.abs(h.coefficients).sum() * max(1.0, curve.omega[index]) ** h.degree
-            assert abs(h(1j * curve.omega[index])) <= 1e-12 * size
+    assert_roots_on_the_axis(family, chart.boundaries, 7, 1e-12)
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.4])

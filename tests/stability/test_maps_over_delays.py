@@ -7,6 +7,7 @@ from deadtime import delay, s
 from deadtime.stability import MapStatus
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from map_families import assert_roots_on_the_axis
 
 T1, T2, K, T, a = dtm.parameters("T1 T2 K T a")
 SECOND = s**2 + 0.5 * s + 1.0
@@ -149,13 +150,8 @@ def test_boundaries_are_roots_on_the_axis(name):
     chart = dtm.stability_map(family, ranges, (41, 40), abscissa=False)
     # Where the leading term vanishes, roots go through infinity.
     assert bool(chart.boundaries) == (name != "leading term vanishes")
-    for curve in chart.boundaries:
-        for index in range(0, len(curve), 5):
-            values = {key: float(value[index]) for key, value in curve.values.items()}
-            h = family.at(**values)
-            size = np.abs(h.coefficients).sum() * max(1.0, curve.omega[index]) ** h.degree
-            # Newton's last step is below 1e-10, and what it leaves is of the order of its square.
-            assert abs(h(1j * curve.omega[index])) <= 1e-11 * size
+    # Newton's last step is below 1e-10, and what it leaves is of the order of its square.
+    assert_roots_on_the_axis(family, chart.boundaries, 5, 1e-11)
 
 
 @pytest.mark.parametrize("options", [{}, {"decay": 0.2}, {"damping": (0.2, 0.5)}])

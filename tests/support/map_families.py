@@ -1,6 +1,7 @@
 """Five families of gain maps from the literature of delayed control, for tests."""
 
 import deadtime as dtm
+import numpy as np
 from deadtime import delay, s
 
 Kp, Kv, Ki, Kd, K1, K2 = dtm.parameters("Kp Kv Ki Kd K1 K2")
@@ -23,3 +24,13 @@ FAMILIES = {
     ),
     "two delays": (s + K1 * delay(0.3) + K2 * delay(1.1), {"K1": (-6, 6), "K2": (-6, 6)}),
 }
+
+
+def assert_roots_on_the_axis(family, curves, stride, tolerance):
+    """At every `stride`-th point of the curves the member has a root at j omega."""
+    for curve in curves:
+        for index in range(0, len(curve), stride):
+            values = {key: float(value[index]) for key, value in curve.values.items()}
+            h = family.at(**values)
+            size = np.abs(h.coefficients).sum() * max(1.0, curve.omega[index]) ** h.degree
+            assert abs(h(1j * curve.omega[index])) <= tolerance * size

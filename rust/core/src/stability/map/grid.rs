@@ -1,13 +1,13 @@
 //! Stability over two parameters of a family.
 //!
 //! Counts: if the family is affine in one of the two, or has it as the delay of some terms, every
-//! value of the other makes a row, whose crossings of the edge give all its cells (`row`); the cost grows with the number of rows and of
-//! crossings, not of cells. Otherwise blocks of cells are divided along the boundaries (`blocks`).
-//! With `Proof::Cells`, and for the abscissa of a family that is affine in neither, every cell is
-//! judged alone. In each case a cell equals [`judge`] of the family's member there, and results
-//! have the same bits for any number of threads. A member that cannot be formed, because a
-//! coefficient overflows, is an undecided cell; delays that become negative are refused before any
-//! work is done.
+//! value of the other makes a row, whose crossings of the edge give all its cells (`row`); the cost
+//! grows with the number of rows and of crossings, not of cells. Otherwise blocks of cells are
+//! divided along the boundaries (`blocks`). With `Proof::Cells`, and for the abscissa of a family
+//! without such rows, every cell is judged alone. In each case a cell equals [`judge`] of the
+//! family's member there, and results have the same bits for any number of threads. A member that
+//! cannot be formed, because a coefficient overflows, is an undecided cell; delays that become
+//! negative are refused before any work is done.
 
 use rayon::prelude::*;
 

@@ -1,9 +1,9 @@
 //! Stability over two parameters.
 //!
 //! `axes` holds what is asked. `grid` chooses the method: `rows`, where one parameter enters as a
-//! gain or as one delay, or `blocks`, which `block` divides by the proofs of boxes. `one_row` does so
-//! with one row, whose crossings `row_search` finds. `chart` holds the arrays, `curves` joins crossings to boundaries, and `robust` maps what
-//! holds over an interval of a third parameter.
+//! gain or as one delay, or `blocks`, which `block` divides by the proofs of boxes. `one_row` does
+//! so with one row, whose crossings `row_search` finds. `chart` holds the arrays, `curves` joins
+//! crossings to boundaries, and `robust` maps what holds over an interval of a third parameter.
 
 mod axes;
 mod block;

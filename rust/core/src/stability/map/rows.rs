@@ -182,8 +182,8 @@ impl<'a> Rows<'a> {
         })
     }
 
-    /// Along a gain a root of all members at 0 is passed over; along a delay all cells would be
-    /// boundary.
+    /// Are the boundaries curves? Not along a delay where a root of all members stays at 0: there every
+    /// cell is on the boundary.
     pub(crate) fn has_boundaries(&self) -> bool {
         self.line.delay_slope.is_none() || blocks::grid(self.map).is_some()
     }
