@@ -1,6 +1,7 @@
 """`deadtime.design` for velocity feedback: CPU time of whole calls.
 
-It is not compared with a peer. Run ``python benches/peers/design.py [--quick]``.
+It is not compared with a peer. Run ``OPENBLAS_NUM_THREADS=1 python benches/peers/design.py
+[--quick]``: threads of OpenBLAS wait for one another with the processor busy, which would count.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,9 @@ _BEYOND = 0.5
 _FRINGE = np.array([0.5, 0.25])
 _FRINGE_SIDES = {1: 1, 2: 31, 3: 7}
 
+#: Maps by the numbers that are the same in all their cells.
+Maps = dict[frozenset[tuple[str, float]], StabilityMap]
+
 
 @dataclass(frozen=True, eq=False)
 class Survey:
@@ -39,10 +42,13 @@ class Survey:
         Values of each free gain.
     abscissa : ndarray, shape of the grid
         Worst spectral abscissa, 1/s; inf where a scenario is not stable.
+    maps : dict
+        Maps over two gains, by the other numbers.
     """
 
     axes: tuple[Vector, ...]
     abscissa: Vector
+    maps: Maps = field(default_factory=dict, repr=False)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -118,7 +124,9 @@ def surveyed(
         axes = tuple(
             np.linspace(*spans[name], count) for name, count in zip(free, counts, strict=True)
         )
-        survey = Survey(axes, worst_abscissa(problem, axes, scenarios or problem.corners))
+        maps: Maps = {}
+        worst = worst_abscissa(problem, axes, scenarios or problem.corners, maps)
+        survey = Survey(axes, worst, maps)
         if survey.stable.any():
             return survey
     tried = ", nor in ".join(
@@ -133,11 +141,15 @@ def surveyed(
 
 
 def worst_abscissa(
-    problem: Problem, axes: Sequence[Vector], scenarios: Sequence[Scenario]
+    problem: Problem,
+    axes: Sequence[Vector],
+    scenarios: Sequence[Scenario],
+    maps: Maps | None = None,
 ) -> Vector:
     """Worst spectral abscissa on a grid of the free gains, infinite where one is not stable.
 
-    Maps are much cheaper than loops one by one: they follow the roots from cell to cell.
+    `maps` receives the maps over two gains, where there are no others. Maps are much cheaper than
+    loops one by one: they follow the roots from cell to cell.
     """
     free = problem.free
     worst = np.full([len(axis) for axis in axes], -np.inf)
@@ -154,7 +166,10 @@ def worst_abscissa(
         }
         place: Any = (..., *layer)
         for one in scenarios:
-            worst[place] = np.maximum(worst[place], _judged(_mapped(problem, one | held, plane)))
+            chart = _mapped(problem, one | held, plane)
+            if maps is not None and not held:
+                maps[frozenset(one.items())] = chart
+            worst[place] = np.maximum(worst[place], _judged(chart))
     return worst
 
 
@@ -173,7 +188,12 @@ def charts_at(problem: Problem, survey: Survey, gains: Vector) -> tuple[Stabilit
     held = problem.named(gains)
     axes = {name: survey.axes[i] for i, name in enumerate(free[:2])}
     held = {name: held[name] for name in free[2:]}
-    return tuple(_mapped(problem, middle | {"delay": late} | held, axes) for late in problem.delays)
+    charts = []
+    for late in problem.delays:
+        numbers = middle | {"delay": late} | held
+        known = survey.maps.get(frozenset(numbers.items()))
+        charts.append(_mapped(problem, numbers, axes) if known is None else known)
+    return tuple(charts)
 
 
 def _by_the_rest(
