@@ -3,6 +3,7 @@
 The pictures are stored beside the pages, so that building the pages does not run the package.
 """
 
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -385,7 +386,29 @@ def rows_of_logs() -> None:
     figure.savefig(IMAGES / "rows-of-logs.png", dpi=90)
 
 
+def explorer() -> None:
+    """The explorer with the gains of a sampled PV loop, in a browser."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        print("explorer: there is no chromium on this machine")
+        return
+    from playwright.sync_api import sync_playwright
+
+    loop = dtm.ControlLoop(
+        dtm.Integrator(0.9), dtm.PV(1.5, 0.1), delay=0.36, sample_time=0.065, limit=1.0
+    )
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as run:
+        page = loop.explore({"Kp": (0, 6), "Kv": (-0.9, 0.9)}).save(Path(folder) / "loop.html")
+        browser = run.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        tab = browser.new_page(viewport={"width": 1280, "height": 1040})
+        tab.goto(page.as_uri())
+        tab.wait_for_selector("body[data-ready=yes]")
+        tab.screenshot(path=IMAGES / "explorer.png")
+        browser.close()
+
+
 if __name__ == "__main__":
+    explorer()
     latency()
     rows_of_logs()
     flying()

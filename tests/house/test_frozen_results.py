@@ -57,6 +57,7 @@ MADE = {
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
     "Chain": lambda: h.chains()[0],
     "ControlLoop": lambda: LOOP,
+    "Explorer": lambda: LOOP.explore(),
     "CramerRaoBound": lambda: dtm.estimation.CramerRaoBound(**bound_fields()),
     "Crossings": lambda: dtm.crossings(FAMILY, {"Kp": (0.1, 9.0)}, at={"T": 0.3}),
     "DelayEstimate": lambda: dtm.estimate_delay(

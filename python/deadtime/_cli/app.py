@@ -31,6 +31,7 @@ COMMANDS = {
     "costs.",
     "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
     "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
+    "explore": "Look at a loop live in the browser: its map of gains, roots, margins, responses.",
     "design": "Find the gains that are best in the worst case, within margins.",
     "reproduce": "Reproduce the paper on delays in quadrotor control: each printed number beside "
     "ours.",

@@ -17,7 +17,15 @@ from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
-from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, RateLimited
+from deadtime.loops import (
+    ControlLoop,
+    Explorer,
+    FactoredPlant,
+    Integrator,
+    ParametricPlant,
+    RateLimited,
+)
+from deadtime.loops._explored import explorer_of
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
@@ -217,6 +225,22 @@ class DelayEstimate(ReadOnlyArrays):
         reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
         low = value - reach
         return (max(low, floor_of(name)), value + reach)
+
+    def explore(self) -> Explorer:
+        """Return a page with the fitted loop and the 95 % interval of its delay.
+
+        Returns
+        -------
+        deadtime.Explorer
+            See `deadtime.ControlLoop.explore`.
+
+        Raises
+        ------
+        ValueError
+            If the explorer has no such loop.
+        """
+        interval = self.ci() if self.calibrated and "delay" in self.free else None
+        return explorer_of(self.loop.specification, interval=interval)
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
         """Profile likelihood: the increase of the cost when one quantity is held.

@@ -6,6 +6,7 @@ hold the questions that a loop answers, `_run`, `_stability` and the `_sampled_*
 `_sweep` runs many loops, `_fixed_step` imitates block diagrams in fixed steps.
 """
 
+from deadtime._base.explorer import Explorer
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._controllers import PD, PI, PID, PV, Controller, P
 from deadtime.loops._derivative_filter import DerivativeFilter
@@ -26,6 +27,7 @@ __all__ = [
     "ControlLoop",
     "Controller",
     "DerivativeFilter",
+    "Explorer",
     "FactoredPlant",
     "FirstOrder",
     "Integrator",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
+from deadtime._base.explorer import Explorer
 from deadtime._base.validation import non_negative
 from deadtime.loops._controllers import Controller
+from deadtime.loops._explored import explorer_of
 from deadtime.loops._gain import LoopGain
 from deadtime.loops._given_plants import plant_and_delay
 from deadtime.loops._in_time import LoopInTime
@@ -160,6 +163,39 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
     def continuous(self) -> ControlLoop:
         """Return the same loop without the hold, as if the controller computed all the time."""
         return self.replace(sample_time=None)
+
+    def explore(self, ranges: Mapping[str, tuple[float, float]] | None = None) -> Explorer:
+        """Return a page in which this loop is looked at live, its map over two gains in it.
+
+        Delay, sample time, gains and the numbers of the plant move there; map, roots, margins and
+        step responses follow, proved by the same kernels. The page needs no network.
+
+        Parameters
+        ----------
+        ranges : mapping of str to (low, high), optional
+            The two axes of the map at first: gains, ``"gain"``, ``"delay"`` or ``"lag"``. By
+            default the first two gains, or the gain and the delay.
+
+        Returns
+        -------
+        deadtime.loops.Explorer
+            Its `show` opens it in the browser, its `save` writes it; in a notebook it shows itself.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, or the plant limits rates or has delays inside, or the filter of
+            the derivative runs in samples.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(0.9), dtm.PV(Kp=1.5, Kv=0.1), delay=0.36)
+        >>> page = loop.explore({"Kp": (0, 6), "Kv": (-0.9, 0.9)})
+        >>> page.state["x_range"]
+        [0.0, 6.0]
+        """
+        return explorer_of(self.specification, ranges)
 
 
 #: What a loop is made from.

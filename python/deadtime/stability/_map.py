@@ -18,7 +18,7 @@ from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.page import table, table_row
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, Explorer
 from deadtime.loops._characteristic import numbers_of
 from deadtime.loops._held import HeldFamily, Question
 from deadtime.roots import ParametricQuasiPolynomial
@@ -84,6 +84,7 @@ class StabilityMap(ReadOnlyArrays):
     damping: tuple[float, float] | None = None
     family: ParametricQuasiPolynomial | None = None
     _held: HeldFamily | None = None
+    _loop: ControlLoop | None = None
 
     @cached_property
     def boundaries(self) -> tuple[Boundary, ...]:
@@ -236,6 +237,33 @@ class StabilityMap(ReadOnlyArrays):
         ax = shown_axes(ax)
         plot_stability_map(ax, self, chosen, show or ("abscissa" if computed else "counts"))
         return ax
+
+    def explore(self) -> Explorer:
+        """Return a page that shows this map live: see `deadtime.ControlLoop.explore`.
+
+        Returns
+        -------
+        deadtime.loops.Explorer
+
+        Raises
+        ------
+        ValueError
+            If the map is not that of a `ControlLoop`, or the explorer has no such loop or axis.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.5, 0.1), delay=0.36)
+        >>> chart = dtm.stability_map(loop, {"Kp": (0, 6), "Kv": (-0.9, 0.9)}, abscissa=False)
+        >>> chart.explore().state["y"]
+        'Kv'
+        """
+        if self._loop is None:
+            raise ValueError(
+                "the explorer shows maps of a ControlLoop, and this is of another family"
+            )
+        ends = {name: (float(axis[0]), float(axis[-1])) for name, axis in self.axes.items()}
+        return self._loop.explore(ends)
 
     def to_xarray(self) -> Any:
         """Return the arrays as an `xarray.Dataset` with the parameters as coordinates.
@@ -391,4 +419,5 @@ def stability_map(
         question.damping,
         judged,
         held,
+        family.replace(**fixed) if isinstance(family, ControlLoop) else None,
     )

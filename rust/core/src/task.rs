@@ -25,7 +25,8 @@ pub struct Task {
 
 /// A function to call regularly, on the computing thread, that decides whether to continue.
 struct Lookout {
-    start: Instant,
+    /// None where there is no clock, as in a page: then it is asked after every so many checks.
+    start: Option<Instant>,
     every: Duration,
     checks: AtomicU64,
     asked: AtomicU64,
@@ -51,10 +52,19 @@ impl Lookout {
         {
             return false;
         }
-        let period = self.start.elapsed().as_nanos() / self.every.as_nanos().max(1);
+        let Some(start) = self.start else {
+            return true;
+        };
+        let period = start.elapsed().as_nanos() / self.every.as_nanos().max(1);
         let period = u64::try_from(period).unwrap_or(u64::MAX);
         self.asked.swap(period, Ordering::Relaxed) != period
     }
+}
+
+/// The time, where there is a clock.
+fn now() -> Option<Instant> {
+    // Reading the clock of this target panics.
+    (!cfg!(all(target_family = "wasm", target_os = "unknown"))).then(Instant::now)
 }
 
 impl Task {
@@ -73,7 +83,7 @@ impl Task {
     pub fn asking(every: Duration, go_on: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self {
             lookout: Some(Lookout {
-                start: Instant::now(),
+                start: now(),
                 every,
                 checks: AtomicU64::new(0),
                 asked: AtomicU64::new(0),

@@ -1,0 +1,132 @@
+"""The explorer: one HTML file with the kernels in it, in which a loop is looked at live.
+
+Style, scripts and kernels are written into the page, so that it works without a network. The
+kernels are the compiled crate ``rust/web``; ``rust/web/make.py`` builds them.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+#: The scripts of the page; a later one uses what the earlier ones define.
+SCRIPTS = ("kernels", "state", "drawing", "map_view", "panels", "controls", "downloads", "main")
+
+_PLACE = Path(__file__).parent
+
+#: Height of the explorer in a notebook, in pixels.
+_HEIGHT = 900
+
+
+@dataclass(frozen=True)
+class Explorer:
+    """A page in which the numbers of a loop move, and its map, roots and responses follow.
+
+    In a notebook it shows itself.
+
+    Attributes
+    ----------
+    state : dict
+        What the page shows first, as its address and its JSON files have it.
+    title : str
+        Title of the page.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(Kp=1.5, Kv=0.13), delay=0.36)
+    >>> page = loop.explore()
+    >>> page.state["delay"]
+    0.36
+    """
+
+    state: Mapping[str, Any] = field(repr=False)
+    title: str = "Control loop with a delay"
+
+    def __hash__(self) -> int:
+        return hash((self.title, json.dumps(dict(self.state), sort_keys=True)))
+
+    @property
+    def html(self) -> str:
+        """The page, about half a megabyte."""
+        from importlib.metadata import version
+
+        given = json.dumps(dict(self.state), allow_nan=False).replace("<", "\\u003c")
+        parts = {
+            "title": html.escape(self.title),
+            "heading": html.escape(self.title),
+            "style": _part("page.css"),
+            "version": html.escape(version("deadtime")),
+            "given": given,
+            "kernels": _kernels(),
+            "script": "\n".join(_part(f"{name}.js") for name in SCRIPTS),
+        }
+        return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _part("page.html"))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page to `path`, and return that.
+
+        Parameters
+        ----------
+        path : str or Path
+            Its folder is made where there is none.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
+        place = Path(path)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(self.html, encoding="utf-8")
+        return place
+
+    def show(self) -> Path:
+        """Write the page to a temporary file and open it in the browser.
+
+        Returns
+        -------
+        Path
+            Of the file, which stays.
+        """
+        import tempfile
+        import webbrowser
+
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", prefix="deadtime-", suffix=".html", delete=False
+        ) as file:
+            file.write(self.html)
+        webbrowser.open(Path(file.name).as_uri())
+        return Path(file.name)
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe title="{html.escape(self.title)}" srcdoc="{html.escape(self.html)}" '
+            f'style="width: 100%; height: {_HEIGHT}px; border: 0"></iframe>'
+        )
+
+
+def kernels() -> bytes:
+    """The compiled kernels, compressed by gzip."""
+    return (_PLACE / "kernels.wasm.gz").read_bytes()
+
+
+@cache
+def _kernels() -> str:
+    return base64.b64encode(kernels()).decode("ascii")
+
+
+@cache
+def _part(name: str) -> str:
+    return (_PLACE / "parts" / name).read_text(encoding="utf-8")

@@ -1,0 +1,88 @@
+//! The kernels for a page in a browser: one loop in, its map, roots, margins and responses out.
+//!
+//! A page writes a request into the memory that [`reserve`] returns, calls one of the functions, and
+//! reads the answer at [`answer`], or the reason of a failure at [`message`]. All numbers are 64-bit
+//! floats. The request begins with the loop, as `request` reads it; the functions say what follows
+//! and what they answer. There are no threads, clocks or imports.
+
+#![expect(unsafe_code, reason = "names of exports are not mangled")]
+
+mod control_loop;
+mod equations;
+mod exchange;
+mod family;
+mod held;
+mod maps;
+mod margins;
+mod polynomial;
+mod request;
+mod responses;
+mod roots;
+
+use exchange::answered;
+
+/// Make room for `count` numbers of a request, and return where they go.
+#[unsafe(no_mangle)]
+pub extern "C" fn reserve(count: usize) -> *mut f64 {
+    exchange::reserve(count)
+}
+
+/// Where the answer is.
+#[unsafe(no_mangle)]
+pub extern "C" fn answer() -> *const f64 {
+    exchange::answer().0
+}
+
+/// How many numbers the answer has.
+#[unsafe(no_mangle)]
+pub extern "C" fn answer_count() -> usize {
+    exchange::answer().1
+}
+
+/// Where the reason of the last failure is, in UTF-8.
+#[unsafe(no_mangle)]
+pub extern "C" fn message() -> *const u8 {
+    exchange::message().0
+}
+
+/// How many bytes the reason of the last failure has.
+#[unsafe(no_mangle)]
+pub extern "C" fn message_count() -> usize {
+    exchange::message().1
+}
+
+/// Counts, and where they are asked for abscissas, of a map: see [`maps::cells`].
+#[unsafe(no_mangle)]
+pub extern "C" fn map() -> bool {
+    answered(maps::cells)
+}
+
+/// The curves on which roots lie on the edge of stability: see [`maps::boundaries`].
+#[unsafe(no_mangle)]
+pub extern "C" fn boundaries() -> bool {
+    answered(maps::boundaries)
+}
+
+/// The rightmost roots: see [`roots::rightmost`].
+#[unsafe(no_mangle)]
+pub extern "C" fn rightmost() -> bool {
+    answered(roots::rightmost)
+}
+
+/// The roots in a region: see [`roots::in_region`].
+#[unsafe(no_mangle)]
+pub extern "C" fn roots() -> bool {
+    answered(roots::in_region)
+}
+
+/// Gain, phase and delay margins: see [`margins::margins`].
+#[unsafe(no_mangle)]
+pub extern "C" fn margins() -> bool {
+    answered(margins::margins)
+}
+
+/// Responses to a step of the reference or of the load: see [`responses::step`].
+#[unsafe(no_mangle)]
+pub extern "C" fn step() -> bool {
+    answered(responses::step)
+}

@@ -1,0 +1,59 @@
+//! Characteristic roots of a loop.
+
+use deadtime::dde::sampled;
+use deadtime::roots::{
+    Region, RootSet, chain_abscissa, rightmost as search, roots, spectral_abscissa,
+};
+use deadtime::stability::HeldLoop;
+use deadtime::{Error, Task};
+
+use crate::control_loop::ControlLoop;
+use crate::equations::Input;
+use crate::request::Request;
+
+/// After the loop, how many. The answer has the spectral abscissa and that of the chains (−∞ for
+/// none), both in 1/s, and for each root its real and imaginary part, multiplicity and the radius of
+/// its disc (of a sampled loop all poles s = ln(z)/Ts, rightmost first, without discs).
+pub(crate) fn rightmost(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
+    let control_loop = ControlLoop::read(request)?;
+    let many = request.whole()?;
+    let task = Task::new();
+    if control_loop.sample_time().is_some() {
+        let linear = control_loop.linear(Input::Reference)?;
+        let poles = sampled::poles(&linear)?;
+        let rightmost = poles.first().map_or(f64::NEG_INFINITY, |pole| pole.re);
+        let abscissa = HeldLoop::new(&linear)?
+            .abscissa(&task)?
+            .unwrap_or(rightmost);
+        let mut answer = vec![abscissa, f64::NEG_INFINITY];
+        for pole in poles.iter().take(many) {
+            answer.extend([pole.re, pole.im, 1.0, f64::NAN]);
+        }
+        return Ok(answer);
+    }
+    let h = control_loop.characteristic()?;
+    let mut answer = vec![spectral_abscissa(&h, true, &task)?, chain_abscissa(&h)];
+    put(&mut answer, &search(&h, many, &task)?);
+    Ok(answer)
+}
+
+/// After the loop, the ends of a region: least and largest real part, least and largest imaginary part.
+/// The answer has the roots in it, as [`rightmost`] lists them.
+pub(crate) fn in_region(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
+    let h = ControlLoop::read(request)?.characteristic()?;
+    let mut range = || Ok::<_, Error>((request.number()?, request.number()?));
+    let region = Region {
+        re: range()?,
+        im: range()?,
+    };
+    let mut answer = Vec::new();
+    put(&mut answer, &roots(&h, &region, &Task::new())?);
+    Ok(answer)
+}
+
+fn put(answer: &mut Vec<f64>, found: &RootSet) {
+    let places = found.roots.iter().zip(&found.multiplicities);
+    for ((root, many), radius) in places.zip(&found.radii) {
+        answer.extend([root.re, root.im, f64::from(*many), *radius]);
+    }
+}

@@ -1,0 +1,220 @@
+"""The explorer in a real browser: Chromium, driven by Playwright."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import deadtime as dtm
+import numpy as np
+import pytest
+
+LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.5, 0.13), delay=0.36, limit=1.0)
+RANGES = {"Kp": (0.0, 6.0), "Kv": (-0.9, 0.9)}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        pytest.skip("there is no chromium on this machine")
+    with playwright.sync_playwright() as run:
+        started = run.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return LOOP.explore(RANGES).save(tmp_path_factory.mktemp("page") / "loop.html").as_uri()
+
+
+class Page:
+    """An open explorer, offline."""
+
+    def __init__(self, browser: Any, address: str, **context: Any) -> None:
+        self.context = browser.new_context(offline=True, accept_downloads=True, **context)
+        self.tab = self.context.new_page()
+        self.said: list[str] = []
+        self.tab.on("console", lambda message: self.said.append(message.text))
+        self.tab.on("pageerror", lambda error: self.said.append(str(error)))
+        self.tab.goto(address)
+        self.tab.wait_for_selector("body[data-ready=yes]")
+
+    @property
+    def drawn(self) -> dict[str, Any]:
+        """What the page shows, after the next frame."""
+        self.tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => done()))")
+        shown: dict[str, Any] = self.tab.evaluate("() => window.drawn")
+        return shown
+
+    def close(self) -> None:
+        self.context.close()
+        assert self.said == []
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Iterator[Page]:
+    opened = Page(browser, address)
+    yield opened
+    opened.close()
+
+
+def cells(tab: Any) -> np.ndarray:
+    """Colours of the cells, first axis to the right and second one up."""
+    flat, size = tab.evaluate(
+        "() => { const c = document.getElementById('cells');"
+        " return [[...c.getContext('2d').getImageData(0, 0, c.width, c.height).data],"
+        " [c.height, c.width]]; }"
+    )
+    return np.array(flat).reshape(*size, 4)[::-1, :, :3].transpose(1, 0, 2)
+
+
+def are_stable(tab: Any, place: tuple[int, int]) -> np.ndarray:
+    """Cells of the colour of one that is stable."""
+    colours = cells(tab)
+    return np.asarray(np.all(colours == colours[place], axis=2))
+
+
+def test_the_page_shows_what_python_computes(page: Page) -> None:
+    drawn = page.drawn
+    assert drawn["numbers"]["abscissa"] == pytest.approx(LOOP.spectral_abscissa(), rel=1e-12)
+    assert drawn["numbers"]["margins"]["gain"] == pytest.approx(LOOP.margin().gain_margin)
+    chart = dtm.stability_map(LOOP, RANGES, shape=(300, 300), abscissa=False)
+    assert drawn["stable"] == pytest.approx(chart.stable.mean(), abs=1e-12)
+    assert np.array_equal(are_stable(page.tab, (60, 150)), chart.stable)
+    assert page.tab.inner_text("#verdict") == "Stable"
+
+
+def test_a_slider_moves_everything(page: Page) -> None:
+    before = page.drawn
+    page.tab.focus("#range-delay")
+    for _ in range(5):
+        page.tab.keyboard.press("Shift+ArrowRight")
+    drawn = page.drawn
+    delay = drawn["state"]["delay"]
+    assert delay == pytest.approx(0.86)
+    loop = LOOP.replace(delay=delay)
+    assert drawn["numbers"]["abscissa"] == pytest.approx(loop.spectral_abscissa(), rel=1e-9)
+    assert drawn["stable"] < before["stable"]
+    page.tab.fill("#number-sample_time", "0.065")
+    page.tab.keyboard.press("Enter")
+    sampled = page.drawn
+    known = loop.replace(sample_time=0.065).spectral_abscissa()
+    assert sampled["numbers"]["abscissa"] == pytest.approx(known, rel=1e-9)
+    assert "sampled" in page.tab.inner_text("#margins")
+    held = loop.replace(sample_time=0.065)
+    chart = dtm.stability_map(held, RANGES, shape=(150, 150), abscissa=False)
+    assert np.array_equal(are_stable(page.tab, (20, 75)), chart.stable)
+
+
+def test_the_point_is_dragged_and_moved_by_keys(page: Page) -> None:
+    box = page.tab.locator("#map .frame").bounding_box()
+    page.tab.mouse.move(box["x"] + 5, box["y"] + box["height"] / 2)
+    page.tab.mouse.down()
+    page.tab.mouse.move(box["x"] + 0.99 * box["width"], box["y"] + box["height"] / 2, steps=4)
+    page.tab.mouse.up()
+    state = page.drawn["state"]
+    assert state["Kp"] == pytest.approx(5.94, abs=0.03)
+    assert state["Kv"] == pytest.approx(0.0, abs=0.02)
+    assert page.tab.inner_text("#verdict") == "Unstable"
+    page.tab.focus("#map")
+    page.tab.keyboard.press("ArrowLeft")
+    assert page.drawn["state"]["Kp"] == pytest.approx(state["Kp"] - 0.06)
+
+
+def test_a_copied_address_shows_the_same_view(page: Page, browser: Any) -> None:
+    page.tab.select_option("#controller", "PI")
+    page.tab.fill("#number-gain", "0.7")
+    page.tab.keyboard.press("Enter")
+    state = page.drawn["state"]
+    assert (state["controller"], state["gain"], state["y"]) == ("PI", 0.7, "Ki")
+    page.tab.wait_for_function("() => location.hash.includes('controller')")
+    other = Page(browser, page.tab.url)
+    assert other.drawn["state"] == state
+    other.close()
+
+
+@pytest.mark.parametrize("broken", ["#delay=%7B", "#delay=-1e999&Kp", "#x=%22nothing%22&num=3"])
+def test_a_broken_address_is_left_out(browser: Any, address: str, broken: str) -> None:
+    opened = Page(browser, address + broken)
+    assert opened.drawn["state"]["delay"] == 0.36
+    assert opened.tab.inner_text("#problem") == ""
+    opened.close()
+
+
+def test_every_plant_controller_and_axis_can_be_shown(page: Page) -> None:
+    for plant in ("integrator", "first_order", "rational"):
+        page.tab.select_option("#plant", plant)
+        for controller in ("P", "PI", "PD", "PV", "PID"):
+            page.tab.select_option("#controller", controller)
+            assert page.drawn["state"]["plant"] == plant
+            axes = page.tab.evaluate("() => [...document.getElementById('axis-y').options].length")
+            for i in range(axes):
+                page.tab.select_option("#axis-y", index=i)
+                assert "proved" in page.tab.inner_text("#timing")
+                assert page.drawn["state"]["controller"] == controller
+                assert page.tab.inner_text("#problem") == "", page.drawn["state"]
+
+
+def test_a_plant_becomes_its_polynomials(page: Page) -> None:
+    page.tab.fill("#number-lag", "0.2")
+    page.tab.keyboard.press("Enter")
+    before = page.drawn["numbers"]["abscissa"]
+    page.tab.select_option("#plant", "rational")
+    drawn = page.drawn
+    assert drawn["state"]["den"] == [0.2, 1, 0]
+    assert drawn["numbers"]["abscissa"] == pytest.approx(before, rel=1e-12)
+
+
+def test_what_is_saved_can_be_read(page: Page, tmp_path: Path) -> None:
+    saved = {}
+    for name in ("json", "svg", "png"):
+        with page.tab.expect_download() as waiting:
+            page.tab.click(f"#{name}")
+        saved[name] = tmp_path / waiting.value.suggested_filename
+        waiting.value.save_as(saved[name])
+    found = json.loads(saved["json"].read_text())
+    assert found["schema"] == "deadtime.explorer/1"
+    assert found["state"]["delay"] == 0.36
+    for x, y, omega in found["curves"][0][0]:
+        member = LOOP.replace(Kp=x, Kv=y)
+        assert abs(member.characteristic()(1j * omega)) < 1e-8 * (1.0 + omega)
+    assert "<image" in saved["svg"].read_text()
+    assert saved["png"].read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [360, 1300])
+def test_no_serious_finding_of_axe_and_nothing_cut_off(
+    browser: Any, address: str, scheme: str, width: int
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is missing")
+    size = {"width": width, "height": 900}
+    opened = Page(browser, address, viewport=size, color_scheme=scheme, reduced_motion="reduce")
+    assert opened.tab.evaluate("() => document.documentElement.scrollWidth") <= width
+    found = axe.Axe().run(opened.tab).response["violations"]
+    serious = [one for one in found if one["impact"] in ("serious", "critical")]
+    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in serious] == []
+    opened.close()
+
+
+def test_an_interval_of_the_delay_is_a_band(browser: Any, tmp_path: Path) -> None:
+    from deadtime.loops._explored import explorer_of
+
+    place = explorer_of(LOOP.specification, RANGES, (0.3, 0.42)).save(tmp_path / "band.html")
+    opened = Page(browser, place.as_uri())
+    drawn = opened.drawn
+    charts = [
+        dtm.stability_map(LOOP.replace(delay=late), RANGES, shape=(150, 150), abscissa=False)
+        for late in np.linspace(0.3, 0.42, 5)
+    ]
+    stable = np.all([chart.stable for chart in charts], axis=0)
+    assert drawn["stable"] == pytest.approx(stable.mean(), abs=1e-12)
+    opened.tab.click("#drop-interval")
+    assert opened.drawn["stable"] > drawn["stable"]
+    opened.close()
