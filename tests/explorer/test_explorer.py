@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_line import run
 from deadtime.loops._explored import described
+from deadtime.tuning._live import live_section
 
 LOOP = dtm.ControlLoop(dtm.Integrator(0.9, 0.1), dtm.PV(1.5, 0.13), delay=0.36, limit=1.0)
 
@@ -96,6 +97,20 @@ def test_a_rational_plant_keeps_its_gain_apart() -> None:
     )
     state = described(loop.specification)
     assert (state["gain"], state["num"], state["den"]) == (0.5, [2.0], [1.0, 3.0, 0.0])
+
+
+def test_a_design_opens_with_the_interval_of_its_delay_and_stands_in_reports() -> None:
+    found = dtm.design(LOOP, controller=dtm.PV, delay=(0.3, 0.4), shape=(9, 9))
+    state = found.explore().state
+    assert (state["Kp"], state["interval"]) == (found.gains["Kp"], [0.3, 0.4])
+    heading, frame = live_section(found)
+    assert heading.startswith("<h2>")
+    assert "<iframe" in frame
+    assert "<script" not in frame
+    G = 1 / (dtm.s + dtm.delay(0.1))
+    inside = dtm.ControlLoop(G, dtm.P(0.5), delay=0.1)
+    ranges = {"Kp": (0.1, 0.6)}
+    assert live_section(dtm.design(inside, controller=dtm.P, ranges=ranges)) == []
 
 
 def test_the_command_writes_the_page_of_a_loop_and_of_a_recording(tmp_path: Path) -> None:

@@ -189,7 +189,7 @@ def test_what_is_saved_can_be_read(page: Page, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 1300])
+@pytest.mark.parametrize("width", [360, 900, 1300])
 def test_no_serious_finding_of_axe_and_nothing_cut_off(
     browser: Any, address: str, scheme: str, width: int
 ) -> None:
@@ -201,6 +201,27 @@ def test_no_serious_finding_of_axe_and_nothing_cut_off(
     serious = [one for one in found if one["impact"] in ("serious", "critical")]
     assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in serious] == []
     opened.close()
+
+
+def test_a_page_in_a_frame_works(browser: Any, tmp_path: Path) -> None:
+    place = tmp_path / "report.html"
+    text = (
+        f"<!doctype html><html lang='en'><title>Report</title>{LOOP.explore(RANGES).frame}</html>"
+    )
+    place.write_text(text, encoding="utf-8")
+    tab = browser.new_page()
+    said: list[str] = []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.goto(place.as_uri())
+    frame = tab.frame_locator("iframe")
+    frame.locator("body[data-ready=yes]").wait_for()
+    frame.locator("#number-delay").fill("0.9")
+    frame.locator("#number-delay").press("Enter")
+    tab.wait_for_timeout(400)
+    assert frame.locator("#verdict").inner_text() == "Stable"
+    assert said == []
+    tab.close()
 
 
 def test_an_interval_of_the_delay_is_a_band(browser: Any, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from deadtime._base.page import escaped, page, picture, table, table_row, write_
 from deadtime.flights._learn import COLUMNS, FlightStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
+from deadtime.tuning._live import live_section
 
 PARTS = ("what", "time", "95 % interval")
 
@@ -39,6 +40,7 @@ def render(study: FlightStudy, vehicle: str) -> str:
         _telemetry(study),
         "<h2>The gains</h2>",
         f"<pre>{escaped(learned.designed.summary())}</pre>",
+        *live_section(learned.designed),
     ]
     return page(f"Steps flown by {vehicle}", body)
 

@@ -84,5 +84,5 @@ def _ranges(loop: LoopSpecification) -> dict[str, tuple[float, float]]:
 
 
 def _around(gain: float) -> tuple[float, float]:
-    reach = _REACH * abs(gain) or _GAINS
+    reach = float(f"{_REACH * abs(gain):.1g}") or _GAINS
     return (0.0, reach) if gain > 0.0 else (-reach, reach)

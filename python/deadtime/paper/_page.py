@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from deadtime._base.page import escaped, page, picture, table, table_row, write_page
+from deadtime.loops import PV, ControlLoop, Integrator
 from deadtime.paper import TITLES, Comparison, Grid, Part, Reproduction, Verdict
 
 if TYPE_CHECKING:
@@ -48,6 +49,10 @@ CAPTIONS = {
     "2 % for good.",
 }
 
+#: The loop with velocity feedback, and the gains that its map shows at first.
+LOOP = ControlLoop(Integrator(), PV(Kp=2.0, Kv=0.3), delay=0.36, limit=1.0)
+RANGES = {"Kp": (0.0, 6.0), "Kv": (-1.0, 1.0)}
+
 CLASSES = {
     Verdict.EXACT: "good",
     Verdict.CONFIRMED: "good",
@@ -80,6 +85,7 @@ def render_reproduction(found: Reproduction, figures: dict[str, Figure] | None =
     ]
     for name, part in found.parts.items():
         body += _part(name, part, drawn.get(name))
+    body += ["<h2>The loop of the paper, live</h2>", LOOP.explore(RANGES).frame]
     return page("A paper on delays in quadrotor control, reproduced", body, STYLE)
 
 

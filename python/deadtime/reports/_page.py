@@ -10,6 +10,7 @@ from deadtime.estimation._compare import COLUMNS, truth_row
 from deadtime.estimation._plots import plot_fits
 from deadtime.reports._study import Study
 from deadtime.systems._plots import plot_responses
+from deadtime.tuning._live import live_section
 
 
 def write_report(study: Study, path: Path) -> Path:
@@ -34,6 +35,7 @@ def render(study: Study) -> str:
             _map(study),
             "<h2>Designed with the delay, and without</h2>",
             _responses(study),
+            *live_section(study.designed),
         ],
     )
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from deadtime._base.digits import between
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime.loops import ControlLoop
+from deadtime.loops import ControlLoop, Explorer
+from deadtime.loops._explored import explorer_of
 from deadtime.stability import StabilityMap
 from deadtime.tuning._problem import ObjectiveName, Scenario, Vector
 from deadtime.tuning._region import ConfidenceRegion
@@ -140,6 +141,23 @@ class Design(ReadOnlyArrays):
     def _late(self) -> str:
         ends = dict.fromkeys((self.delays[0], self.delays[-1]))
         return " to ".join(f"{end:g}" for end in ends)
+
+    def explore(self) -> Explorer:
+        """Return a page with the designed loop and the interval of its delay.
+
+        Returns
+        -------
+        deadtime.loops.Explorer
+            See `deadtime.ControlLoop.explore`.
+
+        Raises
+        ------
+        ValueError
+            If the explorer has no such loop.
+        """
+        ends = (min(self.delays), max(self.delays))
+        interval = ends if ends[0] < ends[1] else None
+        return explorer_of(self.loop.specification, interval=interval)
 
     def summary(self) -> str:
         """Gains, their properties and what the requirements cost, in a few lines.

@@ -21,8 +21,8 @@ SCRIPTS = ("kernels", "state", "drawing", "map_view", "panels", "controls", "dow
 
 _PLACE = Path(__file__).parent
 
-#: Height of the explorer in a notebook, in pixels.
-_HEIGHT = 900
+#: Height of the explorer inside of another page, in pixels.
+_HEIGHT = 1000
 
 
 @dataclass(frozen=True)
@@ -110,11 +110,16 @@ class Explorer:
         webbrowser.open(Path(file.name).as_uri())
         return Path(file.name)
 
-    def _repr_html_(self) -> str:
+    @property
+    def frame(self) -> str:
+        """The page as an HTML element, to stand inside of another page."""
         return (
             f'<iframe title="{html.escape(self.title)}" srcdoc="{html.escape(self.html)}" '
-            f'style="width: 100%; height: {_HEIGHT}px; border: 0"></iframe>'
+            f'loading="lazy" style="width: 100%; height: {_HEIGHT}px; border: 0"></iframe>'
         )
+
+    def _repr_html_(self) -> str:
+        return self.frame
 
 
 def kernels() -> bytes:

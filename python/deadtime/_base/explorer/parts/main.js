@@ -60,6 +60,8 @@ async function main() {
 
   // A browser takes few changes of the address a second.
   function writeAddress() {
+    // A frame inside of another page has no address of its own.
+    if (location.protocol === "about:") return;
     const fragment = toFragment(state, first);
     const path = location.pathname + location.search;
     history.replaceState(null, "", fragment ? `#${fragment}` : path);
