@@ -1,6 +1,9 @@
 """Sphinx configuration."""
 
+import tempfile
 from importlib.metadata import version as installed_version
+
+import deadtime as dtm
 
 project = "deadtime"
 author = "The deadtime developers"
@@ -10,6 +13,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
+    "sphinx_copybutton",
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 autodoc_default_options = {
@@ -20,5 +24,20 @@ autodoc_member_order = "groupwise"
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 exclude_patterns = ["_build", "paper/reproduction-numbers.md"]
-html_theme = "alabaster"
+html_theme = "furo"
 html_title = "deadtime"
+html_static_path = ["styles"]
+html_css_files = ["pages.css"]
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#0b5f9e", "color-brand-content": "#0b5f9e"},
+    "dark_css_variables": {"color-brand-primary": "#7cc0f5", "color-brand-content": "#7cc0f5"},
+}
+# What a reader copies is what a console takes.
+copybutton_prompt_text = ">>> "
+
+# The explorer of the first page.
+_explorer = tempfile.mkdtemp(prefix="deadtime-docs-")
+dtm.ControlLoop(dtm.Integrator(), dtm.PV(Kp=1.5, Kv=0.13), delay=0.36, limit=1.0).explore(
+    {"Kp": (0.0, 6.0), "Kv": (-1.0, 1.0)}
+).save(f"{_explorer}/explorer.html")
+html_extra_path = [_explorer]
