@@ -95,9 +95,10 @@ def test_json_on_a_poor_terminal_is_the_same_json():
     before = (
         "from deadtime._cli.show import print_json\n"
         f"{MADE_READABLE}"
-        "print_json({'where': 'σ → ω', 'n': 1.5})\n"
+        "print_json('any', {'where': 'σ → ω', 'n': 1.5})\n"
         "sys.exit()"
     )
     poor = command(before=before, PYTHONIOENCODING="ascii").stdout
     rich = command(before=before, PYTHONIOENCODING="utf-8").stdout
-    assert json.loads(poor) == json.loads(rich) == {"where": "σ → ω", "n": 1.5}
+    expected = {"schema": "deadtime.any/1", "where": "σ → ω", "n": 1.5}
+    assert json.loads(poor) == json.loads(rich) == expected

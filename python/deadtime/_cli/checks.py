@@ -16,7 +16,9 @@ def show_checks(files: Sequence[Path], checks: Sequence[RecordingCheck], as_json
         found = [
             {"file": file, **check.to_dict()} for file, check in zip(files, checks, strict=True)
         ]
-        print_json({"refused": any(check.refused for check in checks), "recordings": found})
+        print_json(
+            "check", {"refused": any(check.refused for check in checks), "recordings": found}
+        )
         return
     for file, check in zip(files, checks, strict=True):
         described, *findings = check.summary().splitlines()

@@ -38,6 +38,7 @@ def command(
     page = write_report(found, folder / "report.html")
     if as_json:
         print_json(
+            "demo",
             {
                 "truth": flight.numbers,
                 "estimates": {
@@ -47,7 +48,7 @@ def command(
                 "verdict": found.verdict(),
                 "flight": file,
                 "report": page,
-            }
+            },
         )
         return
     print_table(estimates_table(found.comparison, flight.numbers))

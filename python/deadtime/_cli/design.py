@@ -88,7 +88,7 @@ def command(
         choice = found.filter_choice
         save_figure(found.plot() if choice is None else choice.plot(), plot)
     if as_json:
-        print_json(_as_dict(found))
+        print_json("design", _as_dict(found))
         return
     print_text(found.summary(), wrapped=False)
 

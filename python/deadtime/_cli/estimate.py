@@ -194,7 +194,7 @@ def command(
     if plot is not None:
         _draw(fit, plot)
     if as_json:
-        print_json(fit.to_dict() | {"findings": findings})
+        print_json("estimate", fit.to_dict() | {"findings": findings})
     else:
         print_headline(fit)
         print_grave_findings(findings)
@@ -243,7 +243,7 @@ def _show_choice(
     if plot is not None:
         _draw(choice.best, plot)
     if as_json:
-        print_json(choice.to_dict() | {"findings": findings})
+        print_json("plant-choice", choice.to_dict() | {"findings": findings})
         return
     print_headline(choice.best)
     print_grave_findings(findings)
@@ -267,6 +267,7 @@ def _show_all(
         save_figure(figure, plot)
     if as_json:
         print_json(
+            "comparison",
             {
                 "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
                 "refusals": comparison.refusals,
@@ -275,7 +276,7 @@ def _show_all(
                 },
                 "explanation": comparison.explanation(),
                 "findings": findings,
-            }
+            },
         )
         return
     print_headline(comparison.best)

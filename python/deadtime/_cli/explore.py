@@ -70,6 +70,6 @@ def command(
         page = found.explore()
     place = page.save(out) if out is not None else page.show()
     if as_json:
-        print_json({"page": place, "state": page.state})
+        print_json("explore", {"page": place, "state": page.state})
         return
     print_text(f"page: {place}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
@@ -13,12 +12,12 @@ from typing import Annotated
 import typer
 
 from deadtime._base.drawing import check_matplotlib
-from deadtime._base.plain import plain
 from deadtime._cli import options as opt
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
 from deadtime._cli.show import (
     ERRORS,
+    as_json_text,
     print_json,
     print_table,
     print_text,
@@ -127,11 +126,11 @@ def command(
         raise
     page = where / "report.html"
     result = {"flown_on": vehicle.name, **study.to_dict(), "report": page, "folder": where}
-    text = json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False)
+    text = as_json_text("flight", result)
     (where / "result.json").write_text(text + "\n", encoding="utf-8")
     write_flight_page(study, page, vehicle.name)
     if as_json:
-        print_json(result)
+        print_json("flight", result)
     else:
         _print_study(study, page)
 

@@ -34,11 +34,11 @@ def command(
     if loop is not None:
         one = found.loop(loop)
         if as_json:
-            print_json(one.to_dict())
+            print_json("log-loop", one.to_dict())
         else:
             _print_loop(one)
     elif as_json:
-        print_json(found.to_dict())
+        print_json("log", found.to_dict())
     else:
         _print_log(found)
 

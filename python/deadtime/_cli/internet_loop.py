@@ -126,7 +126,7 @@ def command(
         plot_internet_loop(found, printed, axes)
         save_figure(figure, plot)
     if as_json:
-        print_json({**found.to_dict(), "table_1": printed})
+        print_json("internet-loop", {**found.to_dict(), "table_1": printed})
         return
     rows = [_row(run, printed) for run in found.runs]
     print_table(results_table(HEADS, rows, "Times in ms"))

@@ -52,10 +52,10 @@ def command(
             raise ValueError("--out writes the page of one log: give one, or leave it out")
     found = [_told(open_log(one, flight=flight), axis, loop, as_json) for one in logs]
     if as_json and len(found) == 1:
-        print_json(found[0].to_dict())
+        print_json("latency", found[0].to_dict())
     elif as_json:
         changes = [one.to_dict() for one in compare_latencies(*found)]
-        print_json({"logs": [one.to_dict() for one in found], "changes": changes})
+        print_json("latency-change", {"logs": [one.to_dict() for one in found], "changes": changes})
     else:
         for one in found:
             _print(one)

@@ -95,6 +95,7 @@ def command(
         save_figure(figure, plot)
     if as_json:
         print_json(
+            "map",
             {
                 "axes": chart.axes,
                 "unstable": chart.unstable,
@@ -108,7 +109,7 @@ def command(
                 "best_abscissa": abscissa,
                 "best_delay_margin": margin,
                 "crossings": None if crossed is None else _attributes(crossed, *CROSSINGS),
-            }
+            },
         )
         return
     cells = chart.stable.size

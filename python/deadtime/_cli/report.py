@@ -38,7 +38,9 @@ def command(
         found = study(recording, loop, window=window, progress=begin)
     write_report(found, out)
     if as_json:
-        print_json({"verdict": found.verdict(), "report": out, "gains": found.designed.gains})
+        print_json(
+            "report", {"verdict": found.verdict(), "report": out, "gains": found.designed.gains}
+        )
         return
     print_text(found.verdict())
     print_text(f"report: {out}")

@@ -63,7 +63,7 @@ def command(
             save_figure(figure, files[name])
         written = write_reproduction(found, page or out / "reproduction.html", figures)
     if as_json:
-        print_json({**found.to_dict(), "figures": files, "page": written})
+        print_json("reproduction", {**found.to_dict(), "figures": files, "page": written})
         return
     for name, part in found.parts.items():
         _show(TITLES[name], part)

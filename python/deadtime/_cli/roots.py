@@ -62,6 +62,7 @@ def command(
         save_figure(figure, plot)
     if as_json:
         print_json(
+            "roots",
             {
                 "roots": [complex(root) for root in found.roots],
                 "multiplicities": found.multiplicities,
@@ -71,7 +72,7 @@ def command(
                 "chain_abscissa": chain,
                 "spectral_abscissa": loop.spectral_abscissa(),
                 "stable": loop.is_stable(),
-            }
+            },
         )
         return
     rows = [

@@ -20,13 +20,22 @@ from deadtime._cli.readable import shows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Version of what the commands print as JSON: a new one where a key goes or changes its meaning.
+SCHEMA = 1
+
 console = Console()
 PICTURES = (".png", ".svg", ".pdf")
 
 
-def print_json(found: Mapping[str, Any]) -> None:
-    """Print values as JSON; numbers that are not finite become null."""
-    text = json.dumps(plain(found), indent=2, ensure_ascii=False, allow_nan=False)
+def as_json_text(schema: str, found: Mapping[str, Any]) -> str:
+    """Values as JSON, the name of their schema first; numbers that are not finite become null."""
+    said = {"schema": f"deadtime.{schema}/{SCHEMA}", **found}
+    return json.dumps(plain(said), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def print_json(schema: str, found: Mapping[str, Any]) -> None:
+    """Print values as JSON."""
+    text = as_json_text(schema, found)
     print(text if shows(text) else json.dumps(json.loads(text), indent=2))
 
 

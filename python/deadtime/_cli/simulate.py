@@ -69,13 +69,14 @@ def command(
         figures = {name: figures[name] if name in PEAK else np.nan for name in figures}
     if as_json:
         print_json(
+            "simulate",
             {
                 "time": response.time,
                 "output": response.outputs,
                 "command": response.inputs,
                 "stable": stable,
                 "info": figures,
-            }
+            },
         )
         return
     limited = " (without the limit on its command)" if limit is not None else ""

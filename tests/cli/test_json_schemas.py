@@ -1,0 +1,76 @@
+"""Every command prints the keys that the page on JSON names for its schema."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from command_line import found
+from made_logs import copter
+
+PAGE = Path(__file__).resolve().parents[2] / "docs/reference/json.md"
+
+
+def documented() -> dict[str, set[str]]:
+    """The keys of each schema in the tables of the page."""
+    sections = re.split(r"^## `(.+)`$", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    keys = {}
+    for schema, text in zip(sections[::2], sections[1::2], strict=True):
+        cells = re.findall(r"^\| (`[^|]+) \|", text, flags=re.MULTILINE)
+        keys[schema] = {key for cell in cells for key in re.findall(r"`(\w+)`", cell)}
+    return keys
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("json")
+    time = 0.065 * np.arange(120)
+    reference = np.where(time >= 0.65, 1.0, 0.0)
+    loop = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(2.4), delay=0.3)
+    noise = np.random.default_rng(1).normal(0.0, 0.005, time.size)
+    output = loop.simulate(time, reference).outputs + noise
+    table = np.column_stack([time, reference, output])
+    np.savetxt(
+        place / "step.csv", table, delimiter=",", header="time,reference,output", comments=""
+    )
+    (place / "flight.bin").write_bytes(copter().data)
+    return place
+
+
+STEP = ("estimate", "step.csv", "--kp", 2.4)
+
+
+@pytest.mark.parametrize(
+    ("schema", "command"),
+    [
+        ("roots", ("roots", "--kp", 2, "--delay", 0.3)),
+        ("map", ("map", "--delay", 0.36, "--shape", 9, 9)),
+        ("design", ("design", "--delay", 0.3, "--controller", "P")),
+        ("simulate", ("simulate", "--kp", 1, "--delay", 0.3)),
+        ("explore", ("explore", "--out", "page.html")),
+        ("report", ("report", "step.csv", "--kp", 2.4, "--out", "report.html")),
+        ("demo", ("demo", "--folder", "demo")),
+        ("estimate", (*STEP, "--method", "auto")),
+        ("comparison", (*STEP, "--method", "all")),
+        ("plant-choice", (*STEP, "--plant", "auto/s")),
+        ("check", (*STEP, "--check")),
+        ("log", ("inspect", "flight.bin")),
+        ("log-loop", ("inspect", "flight.bin", "--loop", "roll")),
+        ("latency", ("latency", "flight.bin", "--loop", "roll")),
+        ("latency-change", ("latency", "flight.bin", "flight.bin", "--loop", "roll")),
+        ("reproduction", ("reproduce", "--only", "figure9")),
+    ],
+)
+def test_the_page_names_what_is_printed(
+    folder: Path, schema: str, command: tuple[object, ...]
+) -> None:
+    printed = found(*command, cwd=folder)
+    name = printed.pop("schema")
+    assert name == f"deadtime.{schema}/1"
+    assert set(printed) <= documented()[name]
+    optional = {"noise", "link", "no_interval_because"}
+    assert documented()[name] - set(printed) <= optional
+    assert f"`{name}`" in PAGE.read_text(encoding="utf-8").split("\n## ")[0]
