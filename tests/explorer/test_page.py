@@ -11,6 +11,7 @@ from typing import Any
 import deadtime as dtm
 import numpy as np
 import pytest
+from web_kernels import recorded_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.5, 0.13), delay=0.36, limit=1.0)
 RANGES = {"Kp": (0.0, 6.0), "Kv": (-0.9, 0.9)}
@@ -222,6 +223,61 @@ def test_a_page_in_a_frame_works(browser: Any, tmp_path: Path) -> None:
     assert frame.locator("#verdict").inner_text() == "Stable"
     assert said == []
     tab.close()
+
+
+CSV = {
+    "comma": ("time,reference,output\n", ",", "."),
+    "semicolons and decimal commas": ("Zeit time;ref;height\n", ";", ","),
+}
+
+
+@pytest.mark.parametrize("form", CSV)
+def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, form: str) -> None:
+    recording, loop, delay = recorded_step(2, 0.0, 0.0)
+    columns = (recording.time, recording.reference, recording.output)
+    head, separator, point = CSV[form]
+    rows = [
+        separator.join(f"{value:.6f}".replace(".", point) for value in row)
+        for row in zip(*columns, strict=True)
+    ]
+    log = tmp_path / "step.csv"
+    log.write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+    page.tab.set_input_files("#file", log)
+    page.tab.wait_for_function("() => document.getElementById('estimate').textContent")
+    # Velocity feedback needs the command; under P it follows from the rows.
+    assert "choose the column of the command" in page.tab.inner_text("#estimate")
+    page.tab.select_option("#controller", "P")
+    for name in ("Kp", "sample_time", "limit"):
+        page.tab.fill(f"#number-{name}", f"{loop.parameters[name]:.9f}")
+        page.tab.keyboard.press("Enter")
+    page.tab.click("#fit")
+    state = page.drawn["state"]
+    known = dtm.estimate_delay(recording, loop, free=("delay", "gain"))
+    assert state["interval"] == pytest.approx(known.ci(), abs=1e-3)
+    assert known.ci()[0] < delay < known.ci()[1]
+    assert state["delay"] == pytest.approx(known.delay, abs=2e-4)
+    assert state["gain"] == pytest.approx(known.gain, abs=1e-3)
+    assert "The model explains the recording" in page.tab.inner_text("#estimate")
+    assert page.tab.locator("#recorded circle").count() == 130
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,reference,output\n0,0,0\n", "no rows"),
+        ("time\n0\n1\n2\n", "one column"),
+        ("time,reference,output\n" + "0,0,0\n" * 20, "times must increase"),
+        ("time,reference,output\n0,0\n1,1\n", "2 cells"),
+    ],
+)
+def test_a_file_without_sense_is_refused_in_words(
+    page: Page, tmp_path: Path, text: str, said: str
+) -> None:
+    log = tmp_path / "bad.csv"
+    log.write_text(text, encoding="utf-8")
+    page.tab.set_input_files("#file", log)
+    page.tab.wait_for_function("() => document.getElementById('estimate').textContent")
+    assert said in page.tab.inner_text("#estimate")
 
 
 def test_an_interval_of_the_delay_is_a_band(browser: Any, tmp_path: Path) -> None:

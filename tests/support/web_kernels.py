@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from typing import Any
 
+import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime._base.explorer import kernels
@@ -68,3 +69,28 @@ class WebKernels:
             raise ValueError(memory.read(store, begin, begin + count).decode())
         begin, count = exports["answer"](store), exports["answer_count"](store)
         return np.frombuffer(memory.read(store, begin, begin + 8 * count), dtype="<f8").copy()
+
+
+def recorded_step(
+    seed: int, lag: float, air: float
+) -> tuple[dtm.Recording, dtm.ControlLoop, float]:
+    """A step of a P loop in moving air, with the commands as they were given; loop and delay."""
+    rng = np.random.default_rng(seed)
+    delay, gain, kp = rng.uniform(0.1, 0.4), rng.uniform(0.6, 1.2), rng.uniform(1.0, 2.2)
+    period, parts, rows = 0.065, 65, 130
+    time = period * np.arange(rows)
+    reference = np.where(np.arange(rows) < 15, 0.0, 1.0)
+    commands, outputs = np.zeros(rows), np.zeros(rows)
+    height = speed = wind = 0.0
+    step = period / parts
+    for row in range(rows):
+        outputs[row] = height + rng.normal(0.0, 0.005)
+        commands[row] = np.clip(kp * (reference[row] - outputs[row]), -1.0, 1.0)
+        for part in range(parts):
+            sent = int(np.floor((row * period + (part + 0.5) * step - delay) / period))
+            told = gain * (commands[sent] if sent >= 0 else 0.0)
+            speed = told if lag == 0.0 else speed + (told - speed) * step / lag
+            wind += air * np.sqrt(step) * rng.normal() - wind * step
+            height += step * (speed + wind)
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(kp), sample_time=period, limit=1.0)
+    return dtm.Recording(time, reference, outputs, command=commands), loop, delay

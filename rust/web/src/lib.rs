@@ -9,6 +9,7 @@
 
 mod control_loop;
 mod equations;
+mod estimate;
 mod exchange;
 mod family;
 mod held;
@@ -18,6 +19,7 @@ mod polynomial;
 mod request;
 mod responses;
 mod roots;
+mod statistics;
 
 use exchange::answered;
 
@@ -85,4 +87,10 @@ pub extern "C" fn margins() -> bool {
 #[unsafe(no_mangle)]
 pub extern "C" fn step() -> bool {
     answered(responses::step)
+}
+
+/// Delay, gain and lag of a recording: see [`estimate::estimate`].
+#[unsafe(no_mangle)]
+pub extern "C" fn estimate() -> bool {
+    answered(estimate::estimate)
 }

@@ -17,7 +17,10 @@ from pathlib import Path
 from typing import Any
 
 #: The scripts of the page; a later one uses what the earlier ones define.
-SCRIPTS = ("kernels", "state", "drawing", "map_view", "panels", "controls", "downloads", "main")
+SCRIPTS = (
+    *("kernels", "state", "drawing", "map_view", "panels", "recording", "controls", "downloads"),
+    "main",
+)
 
 _PLACE = Path(__file__).parent
 

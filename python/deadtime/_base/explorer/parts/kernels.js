@@ -66,6 +66,29 @@ async function loadKernels(base64) {
       const [stable, gain, reduction, phase, delay] = call("margins", encoded(loop));
       return { stable: stable === 1, gain, reduction, phase, delay };
     },
+    // Delay, lag, their sum and gain of a recording under these commands, each with its interval.
+    estimate(loop, rows, commands, hasLag) {
+      const list = (numbers) => [numbers.length, ...numbers];
+      const lag = hasLag || loop.plant === "first_order" ? 1 : 0;
+      const request = [...list(loop.num), ...list(loop.den), lag];
+      for (const numbers of [rows.time, rows.output, rows.time, commands]) request.push(...list(numbers));
+      const answer = call("estimate", request);
+      const part = (i) => ({ value: answer[3 * i], low: answer[3 * i + 1], high: answer[3 * i + 2] });
+      const [noise, air, trim, white, further, adequate] = answer.subarray(12, 18);
+      return {
+        delay: part(0),
+        lag: part(1),
+        sum: part(2),
+        gain: part(3),
+        noise,
+        air: air === 1,
+        trim: trim === 1,
+        white,
+        further,
+        adequate: adequate === 1,
+        fitted: answer.subarray(18),
+      };
+    },
     step(loop, time, { height = 1, load = false } = {}) {
       const measured = loop.delay_path === "measurement" ? 1 : 0;
       const request = [...encoded(loop), load ? 1 : 0, height, measured, time.length, ...time];

@@ -20,6 +20,21 @@ async function main() {
     },
     kernels,
   );
+  const list = (what) => [what, $(`column-${what}`)];
+  new RecordingView(
+    {
+      file: $("file"),
+      columns: $("columns"),
+      lists: Object.fromEntries(Object.keys(COLUMNS).map(list)),
+      lag: $("fit-lag"),
+      fit: $("fit"),
+      plot: $("recorded"),
+      result: $("estimate"),
+    },
+    kernels,
+    () => state,
+    change,
+  );
   const controls = new Controls($("sliders"), change);
 
   function change(numbers) {
