@@ -259,6 +259,10 @@ def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, f
     assert state["gain"] == pytest.approx(known.gain, abs=1e-3)
     assert "The model explains the recording" in page.tab.inner_text("#estimate")
     assert page.tab.locator("#recorded circle").count() == 130
+    assert page.tab.locator("#recorded").is_visible()
+    page.tab.select_option("#axis-y", "delay")
+    assert page.drawn["state"]["y"] == "delay"
+    assert page.tab.locator("#map .end").count() == 2
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,8 @@ async function main() {
       });
     }
     $("interval-note").textContent = state.interval
-      ? `Delay between ${shown(state.interval[0])} and ${shown(state.interval[1])} s: cells are stable at ${DELAYS} delays of it`
+      ? `Delay between ${shown(state.interval[0])} and ${shown(state.interval[1])} s` +
+        (map.loops(state).length > 1 ? `: cells are stable at ${DELAYS} delays of it` : "")
       : "";
     $("drop-interval").hidden = !state.interval;
   }

@@ -114,8 +114,21 @@ class MapView {
         if (middle) this.frequencies(lines, frame, curve);
       }
     });
+    this.band(lines, frame, state);
     frame.axes();
     this.drawn = frame;
+  }
+
+  // The ends of the interval where the delay itself is an axis.
+  band(lines, frame, state) {
+    const { x, y, width, height } = frame.box;
+    for (const end of state.interval ?? []) {
+      const [px, py] = [frame.px(end), frame.py(end)];
+      const place = { x: { x1: px, x2: px, y1: y, y2: y + height }, y: { x1: x, x2: x + width, y1: py, y2: py } };
+      for (const one of ["x", "y"]) {
+        if (state[one] === "delay") lines.append(svg("line", { ...place[one], class: "end" }));
+      }
+    }
   }
 
   // Frequencies along a curve, where there is room.

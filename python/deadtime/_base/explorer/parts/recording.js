@@ -117,7 +117,7 @@ class RecordingView {
 
   say(text) {
     this.result.textContent = text;
-    this.plot.hidden = true;
+    this.plot.toggleAttribute("hidden", true);
   }
 
   estimate() {
@@ -155,7 +155,7 @@ class RecordingView {
     this.result.replaceChildren(
       ...lines.map((line) => Object.assign(document.createElement("span"), { textContent: line })),
     );
-    this.plot.hidden = false;
+    this.plot.toggleAttribute("hidden", false);
     const width = Math.max(260, this.plot.clientWidth || 320);
     const all = [...rows.output, ...rows.reference];
     const [low, high] = [Math.min(...all), Math.max(...all)];
