@@ -27,6 +27,7 @@ mod nodes;
 mod output;
 mod problem;
 mod run;
+mod scalar;
 mod shifted;
 mod sparsity;
 #[cfg(test)]

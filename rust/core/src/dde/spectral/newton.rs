@@ -3,15 +3,16 @@
 //! For the residual R of Y = y_0 + (h/2) B F(Y) the step δ solves (I − (h/2) B ⊗ J) δ = R, where J
 //! = ∂f/∂y at one node, together with ∂f/∂z for delays shorter than the element. With J = 0 this is
 //! Picard's iteration. Where J is nearly diagonal, or its factors would be too large, one real
-//! system for each component remains. A small system is solved as a whole; a large one is divided
-//! by the eigenvalues of B into complex systems of the size of J. Factors are used for all sweeps,
-//! and for all elements of the same length and order.
+//! system for each component remains, tridiagonal in the Legendre basis. A small system is solved
+//! as a whole; a large one is divided by the eigenvalues of B into complex systems of the size of
+//! J. Factors are used for all sweeps, and for all elements of the same length and order.
 
 use super::delayed::Delayed;
 use super::dense::{Factors, add_multiple, dot};
 use super::jacobian::{Differences, Jacobian, Point};
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation};
+use super::scalar::Scalar;
 use super::shifted::Shifted;
 use super::sparsity::Sparsity;
 use crate::{Error, Task};
@@ -37,12 +38,12 @@ pub(super) struct Newton {
     jacobian: Option<Jacobian>,
     differences: Differences,
     /// The diagonal, where only it is used.
-    diagonal: Option<Vec<f64>>,
+    diagonal: Option<Diagonal>,
     /// (h/2, order) of the factors.
     key: Option<(f64, usize)>,
     whole: Option<Factors>,
     shifted: Option<Shifted>,
-    /// One system for each distinct entry of the diagonal.
+    /// One system for each distinct entry of the diagonal, in their order.
     single: Vec<Single>,
     known: Vec<f64>,
     /// Elements since J was evaluated.
@@ -51,11 +52,38 @@ pub(super) struct Newton {
     waits: bool,
 }
 
+/// The diagonal of a Jacobian.
+#[derive(Debug)]
+struct Diagonal {
+    /// The distinct entries, and the number of components that have them.
+    entries: Vec<(f64, usize)>,
+    /// Index of the entry of each component.
+    of: Vec<usize>,
+}
+
+impl Diagonal {
+    /// Entries that differ by no more than the error of differences become one.
+    fn new(values: &[f64]) -> Self {
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let mut entries: Vec<(f64, usize)> = Vec::new();
+        let mut of = vec![0; values.len()];
+        for component in order {
+            let value = values[component];
+            match entries.last_mut() {
+                Some((entry, count)) if close(*entry, value) => *count += 1,
+                _ => entries.push((value, 1)),
+            }
+            of[component] = entries.len() - 1;
+        }
+        Self { entries, of }
+    }
+}
+
 /// The system of all components with one entry of the diagonal.
 #[derive(Debug)]
 struct Single {
-    slope: f64,
-    factors: Factors,
+    factors: Scalar,
     /// The inverse, where many components share it.
     inverse: Option<Vec<f64>>,
 }
@@ -149,7 +177,7 @@ impl Newton {
             }
         }
         let alone = off <= OFF_DIAGONAL * on || !Shifted::fits(jacobian, n - 1);
-        self.diagonal = alone.then_some(diagonal);
+        self.diagonal = alone.then(|| Diagonal::new(&diagonal));
         Ok(true)
     }
 
@@ -170,8 +198,8 @@ impl Newton {
             }
             _ => return false,
         };
-        for (&entry, residual) in diagonal.iter().zip(residual.chunks_exact_mut(order)) {
-            let single = self.single.iter().find(|one| close(one.slope, entry));
+        for (&index, residual) in diagonal.of.iter().zip(residual.chunks_exact_mut(order)) {
+            let single = self.single.get(index);
             match single.map(|one| (&one.factors, &one.inverse)) {
                 Some((_, Some(inverse))) => {
                     self.known.clear();
@@ -180,7 +208,7 @@ impl Newton {
                         *step = dot(row, &self.known);
                     }
                 }
-                Some((factors, None)) => factors.solve(residual),
+                Some((factors, None)) => factors.solve(nodes, residual, &mut self.known),
                 None => {}
             }
         }
@@ -193,30 +221,13 @@ impl Newton {
         self.whole = None;
         self.shifted = None;
         self.single.clear();
-        let entry = |i: usize, j: usize, slope: f64| {
-            let identity = if i == j { 1.0 } else { 0.0 };
-            identity - half * nodes.integrate[i * order + j] * slope
-        };
         if let Some(diagonal) = &self.diagonal {
-            for &slope in diagonal {
-                if self.single.iter().any(|one| close(one.slope, slope)) {
-                    continue;
-                }
-                let sharing = diagonal
-                    .iter()
-                    .filter(|other| close(**other, slope))
-                    .count();
-                let size = order * order;
-                let matrix = (0..size).map(|at| entry(at / order, at % order, slope));
-                let Some(factors) = Factors::new(order, matrix.collect()) else {
+            for &(slope, sharing) in &diagonal.entries {
+                let Some(factors) = Scalar::new(order, half * slope) else {
                     return false;
                 };
-                let inverse = (sharing > SHARED).then(|| factors.inverse());
-                self.single.push(Single {
-                    slope,
-                    factors,
-                    inverse,
-                });
+                let inverse = (sharing > SHARED).then(|| factors.inverse(nodes));
+                self.single.push(Single { factors, inverse });
             }
         } else if let Some(jacobian) = &self.jacobian
             && jacobian.dim() * order <= WHOLE

@@ -32,6 +32,10 @@ pub(super) struct Nodes {
     pub(super) to_coefficients: Vec<f64>,
     /// B, N × N row-major.
     pub(super) integrate: Vec<f64>,
+    /// P_k at the N nodes for k below N, a row for each node.
+    pub(super) legendre: Vec<f64>,
+    /// From values at the N nodes to Legendre coefficients, row-major.
+    pub(super) to_legendre: Vec<f64>,
     /// Largest |∫ π| over |π(−1)|.
     pub(super) spread: f64,
 }
@@ -62,12 +66,25 @@ impl Nodes {
                 }
             }
         }
+        let mut legendre_values = vec![0.0; order * order];
+        let mut to_legendre = vec![0.0; order * order];
+        // The quadrature has the weights of the last row of B.
+        let weights = &integrate[(order - 1) * order..];
+        for (i, (x, weight)) in points[1..].iter().zip(weights).enumerate() {
+            for k in 0..order {
+                let value = if k == 0 { 1.0 } else { legendre(k, *x).1 };
+                legendre_values[i * order + k] = value;
+                to_legendre[k * order + i] = (k as f64 + 0.5) * weight * value;
+            }
+        }
         Self {
             order,
             points,
             basis,
             to_coefficients,
             integrate,
+            legendre: legendre_values,
+            to_legendre,
             spread: spread(order),
         }
     }

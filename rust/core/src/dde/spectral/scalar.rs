@@ -1,0 +1,117 @@
+//! The system (I − a B) δ = R of one component, without a full factorisation.
+//!
+//! B integrates the polynomial of degree N − 1 through the nodes. In the Legendre basis
+//! ∫ P_k = (P_{k+1} − P_{k−1}) / (2k + 1), ∫ P_0 = P_1 + P_0, and at the nodes, the zeros of
+//! P_N − P_{N−1}, P_N is P_{N−1}. The system is therefore tridiagonal there. Eliminated from the
+//! highest degree down, its pivots d_k = 1 + a² / ((2k + 1)(2k + 3) d_{k+1}) are at least 1 for
+//! k ≥ 1 and a ≤ 0, and d_0 as well. For a > 0 the pivot d_0 decreases like e^(−a): elements on
+//! which a solution grows that fast are refused. The transformation to coefficients is the
+//! quadrature at the nodes, exact to degree 2N − 2.
+
+use super::dense::dot;
+use super::nodes::Nodes;
+
+/// Smallest pivot relative to the entries of the system.
+const LEAST: f64 = 1e-10;
+
+/// The factors for one a.
+#[derive(Debug)]
+pub(super) struct Scalar {
+    a: f64,
+    /// Factor on row k + 1 that is subtracted from row k.
+    above: Vec<f64>,
+    pivots: Vec<f64>,
+}
+
+impl Scalar {
+    /// Factors; `None` where the system is singular or not finite.
+    pub(super) fn new(order: usize, a: f64) -> Option<Self> {
+        let odd = |k: usize| (2 * k + 1) as f64;
+        let mut pivots = vec![1.0; order];
+        let mut above = vec![0.0; order];
+        pivots[0] = 1.0 - a;
+        pivots[order - 1] = 1.0 - a / odd(order - 1);
+        for k in (0..order - 1).rev() {
+            above[k] = a / odd(k + 1) / pivots[k + 1];
+            pivots[k] += above[k] * a / odd(k);
+        }
+        let least = LEAST * (1.0 + a.abs());
+        let regular = pivots.iter().all(|d| d.is_finite() && *d > least);
+        regular.then_some(Self { a, above, pivots })
+    }
+
+    /// Solve in place; `work` is overwritten.
+    pub(super) fn solve(&self, nodes: &Nodes, values: &mut [f64], work: &mut Vec<f64>) {
+        let order = nodes.order;
+        work.clear();
+        let rows = nodes.to_legendre.chunks_exact(order);
+        work.extend(rows.map(|row| dot(row, values)));
+        let mut higher = 0.0;
+        for (x, above) in work.iter_mut().zip(&self.above).rev() {
+            *x -= above * higher;
+            higher = *x;
+        }
+        let mut lower = 0.0;
+        for (k, (x, pivot)) in work.iter_mut().zip(&self.pivots).enumerate() {
+            // The entry below the diagonal in column k − 1 is −a / (2k − 1).
+            *x = (*x + self.a / (2.0 * k as f64 - 1.0) * lower) / pivot;
+            lower = *x;
+        }
+        for (value, row) in values.iter_mut().zip(nodes.legendre.chunks_exact(order)) {
+            *value = dot(row, work);
+        }
+    }
+
+    /// The inverse, row-major; it pays where many components share it.
+    pub(super) fn inverse(&self, nodes: &Nodes) -> Vec<f64> {
+        let n = nodes.order;
+        let mut inverse = vec![0.0; n * n];
+        let (mut column, mut work) = (vec![0.0; n], Vec::new());
+        for j in 0..n {
+            column.fill(0.0);
+            column[j] = 1.0;
+            self.solve(nodes, &mut column, &mut work);
+            for (row, entry) in inverse.chunks_exact_mut(n).zip(&column) {
+                row[j] = *entry;
+            }
+        }
+        inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::nodes::{ORDERS, nodes};
+    use super::*;
+
+    #[test]
+    fn the_solution_satisfies_the_full_system() {
+        for order in ORDERS {
+            let nodes = nodes(order);
+            for a in [0.0, -1e-9, -0.3, -20.0, -1e8, 0.3, 1.0, 3.0] {
+                let scalar = Scalar::new(order, a).unwrap();
+                let known: Vec<f64> = (0..order).map(|i| ((i * i) as f64).sin()).collect();
+                let mut found: Vec<f64> = nodes
+                    .integrate
+                    .chunks_exact(order)
+                    .zip(&known)
+                    .map(|(row, x)| x - a * dot(row, &known))
+                    .collect();
+                let inverse = scalar.inverse(nodes);
+                let rows = inverse.chunks_exact(order);
+                let by_inverse: Vec<f64> = rows.map(|row| dot(row, &found)).collect();
+                scalar.solve(nodes, &mut found, &mut Vec::new());
+                for (found, known) in found.iter().chain(&by_inverse).zip(known.iter().cycle()) {
+                    assert!((found - known).abs() < 1e-9, "{order} {a}: {found} {known}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_grows_too_fast_or_is_not_finite_is_refused() {
+        for a in [7.0, 1e3, f64::INFINITY, f64::NAN] {
+            assert!(Scalar::new(4, a).is_none(), "{a}");
+        }
+    }
+}
