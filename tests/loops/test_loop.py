@@ -252,6 +252,18 @@ def test_loops_are_values():
         changed.simulate([0.0, 1.0]).outputs[0] = 1.0
 
 
+def test_a_response_does_not_change_with_the_arrays_of_its_call():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36)
+    time, reference = np.linspace(0.0, 8.0, 33), np.linspace(1.0, 0.2, 33)
+    response = loop.simulate(time, reference)
+    other = loop.simulate(time.copy(), reference.copy())
+    kept, info = time.copy(), other.info()
+    time *= 2.0
+    reference[:] = 5.0
+    np.testing.assert_array_equal(response.time, kept)
+    assert response.info() == pytest.approx(info, rel=0.0, abs=0.0, nan_ok=True)
+
+
 def test_the_kit_plant():
     num, den = dtm.kit_plant().polynomials()
     np.testing.assert_array_equal(num, [0.15265, 5.1529])

@@ -99,7 +99,7 @@ class Controller(ABC):
     @property
     def gains(self) -> dict[str, float]:
         """The gains by name."""
-        return {name: float(getattr(self, name)) for name in self._gains()}
+        return {name: getattr(self, name) for name in self._gains()}
 
     @property
     def _filter(self) -> DerivativeFilter | None:

@@ -75,19 +75,27 @@ def _is(other: Any, number: float) -> bool:
     return isinstance(other, (int, float)) and other == number
 
 
+#: Of a part without states.
+_NO_VECTOR = np.empty(0)
+_NO_MATRIX = np.empty((0, 0))
+_FLOAT = np.dtype(np.float64)
+
+
 def vector(entries: Sequence[Any]) -> NDArray[Any]:
     """Array of the entries."""
-    if all(type(entry) is float for entry in entries):
-        return np.array(entries, dtype=np.float64)
-    if any(isinstance(entry, Each) for entry in entries):
-        return np.array(entries, dtype=object)
-    return np.array(entries, dtype=np.result_type(np.float64, *(type(e) for e in entries)))
+    if not entries:
+        return _NO_VECTOR
+    array = np.array(entries)
+    if array.dtype is _FLOAT or array.dtype.kind in "cO":
+        return array
+    return array.astype(np.float64)
 
 
 def matrix(rows: Sequence[Sequence[Any]]) -> NDArray[Any]:
     """Array of shape (m, n) from m rows of n entries."""
-    flat = vector([entry for row in rows for entry in row])
-    return flat.reshape(len(rows), -1 if rows else 0)
+    if not rows:
+        return _NO_MATRIX
+    return vector([entry for row in rows for entry in row]).reshape(len(rows), -1)
 
 
 def zeros(shape: tuple[int, ...], *like: NDArray[Any]) -> NDArray[Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -110,18 +111,54 @@ class LoopInTime:
         >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
         [ 0.         -1.31       -0.348984]
         """
-        run = _simulated if self.specification.plant.is_rational else simulate_with_delays
-        return run(
-            self.specification,
-            time,
-            reference,
-            initial_output=initial_output,
-            reference_before=reference_before,
-            reference_time=reference_time,
-            command_history=command_history,
-            sample_phase=sample_phase,
-            sensitivities=sensitivities,
+        loop = self.specification
+        if not loop.plant.is_rational:
+            return simulate_with_delays(
+                loop,
+                time,
+                reference,
+                initial_output=initial_output,
+                reference_before=reference_before,
+                reference_time=reference_time,
+                command_history=command_history,
+                sample_phase=sample_phase,
+                sensitivities=sensitivities,
+            )
+        times = one_dimensional("time", time)
+        if times.size == 0:
+            raise ValueError("time is empty: give at least one output time")
+        initial = before = finite("initial_output", initial_output)
+        if reference_before is not None:
+            before = finite("reference_before", reference_before)
+        held: float | Vector
+        past, held_from = before, None
+        if type(reference) is float and reference_time is None:
+            held = finite("reference", reference)
+        else:
+            jumps = reference_jumps(times, reference, reference_time, before)
+            # The arrays belong to the caller; the response must not change with them.
+            held, held_from = jumps.values.copy(), jumps.times.copy()
+            if held_from[0] < times[0]:
+                past = jumps.just_before(float(times[0]))
+        history = None
+        if not isinstance(command_history, tuple) or command_history:
+            history = one_dimensional("command_history", command_history).copy()
+        phase = finite("sample_phase", sample_phase)
+        state, command = loop.rest_at(initial, past)
+        run = (state, command, before, held, held_from, history, phase)
+        found = loop.native.respond(times, run, loop.output_lead)
+        response = Response._of_fresh(found, _Again(loop, found["time"], run))
+        if not sensitivities:
+            return response
+        names, start = slope_names(loop, sensitivities), float(times[0])
+        slopes, input_slopes = output_and_input_slopes(
+            loop,
+            names,
+            (initial, past),
+            _moved(loop, response.time - start, start, phase),
+            _since_start(loop, start, LoopRun(*run)),
         )
+        return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
 
     def step_response(self, time: ArrayLike | None = None, amplitude: float = 1.0) -> Response:
         """Response to a step of the reference from rest at zero.
@@ -151,9 +188,7 @@ class LoopInTime:
         if not loop.plant.is_rational:
             return settled_step_with_delays(loop, amplitude)
         longest = loop.known_delay + (loop.sample_time or 0.0)
-        return until_settled(
-            lambda times: _simulated(loop, times, amplitude), loop.model.A, longest
-        )
+        return until_settled(lambda times: self.simulate(times, amplitude), loop.model.A, longest)
 
     def impulse_response(self, time: ArrayLike | None = None) -> Response:
         """Response to an impulse of the reference of unit area, from rest at zero.
@@ -198,56 +233,6 @@ class LoopInTime:
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
 
 
-def _simulated(
-    loop: LoopSpecification,
-    time: ArrayLike,
-    reference: ArrayLike,
-    *,
-    initial_output: float = 0.0,
-    reference_before: float | None = None,
-    reference_time: ArrayLike | None = None,
-    command_history: ArrayLike = (),
-    sample_phase: float = 0.0,
-    sensitivities: Sequence[str] = (),
-) -> Response:
-    """Check the arguments of `ControlLoop.simulate` and run it."""
-    times = one_dimensional("time", time)
-    if times.size == 0:
-        raise ValueError("time is empty: give at least one output time")
-    initial = finite("initial_output", initial_output)
-    before = initial if reference_before is None else finite("reference_before", reference_before)
-    held: float | Vector
-    past, held_from = before, None
-    if type(reference) is float and reference_time is None:
-        held = last = finite("reference", reference)
-    else:
-        jumps = reference_jumps(times, reference, reference_time, before)
-        held, held_from, last = jumps.values, jumps.times, float(jumps.values[-1])
-        if jumps.times[0] < times[0]:
-            past = jumps.just_before(float(times[0]))
-    history = None
-    if not isinstance(command_history, tuple) or command_history:
-        history = one_dimensional("command_history", command_history)
-    phase = finite("sample_phase", sample_phase)
-    run = LoopRun(*loop.rest_at(initial, past), before, held, held_from, history, phase)
-    # The array belongs to the caller; the response must not change with it.
-    kept = times.copy()
-    found = loop.native.respond(kept, run, loop.output_lead)
-    start = float(kept[0])
-    response = Response._of_fresh(kept, found, _Again(loop, start, run, last))
-    if not sensitivities:
-        return response
-    names = slope_names(loop, sensitivities)
-    slopes, input_slopes = output_and_input_slopes(
-        loop,
-        names,
-        (initial, past),
-        _moved(loop, kept - start, start, phase),
-        _since_start(loop, start, run),
-    )
-    return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
-
-
 def _since_start(loop: LoopSpecification, start: float, run: LoopRun) -> LoopRun:
     """The run in the clock of the stepper, which is zero at the start."""
     times = np.array([start]) if run.reference_time is None else run.reference_time
@@ -265,15 +250,16 @@ def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -
 class _Again:
     """Output of a run at other times: the run is repeated for them."""
 
-    __slots__ = ("last", "loop", "run", "start")
+    __slots__ = ("loop", "run", "times")
 
-    def __init__(self, loop: LoopSpecification, start: float, run: LoopRun, last: float) -> None:
-        self.loop, self.start, self.run, self.last = loop, start, run, last
+    def __init__(self, loop: LoopSpecification, times: Vector, run: tuple[Any, ...]) -> None:
+        self.loop, self.times, self.run = loop, times, run
 
     def steady_state(self) -> float | None:
         """Output at rest under the last reference, None without such a rest."""
-        return self.loop.steady_state(self.last)
+        return self.loop.steady_state(float(np.ravel(LoopRun(*self.run).reference)[-1]))
 
     def __call__(self, times: Vector) -> Vector:
-        run = _since_start(self.loop, self.start, self.run)
-        return self.loop.native.outputs(times - self.start + self.loop.output_lead, run)
+        start = float(self.times[0])
+        run = _since_start(self.loop, start, LoopRun(*self.run))
+        return self.loop.native.outputs(times - start + self.loop.output_lead, run)

@@ -62,11 +62,12 @@ class ReferenceJumps(NamedTuple):
         return float(self.at(np.array([np.nextafter(time, -np.inf)]))[0])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LoopModel:
     """The matrices of a loop with numbers in the place of every parameter.
 
-    Entries may be `Each`: the numbers of many loops.
+    Entries may be `Each`: the numbers of many loops. It never changes, but is not frozen either:
+    that would take three times as long to make.
     """
 
     A: Vector

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import finite, non_negative, non_zero, unmasked
-from deadtime.loops._entries import matrix, number, vector
+from deadtime.loops._entries import number, vector
 from deadtime.roots import s
 from deadtime.systems import TransferFunction
 
@@ -301,16 +301,18 @@ def steady_lag(num: Sequence[float], den: Sequence[float]) -> float:
 def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
     """Observable canonical form of num/den (descending, proper); entries may be arrays."""
     a, b = _led(den), _led(num)
-    b = [0.0] * (len(a) - len(b)) + b
-    direct, n = b[0] / a[0], len(a) - 1
-    poles, gains = ([c / a[0] for c in part[1:]] for part in (a, b))
-    rows = [
-        [0.0 - pole, *(1.0 if j == i + 1 else 0.0 for j in range(1, n))]
-        for i, pole in enumerate(poles)
-    ]
-    drive = [gain - pole * direct for gain, pole in zip(gains, poles, strict=True)]
-    first = np.array([1.0, *[0.0] * (n - 1)][:n])
-    return StateSpace(matrix(rows), vector(drive), first, number(direct))
+    lead, n = a[0], len(a) - 1
+    b = [0.0] * (n + 1 - len(b)) + b
+    direct = b[0] / lead
+    poles = [c / lead for c in a[1:]]
+    flat = [0.0] * (n * n)
+    flat[1 :: n + 1] = [1.0] * max(n - 1, 0)
+    for i, pole in enumerate(poles):
+        flat[i * n] = 0.0 - pole
+    drive = [gain / lead - pole * direct for gain, pole in zip(b[1:], poles, strict=True)]
+    first = np.zeros(n)
+    first[:1] = 1.0
+    return StateSpace(vector(flat).reshape(n, n), vector(drive), first, number(direct))
 
 
 def rest(
@@ -350,7 +352,7 @@ def _led(coefficients: Sequence[Any]) -> list[Any]:
 
 def _is_something(coefficient: Any) -> bool:
     """Whether a number, or any of an array, is other than zero."""
-    if isinstance(coefficient, float):
+    if type(coefficient) is float:
         return coefficient != 0.0
     return bool(np.any(coefficient != 0.0))
 

@@ -57,7 +57,8 @@ class LoopSpecification:
         if self.plant.is_rational:
             # Building the model checks that its parts fit.
             _ = self.model
-        if self.plant.is_rational or not self.plant.is_linear:
+            return
+        if not self.plant.is_linear:
             return
         for name, value in (("sample_time", self.sample_time), ("limit", self.limit)):
             if value is not None:
@@ -73,9 +74,12 @@ class LoopSpecification:
     @property
     def parameters(self) -> dict[str, float]:
         """The named numbers of plant and controller, then those of the loop that are not None."""
-        own = {name: getattr(self, name) for name in ("delay", "sample_time", "limit")}
-        known = {name: value for name, value in own.items() if value is not None}
-        return self.plant.parameters | self.controller.parameters | known
+        numbers = self.plant.parameters | self.controller.parameters
+        own = (("delay", self.delay), ("sample_time", self.sample_time), ("limit", self.limit))
+        for name, value in own:
+            if value is not None:
+                numbers[name] = value
+        return numbers
 
     @property
     def known_delay(self) -> float:
@@ -92,7 +96,7 @@ class LoopSpecification:
         if self.sample_time is not None:
             raise ValueError(f"a loop with sample_time={self.sample_time} {why}")
 
-    @property
+    @cached_property
     def output_lead(self) -> float:
         """How much earlier than its measurement the output is, s."""
         return self.known_delay if self.delay_path == "measurement" else 0.0

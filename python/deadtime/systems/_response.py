@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import finite, positive, real_array
-from deadtime._deadtime import LoopResponse
 from deadtime.systems._step_metrics import OneSignal
 
 if TYPE_CHECKING:
@@ -109,26 +108,12 @@ class Response(ReadOnlyArrays):
         self._freeze()
 
     @classmethod
-    def _of_fresh(
-        cls,
-        time: Vector,
-        found: LoopResponse,
-        run: RepeatedRun,
-    ) -> Response:
-        """Make a response of arrays that are used nowhere else: nothing is copied or converted."""
-        response = object.__new__(cls)
-        fields = response.__dict__
-        fields["time"] = time
-        fields["outputs"] = found.outputs
-        fields["inputs"] = found.inputs
-        fields["breaks"] = found.breaks
-        fields["reference"] = found.reference
-        for array in list(fields.values()):
-            # Read-only, in a fifth of the time that `flags` takes.
-            array.setflags(False)
-        fields["states"] = None
+    def _of_fresh(cls, fields: dict[str, Any], run: RepeatedRun) -> Response:
+        """Make a response of the read-only arrays of `fields`, which becomes its own dict."""
         fields["sensitivities"] = fields["input_sensitivities"] = NONE
         fields["_dense"] = run
+        response = object.__new__(cls)
+        object.__setattr__(response, "__dict__", fields)
         return response
 
     def __getattr__(self, name: str) -> Any:

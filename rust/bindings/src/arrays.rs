@@ -5,9 +5,10 @@ use std::borrow::Cow;
 
 use deadtime::{Error, memory};
 use numpy::ndarray::ArrayViewD;
+use numpy::npyffi::NPY_ARRAY_WRITEABLE;
 use numpy::{
-    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
-    PyUntypedArrayMethods,
+    Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
+    PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -17,6 +18,9 @@ use crate::errors::to_python;
 
 /// What memory is asked for.
 const COPY: &str = "the copy of an array";
+
+/// Number of values up to which an array copies them.
+const SHORT: usize = 1024;
 
 /// The elements in C order: borrowed where they lie so in memory, copied otherwise.
 pub(crate) fn in_order<'a, T: Element + Copy>(
@@ -41,6 +45,22 @@ pub(crate) fn owned<T: Element + Copy>(array: &PyReadonlyArrayDyn<'_, T>) -> PyR
 pub(crate) fn rows(matrix: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
     let rows = matrix.as_array();
     rows.rows().into_iter().map(|row| row.to_vec()).collect()
+}
+
+/// An array of the values that nobody can write to. Short ones are copied, since NumPy then frees
+/// one object instead of two.
+pub(crate) fn frozen(py: Python<'_>, values: Vec<f64>) -> Bound<'_, PyArray1<f64>> {
+    let array = if values.len() <= SHORT {
+        PyArray1::from_slice(py, &values)
+    } else {
+        values.into_pyarray(py)
+    };
+    // SAFETY: the array is new and nobody else has it.
+    #[allow(unsafe_code)]
+    unsafe {
+        (*array.as_array_ptr()).fields.flags &= !NPY_ARRAY_WRITEABLE;
+    }
+    array
 }
 
 /// One column of a list of results.

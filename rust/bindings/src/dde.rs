@@ -9,9 +9,11 @@ use deadtime::stability::{HeldLoop, Specification};
 use deadtime::status::CellStatus;
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
+use pyo3::intern;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::arrays::{column, converted, in_order, owned};
+use crate::arrays::{column, converted, frozen, in_order, owned};
 use crate::frequency::PyMargins;
 use crate::runtime::run_here;
 
@@ -50,8 +52,8 @@ struct SampleUpdate<'py> {
     reference: Floats<'py>,
 }
 
-/// The state in which a run starts, and its reference.
-#[derive(FromPyObject)]
+/// The state in which a run starts, and its reference: a tuple, which takes a third of the time of
+/// attributes.
 pub(crate) struct LoopRun<'py> {
     state: Floats<'py>,
     pub(crate) command: f64,
@@ -61,6 +63,24 @@ pub(crate) struct LoopRun<'py> {
     reference_time: Option<Floats<'py>>,
     command_history: Option<Floats<'py>>,
     pub(crate) sample_phase: f64,
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for LoopRun<'py> {
+    type Error = PyErr;
+
+    fn extract(run: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let (state, command, reference_before, reference, reference_time, command_history, phase) =
+            run.extract()?;
+        Ok(Self {
+            state,
+            command,
+            reference_before,
+            reference,
+            reference_time,
+            command_history,
+            sample_phase: phase,
+        })
+    }
 }
 
 impl LoopRun<'_> {
@@ -100,15 +120,6 @@ impl LoopRun<'_> {
         let (times, values) = self.jumps(Some(0.0))?;
         converted(Reference::new(self.reference_before, times, values))
     }
-}
-
-/// The response of a loop.
-#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
-pub(crate) struct LoopResponse {
-    outputs: Py<PyArray1<f64>>,
-    inputs: Py<PyArray1<f64>>,
-    breaks: Py<PyArray1<f64>>,
-    reference: Py<PyArray1<f64>>,
 }
 
 /// A loop with numbers in the place of all parameters.
@@ -171,14 +182,15 @@ impl PyLinearLoop {
 
     /// The response at `time`, in the clock of the caller; the first of the times is the start.
     ///
-    /// Outputs are `output_lead` earlier than the measurement, in which the delay then is.
+    /// Outputs are `output_lead` earlier than the measurement, in which the delay then is. Returned
+    /// are arrays of a `Response` that nobody can write to, by name; `time` is a copy.
     fn respond<'py>(
         &self,
         py: Python<'py>,
         time: Floats<'py>,
         run: LoopRun<'py>,
         output_lead: f64,
-    ) -> PyResult<LoopResponse> {
+    ) -> PyResult<Bound<'py, PyDict>> {
         let start = run.start()?;
         let times = in_order(&time)?;
         let (reference_time, reference) = run.jumps(times.first().copied())?;
@@ -190,12 +202,13 @@ impl PyLinearLoop {
             reference: &reference,
         };
         let found = run_here(py, |task| self.inner.respond(&start, &request, task))?;
-        Ok(LoopResponse {
-            outputs: found.outputs.into_pyarray(py).unbind(),
-            inputs: found.inputs.into_pyarray(py).unbind(),
-            breaks: found.breaks.into_pyarray(py).unbind(),
-            reference: found.reference.into_pyarray(py).unbind(),
-        })
+        let fields = PyDict::new(py);
+        fields.set_item(intern!(py, "time"), frozen(py, owned(&time)?))?;
+        fields.set_item(intern!(py, "outputs"), frozen(py, found.outputs))?;
+        fields.set_item(intern!(py, "inputs"), frozen(py, found.inputs))?;
+        fields.set_item(intern!(py, "breaks"), frozen(py, found.breaks))?;
+        fields.set_item(intern!(py, "reference"), frozen(py, found.reference))?;
+        Ok(fields)
     }
 
     /// The transition matrix of a sampled loop, limit left out.

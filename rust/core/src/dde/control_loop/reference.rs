@@ -13,7 +13,7 @@ pub struct Reference {
 
 impl Reference {
     /// `values[i]` holds from `times[i]` (increasing) on, `before` until the first of them.
-    pub fn new(before: f64, times: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
+    pub fn new(before: f64, mut times: Vec<f64>, mut values: Vec<f64>) -> Result<Self, Error> {
         refuse_if!(
             times.len() != values.len(),
             "{} reference values for {} reference times: give one value for each time",
@@ -31,12 +31,15 @@ impl Reference {
             );
         }
         // Only true jumps are kept, because each one ends an element of time.
-        let mut last = before;
-        let (times, values) = times
-            .into_iter()
-            .zip(values)
-            .filter(|&(_, value)| value != std::mem::replace(&mut last, value))
-            .unzip();
+        let (mut kept, mut last) = (0, before);
+        for at in 0..times.len() {
+            if values[at] != std::mem::replace(&mut last, values[at]) {
+                (times[kept], values[kept]) = (times[at], values[at]);
+                kept += 1;
+            }
+        }
+        times.truncate(kept);
+        values.truncate(kept);
         Ok(Self {
             before,
             times,

@@ -1,6 +1,6 @@
 //! The requested output of a run: outputs and inputs at given times, breaking points, metrics.
 
-use super::series::Series;
+use super::series::{BLOCK, Series};
 use super::step_metrics::StepMetrics;
 use crate::Error;
 use crate::dde::limits::RESPONSE;
@@ -101,6 +101,19 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         }
     }
 
+    /// Store the outputs at all times before `end`, several at once.
+    pub(crate) fn output_blocks(&mut self, end: f64, values: impl FnMut([S; BLOCK]) -> [S; BLOCK]) {
+        let place = |time| self.ahead.pinned(time);
+        let outputs = &mut self.trajectory.outputs;
+        blocks_before(end, self.output_times, outputs, place, values);
+    }
+
+    /// Store the inputs at all times before `end`, several at once.
+    pub(crate) fn input_blocks(&mut self, end: f64, values: impl FnMut([S; BLOCK]) -> [S; BLOCK]) {
+        let inputs = &mut self.trajectory.inputs;
+        blocks_before(end, self.input_times, inputs, S::from, values);
+    }
+
     /// Store a break of y at `t` unless it lies after the last output time.
     pub(crate) fn output_break(&mut self, t: S) -> Result<(), Error> {
         let t = t.value();
@@ -123,5 +136,23 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
     pub(crate) fn is_done(&self) -> bool {
         self.trajectory.outputs.len() == self.output_times.len()
             && self.trajectory.inputs.len() == self.input_times.len()
+    }
+}
+
+/// Append the values at those of the remaining `times` that are before `end`.
+fn blocks_before<S: Scalar>(
+    end: f64,
+    times: &[f64],
+    found: &mut Vec<S>,
+    place: impl Fn(f64) -> S,
+    mut values: impl FnMut([S; BLOCK]) -> [S; BLOCK],
+) {
+    let left = times.get(found.len()..).unwrap_or_default();
+    let count = left.iter().take_while(|time| **time < end).count();
+    for block in left[..count].chunks(BLOCK) {
+        // The last time stands in for those that a short block lacks.
+        let last = block.len() - 1;
+        let here = values(std::array::from_fn(|i| place(block[i.min(last)])));
+        found.extend_from_slice(&here[..block.len()]);
     }
 }

@@ -94,12 +94,18 @@ impl LinearLoop {
         for t in &mut breaks {
             *t += first;
         }
-        let absolute = Reference::new(
-            request.reference_before,
-            copied(RESPONSE, request.reference_time)?,
-            copied(RESPONSE, request.reference)?,
-        )?;
-        let reference = request.time.iter().map(|&t| absolute.at(t));
+        let mut jumps = request
+            .reference_time
+            .iter()
+            .zip(request.reference)
+            .peekable();
+        let mut last = request.reference_before;
+        let reference = request.time.iter().map(|t| {
+            while let Some((_, value)) = jumps.next_if(|(jump, _)| *jump <= t) {
+                last = *value;
+            }
+            last
+        });
         Ok(Response {
             outputs: found.outputs,
             inputs: found.inputs,

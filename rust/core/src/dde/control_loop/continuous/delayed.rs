@@ -35,6 +35,7 @@ pub(super) fn run<S: Scalar>(
     let mut x = start.state.clone();
     let mut forcing = vec![S::default(); x.len()];
     let mut expansion = Expansion::new(&equations.a, x.len());
+    let held = limit.map(|limit| [limit, -limit].map(Series::constant));
     let mut modes: Vec<Stretch> = Vec::new();
     let mut mode = Mode::Free;
     let mut t = S::default();
@@ -98,11 +99,12 @@ pub(super) fn run<S: Scalar>(
             let y = expansion.output(equations, &w);
             requested.measure(t.value(), h.value(), 1.0, &y.values());
         }
-        requested.outputs_before(next.value() - tolerance, |time| {
-            expansion.output_at(equations, &w, (time - t) / h)
+        requested.output_blocks(next.value() - tolerance, |times| {
+            expansion.outputs_at(equations, &w, times.map(|time| (time - t) / h))
         });
-        requested.inputs_before(next.value() - tolerance, |time| {
-            saturate(u.at((time - t) / h), limit)
+        requested.input_blocks(next.value() - tolerance, |times| {
+            let values = u.at_each(times.map(|time| (time - t) / h));
+            values.map(|u| saturate(u, limit))
         });
 
         modes.clear();
@@ -138,7 +140,7 @@ pub(super) fn run<S: Scalar>(
                     },
                 origin: t + delay,
                 scale,
-                series: clipped(&u, stretch.mode, limit),
+                series: *clipped(&u, stretch.mode, &held),
                 order,
             })?;
         }
@@ -150,12 +152,16 @@ pub(super) fn run<S: Scalar>(
     Ok(requested.trajectory)
 }
 
-/// The command after the limit.
-fn clipped<S: Scalar>(u: &Series<S>, mode: Mode, limit: Option<S>) -> Series<S> {
-    match (mode, limit) {
-        (Mode::High, Some(limit)) => Series::constant(limit),
-        (Mode::Low, Some(limit)) => Series::constant(-limit),
-        _ => *u,
+/// The command after the limit, `held` being those at the limit, the upper one first.
+fn clipped<'a, S: Scalar>(
+    u: &'a Series<S>,
+    mode: Mode,
+    held: &'a Option<[Series<S>; 2]>,
+) -> &'a Series<S> {
+    match (mode, held) {
+        (Mode::High, Some([high, _])) => high,
+        (Mode::Low, Some([_, low])) => low,
+        _ => u,
     }
 }
 

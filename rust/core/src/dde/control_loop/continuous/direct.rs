@@ -17,7 +17,7 @@ use crate::{Error, Task};
 use super::effort::watch;
 use super::expansion::Expansion;
 use super::saturation::{Mode, Stretch, stretches};
-use crate::dde::control_loop::series::Series;
+use crate::dde::control_loop::series::{BLOCK, Series};
 
 /// Changes of mode without progress in time after which the mode is kept, because only rounding
 /// errors at the limit cause them.
@@ -151,9 +151,15 @@ pub(super) fn run<S: Scalar>(
         if requested.is_measured() {
             requested.measure(t.value(), h.value(), end, &y.values());
         }
-        requested.outputs_before(next.value() - tolerance, |time| y.at((time - t) / h));
-        requested.inputs_before(next.value() - tolerance, |time| {
-            held.unwrap_or_else(|| saturate(v.at((time - t) / h), limit))
+        requested.output_blocks(next.value() - tolerance, |times| {
+            y.at_each(times.map(|time| (time - t) / h))
+        });
+        requested.input_blocks(next.value() - tolerance, |times| match held {
+            Some(held) => [held; BLOCK],
+            None => {
+                let values = v.at_each(times.map(|time| (time - t) / h));
+                values.map(|v| saturate(v, limit))
+            }
         });
         if end < 1.0 {
             requested.input_break(next)?;

@@ -1,7 +1,7 @@
 //! The Taylor expansion of the state on one element.
 
 use crate::dde::control_loop::linear_loop::Equations;
-use crate::dde::control_loop::series::{DEGREE, NEGLIGIBLE, Series, horner};
+use crate::dde::control_loop::series::{BLOCK, DEGREE, NEGLIGIBLE, Series, horner, horner_each};
 use crate::dde::scalar::Scalar;
 
 /// A state this small throughout its element counts as zero, so that subnormal numbers, which have
@@ -191,18 +191,32 @@ impl<S: Scalar> Expansion<S> {
         }
     }
 
-    /// y at σ.
-    pub(crate) fn output_at(&self, equations: &Equations<S>, w: &Series<S>, sigma: S) -> S {
-        let mut y = S::default();
+    /// y at several σ.
+    pub(crate) fn outputs_at(
+        &self,
+        equations: &Equations<S>,
+        w: &Series<S>,
+        sigmas: [S; BLOCK],
+    ) -> [S; BLOCK] {
+        let mut outputs = [S::default(); BLOCK];
+        let mut add = |gain: S, values: [S; BLOCK]| {
+            for (y, value) in outputs.iter_mut().zip(values) {
+                *y += gain * value;
+            }
+        };
         for (i, &c) in equations.c.iter().enumerate() {
             if !c.is_nothing() {
-                y += c * self.state(i, sigma);
+                let states = match self.n {
+                    1 => horner_each(&self.terms, 0, 1, self.degree, sigmas),
+                    n => horner_each(&self.terms, i, n, self.degree, sigmas),
+                };
+                add(c, states);
             }
         }
         if !equations.d.is_nothing() {
-            y += equations.d * w.at(sigma);
+            add(equations.d, w.at_each(sigmas));
         }
-        y
+        outputs
     }
 
     /// The series of `row` x + `gain` w + `constant`.

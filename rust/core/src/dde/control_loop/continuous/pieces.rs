@@ -93,11 +93,13 @@ impl<S: Scalar> Piece<S> {
     }
 }
 
-/// The remaining pieces in order; never empty.
+/// The remaining pieces in order.
 #[derive(Debug)]
 pub(super) struct Pieces<S = f64> {
-    front: Piece<S>,
-    rest: VecDeque<Piece<S>>,
+    /// The command before the run, in front of the queue until it has passed.
+    first: Piece<S>,
+    has_passed: bool,
+    queue: VecDeque<Piece<S>>,
     end: S,
     delay: S,
     /// Length of the longest of the latest pieces. Two pieces that are longer together are not
@@ -111,8 +113,9 @@ impl<S: Scalar> Pieces<S> {
     /// The constant `command` until the first command of the run arrives.
     pub(super) fn new(command: S, delay: S) -> Self {
         Self {
-            front: Piece::constant(command, delay),
-            rest: VecDeque::new(),
+            first: Piece::constant(command, delay),
+            has_passed: false,
+            queue: VecDeque::new(),
             end: delay,
             delay,
             longest: 0.0,
@@ -121,18 +124,22 @@ impl<S: Scalar> Pieces<S> {
     }
 
     pub(super) fn front(&self) -> &Piece<S> {
-        &self.front
+        let front = self.queue.front().filter(|_| self.has_passed);
+        front.unwrap_or(&self.first)
     }
 
-    /// Remove what ends at `t`; returns the order of the break that is passed.
+    /// Remove what ends at `t`; returns the order of the break that is passed. The last piece
+    /// stays.
     pub(super) fn reach(&mut self, t: S) -> Order {
         let mut order = SMOOTH;
-        while is_reached(self.front.end, t, slack(t, self.delay)) {
-            let Some(next) = self.rest.pop_front() else {
-                break;
-            };
-            self.front = next;
-            order = order.min(next.order);
+        while is_reached(self.front().end, t, slack(t, self.delay))
+            && self.queue.len() > usize::from(self.has_passed)
+        {
+            if self.has_passed {
+                self.queue.pop_front();
+            }
+            self.has_passed = true;
+            order = order.min(self.front().order);
         }
         order
     }
@@ -144,7 +151,7 @@ impl<S: Scalar> Pieces<S> {
         piece.order = piece.order.min(self.dropped);
         let is_dust = (piece.end - self.end).value() <= slack(piece.end, self.delay)
             && !part_ways(piece.end, self.end);
-        let last = self.rest.back_mut().unwrap_or(&mut self.front);
+        let last = self.queue.back_mut().unwrap_or(&mut self.first);
         let is_same = last.series.degree == 0 && last.series == piece.series;
         self.end = piece.end;
         if is_dust {
@@ -166,7 +173,7 @@ impl<S: Scalar> Pieces<S> {
             };
             return Ok(());
         }
-        if self.rest.len() >= MOST_PIECES {
+        if self.queue.len() >= MOST_PIECES {
             return Err(Error::TooMuch {
                 what: "the continuous response",
                 limit: MOST_PIECES as u64,
@@ -176,6 +183,6 @@ impl<S: Scalar> Pieces<S> {
                         .to_owned(),
             });
         }
-        push_back("the command in one delay", &mut self.rest, piece)
+        push_back("the command in one delay", &mut self.queue, piece)
     }
 }
