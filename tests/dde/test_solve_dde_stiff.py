@@ -216,3 +216,52 @@ def test_the_limit_of_steps():
         limited(max_steps=0)
     with pytest.raises(ValueError, match="jac_sparsity has shape"):
         limited(jac_sparsity=np.eye(2))
+
+
+@pytest.mark.parametrize("n", [9, 40, 600])
+def test_components_that_their_past_alone_couples_take_few_calls(n):
+    # 600 took 8 sweeps an element, because no Jacobian was taken of so many.
+    rng = np.random.default_rng(n)
+    rates, past = rng.uniform(1.0, 9.0, n), rng.normal(size=(n, n)) / np.sqrt(n)
+    start, history = rng.normal(size=n), rng.normal(size=n)
+    found = dtm.solve_dde(
+        lambda t, y, z: past @ z[0] - rates[:, None] * y,
+        (0.0, 4.0),
+        history,
+        1.0,
+        y0=start,
+        rtol=1e-8,
+        atol=1e-10,
+        t_eval=[0.3, 1.0, 4.0],
+        vectorized=True,
+    )
+    rest = past @ history / rates
+    for time, value in zip((0.3, 1.0), found.y.T[:2], strict=True):
+        known = rest + (start - rest) * np.exp(-rates * time)
+        np.testing.assert_allclose(value, known, rtol=1e-7, atol=1e-9)
+    # Two sweeps an element, accepted or not, and one look at the Jacobian.
+    assert found.nfev <= 3 * (found.n_elements + found.n_rejected) + 1
+
+
+@pytest.mark.parametrize("vectorized", [True, False])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_coupling_that_a_look_at_the_diagonal_misses_costs_no_accuracy(seed, vectorized):
+    # One entry beside the diagonal goes unnoticed in one case of four.
+    rng = np.random.default_rng(seed)
+    n = 12
+    matrix = -np.eye(n)
+    row, column = rng.choice(n, 2, replace=False)
+    matrix[row, column] = 5.0
+    start = rng.normal(size=n)
+    found = dtm.solve_dde(
+        lambda t, y, z: matrix @ y,
+        (0.0, 3.0),
+        start,
+        1.0,
+        rtol=1e-8,
+        atol=1e-10,
+        t_eval=[3.0],
+        vectorized=vectorized,
+    )
+    known = np.exp(-3.0) * (start + 3.0 * (matrix + np.eye(n)) @ start)
+    np.testing.assert_allclose(found.y[:, 0], known, rtol=1e-7, atol=1e-9)

@@ -5,28 +5,41 @@
 //! (Mason and Handscomb, Chebyshev Polynomials, 2003, eq. 2.52), and
 //! ∫ T_k = T_{k+1} / (2 (k + 1)) − T_{k−1} / (2 (k − 1)) for k ≥ 2 (eq. 2.43).
 
+use pulp::{Simd, WithSimd};
+
+use crate::simd::Instructions;
+
 /// Fill row k of `table` with T_k at all `points`, for k below `n`.
 pub(super) fn basis(points: &[f64], n: usize, table: &mut Vec<f64>) {
     let m = points.len();
     table.clear();
     table.resize(n.max(2) * m, 1.0);
     table[m..2 * m].copy_from_slice(points);
-    for k in 2..n {
-        let (known, next) = table.split_at_mut(k * m);
-        let (older, old) = known[(k - 2) * m..].split_at(m);
-        for ((next, x), (old, older)) in next.iter_mut().zip(points).zip(old.iter().zip(older)) {
-            *next = 2.0 * x * old - older;
-        }
-    }
+    Instructions::chosen().run(Recurrence { points, table });
 }
 
-/// Σ_k c_k T_k at the `m` points of a table of [`basis`].
-pub(super) fn combine(coefficients: &[f64], table: &[f64], m: usize, out: &mut [f64]) {
-    let out = &mut out[..m];
-    out.fill(0.0);
-    for (c, row) in coefficients.iter().zip(table.chunks_exact(m)) {
-        for (out, t) in out.iter_mut().zip(row) {
-            *out += c * t;
+/// The rows of a table from the third on; those before are known.
+struct Recurrence<'a> {
+    points: &'a [f64],
+    table: &'a mut [f64],
+}
+
+impl WithSimd for Recurrence<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let m = self.points.len().max(1);
+        let mut rows = self.table.chunks_exact_mut(m);
+        let (Some(mut older), Some(mut old)) = (rows.next(), rows.next()) else {
+            return;
+        };
+        for next in rows {
+            let above = next.iter_mut().zip(self.points);
+            for ((next, x), (old, older)) in above.zip(old.iter().zip(older.iter())) {
+                *next = 2.0 * x * old - older;
+            }
+            (older, old) = (old, next);
         }
     }
 }

@@ -9,6 +9,7 @@
 use super::chebyshev;
 use super::history::History;
 use super::nodes::Nodes;
+use super::products::{Rows, multiply};
 use crate::Error;
 
 /// Shift of end nodes towards the inside when their piece is searched for, in gaps between nodes.
@@ -92,16 +93,16 @@ impl Delayed {
                     chebyshev::basis(&self.points, piece.terms, &mut self.table);
                     &self.table
                 };
-                let rows = piece.coefficients.chunks_exact(piece.terms);
-                for (d, c) in rows.enumerate() {
-                    let at = block + d * n + first;
-                    chebyshev::combine(c, table, m, &mut z[at..at + m]);
-                }
+                let rows = Rows::of(piece.terms);
+                let places = Rows {
+                    skip: first,
+                    stride: n,
+                };
+                let z = &mut z[block..block + dim * n];
+                multiply((&piece.coefficients, rows), table, m, (z, places));
                 if !dz.is_empty() {
-                    for (d, c) in piece.slopes.chunks_exact(piece.terms).enumerate() {
-                        let at = block + d * n + first;
-                        chebyshev::combine(c, table, m, &mut dz[at..at + m]);
-                    }
+                    let dz = &mut dz[block..block + dim * n];
+                    multiply((&piece.slopes, rows), table, m, (dz, places));
                 }
                 first = beyond;
             }
@@ -129,12 +130,14 @@ impl Delayed {
     /// Compute again what depends on the iterate, given its coefficients.
     pub(super) fn renew(&self, coefficients: &[f64], n: usize, z: &mut [f64]) {
         for inner in &self.inner {
-            let dim = coefficients.len() / n;
-            for (d, c) in coefficients.chunks_exact(n).enumerate() {
-                let at = (inner.delay * dim + d) * n;
-                let m = n - inner.first;
-                chebyshev::combine(c, &inner.table, m, &mut z[at + inner.first..at + n]);
-            }
+            let block = inner.delay * coefficients.len();
+            let places = Rows {
+                skip: inner.first,
+                stride: n,
+            };
+            let z = &mut z[block..block + coefficients.len()];
+            let rows = (coefficients, Rows::of(n));
+            multiply(rows, &inner.table, n - inner.first, (z, places));
         }
     }
 }

@@ -7,11 +7,11 @@
 
 use super::chebyshev;
 use super::delayed::{Delayed, Place};
-use super::dense::dot;
 use super::history::History;
 use super::newton::Newton;
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation, Problem};
+use super::products::{Rows, multiply};
 use crate::{Error, Task};
 
 /// Largest remaining error of the iteration, in tolerances.
@@ -122,7 +122,7 @@ impl Element {
             .gather(begin.history, &problem.delays, place, dim, z, dz)?;
         if self.delayed.overlaps() != overlapped {
             // The point at which the Jacobian was evaluated has changed.
-            self.newton.turn_off();
+            self.newton.forget();
             self.seen = None;
         }
         self.guess(n, begin);
@@ -154,7 +154,8 @@ impl Element {
         let rows = piece.coefficients.chunks_exact(piece.terms);
         for ((y, initial), c) in self.y.chunks_exact_mut(n).zip(begin.initial).zip(rows) {
             let terms = falling(c, far);
-            chebyshev::combine(&c[..terms], &self.table, n, y);
+            let all = Rows::of(n);
+            multiply((&c[..terms], Rows::of(terms)), &self.table, n, (y, all));
             let shift = initial - y[0];
             y.iter_mut().for_each(|y| *y += shift);
             y[0] = *initial;
@@ -192,10 +193,15 @@ impl Element {
             if let Some(bad) = self.f.iter().position(|f| !f.is_finite()) {
                 return Ok(Sweeps::NotFinite(bad % n));
             }
-            let first_of_all = count == 1 && !self.newton.is_on() && equation.is_costly();
-            if first_of_all && self.newton.comes_first(problem.dim()) {
-                self.linearise(equation, task)?;
+            let costly = equation.is_costly();
+            if count == 1
+                && let Some(most) = self.newton.comes_first(problem.dim(), costly)
+            {
+                self.linearise_at(self.t.len() / 2, most, equation, task)?;
                 self.newton.wait_if_full();
+                if !costly && !self.newton.is_uncoupled() {
+                    self.newton.turn_off();
+                }
             }
             self.residual(nodes, half);
             if self.newton.is_on() && !self.newton.solve(nodes, half, &mut self.residual) {
@@ -231,12 +237,13 @@ impl Element {
         equation: &mut E,
         task: &Task,
     ) -> Result<bool, Error> {
-        self.linearise_at(self.t.len() / 2, equation, task)
+        self.linearise_at(self.t.len() / 2, usize::MAX, equation, task)
     }
 
     fn linearise_at<E: Equation + ?Sized>(
         &mut self,
         node: usize,
+        most: usize,
         equation: &mut E,
         task: &Task,
     ) -> Result<bool, Error> {
@@ -248,7 +255,7 @@ impl Element {
         };
         self.seen = None;
         self.newton
-            .evaluate(equation, at, node, &self.delayed, task)
+            .evaluate(equation, at, node, &self.delayed, most, task)
     }
 
     /// Evaluate the Jacobian at the start, where the iterate is exact for any outcome of the
@@ -258,18 +265,19 @@ impl Element {
         equation: &mut E,
         task: &Task,
     ) -> Result<bool, Error> {
-        self.linearise_at(0, equation, task)
+        self.linearise_at(0, usize::MAX, equation, task)
     }
 
     /// y_0 + (h/2) B F − Y.
     fn residual(&mut self, nodes: &Nodes, half: f64) {
         let order = nodes.order;
-        let rows = self.residual.chunks_exact_mut(order);
+        let (slopes, rows) = (Rows::after_first(order + 1), Rows::of(order));
+        let residual = &mut self.residual;
+        multiply((&self.f, slopes), &nodes.integrals, order, (residual, rows));
         let values = self.y.chunks_exact(order + 1);
-        for ((residual, y), f) in rows.zip(values).zip(self.f.chunks_exact(order + 1)) {
-            let weights = nodes.integrate.chunks_exact(order);
-            for ((residual, weights), value) in residual.iter_mut().zip(weights).zip(&y[1..]) {
-                *residual = y[0] + half * dot(weights, &f[1..]) - value;
+        for (residual, y) in self.residual.chunks_exact_mut(order).zip(values) {
+            for (residual, value) in residual.iter_mut().zip(&y[1..]) {
+                *residual = y[0] + half * *residual - value;
             }
         }
     }

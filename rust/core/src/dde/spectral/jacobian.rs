@@ -3,7 +3,9 @@
 //! J = ∂f/∂y, with ∂f/∂z for the delays shorter than the element, at one node. The first calls take
 //! the base and three columns in which all components move at once, with fixed pseudo-random signs.
 //! They show how much each row can change, so that changes by rounding errors are distinguished
-//! from entries. A pattern that was given or found before is used by groups, and its result is
+//! from entries. Where each row changes as by one entry on the diagonal in all three, the Jacobian
+//! is taken as its diagonal: a row with other entries looks so by chance, which may cost sweeps but
+//! no accuracy. A pattern that was given or found before is used by groups, and its result is
 //! compared with the three columns; where they differ, the pattern is determined again, one
 //! component at a time. Columns come in blocks, so that memory grows with the entries and not with
 //! the square of the components.
@@ -17,11 +19,13 @@ use crate::{Error, Task};
 /// Number of columns in which all components move.
 const CHECKS: usize = 3;
 /// Number of components up to which every entry is kept and none is checked.
-const FEW: usize = 8;
+pub(super) const FEW: usize = 8;
 /// Differences below this share of what a row can change count as rounding errors.
 const ROUNDING: f64 = 1e-6;
 /// Share of what a row can change by which a pattern may be wrong.
 const AGREED: f64 = 1e-2;
+/// Share of the largest entry on the diagonal that others may have to be left out.
+pub(super) const ALONE: f64 = 1e-3;
 /// Upper limit on the numbers in the arguments of one call (bounds memory).
 const BLOCK: usize = 1 << 21;
 /// Upper limit on the entries of a Jacobian (bounds memory).
@@ -107,6 +111,8 @@ pub(super) struct Point<'a> {
 pub(super) struct Differences {
     /// The pattern, the group of each column, and their number.
     known: Option<(Sparsity, Vec<usize>, usize)>,
+    /// Was the last Jacobian taken as its diagonal?
+    alone: bool,
     /// Calls of the right-hand side, and columns in them.
     pub(super) calls: u64,
     pub(super) columns: u64,
@@ -134,17 +140,19 @@ impl Differences {
     pub(super) fn cost(&self, dim: usize) -> usize {
         match &self.known {
             _ if dim <= FEW => dim + 1,
+            None if self.alone => CHECKS + 1,
             Some((_, _, count)) => count + CHECKS + 1,
             None => dim + CHECKS + 1,
         }
     }
 
     /// The Jacobian at a point. Only its diagonal where it has too many entries; `None` where it is
-    /// not finite.
+    /// not finite, or has more components than `most` and an unknown pattern.
     pub(super) fn jacobian<E: Equation + ?Sized>(
         &mut self,
         equation: &mut E,
         point: &Point<'_>,
+        most: usize,
         task: &Task,
     ) -> Result<Option<Jacobian>, Error> {
         let dim = point.y.len();
@@ -184,6 +192,14 @@ impl Differences {
                 self.known = Some((pattern, group, count));
                 return Ok(found);
             }
+        }
+        if let Some(diagonal) = diagonal(point.steps, &base, &checks) {
+            self.alone = true;
+            return Ok(finite(only_diagonal(dim), diagonal));
+        }
+        self.alone = false;
+        if dim > most {
+            return Ok(None);
         }
         self.detect(equation, point, &base, &checks, task)
     }
@@ -265,11 +281,7 @@ impl Differences {
             }
         }
         if !fits {
-            let pattern = Sparsity {
-                starts: (0..=dim).collect(),
-                rows: (0..dim).collect(),
-            };
-            return Ok(finite(pattern, diagonal));
+            return Ok(finite(only_diagonal(dim), diagonal));
         }
         pattern.starts.push(pattern.rows.len());
         self.known = Some(with_groups(pattern.clone()));
@@ -365,6 +377,27 @@ fn sign(check: usize, component: usize) -> f64 {
         bits = (bits ^ (bits >> 31)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     }
     if bits >> 63 == 0 { 1.0 } else { -1.0 }
+}
+
+fn only_diagonal(dim: usize) -> Sparsity {
+    Sparsity {
+        starts: (0..=dim).collect(),
+        rows: (0..dim).collect(),
+    }
+}
+
+/// The diagonal, where it explains the change of every row when all components moved.
+fn diagonal(steps: &[f64], base: &[f64], checks: &[f64]) -> Option<Vec<f64>> {
+    let dim = base.len();
+    let entry =
+        |check: usize, row: usize| sign(check, row) * checks[check * dim + row] / steps[row];
+    let entries: Vec<f64> = (0..dim).map(|row| entry(0, row)).collect();
+    let largest = entries.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+    let agree = |row: usize| {
+        let noise = 64.0 * f64::EPSILON * base[row].abs() / steps[row];
+        (1..CHECKS).all(|check| (entry(check, row) - entries[row]).abs() <= ALONE * largest + noise)
+    };
+    (0..dim).all(agree).then_some(entries)
 }
 
 /// Do the entries explain the change of the right-hand side when all components moved?

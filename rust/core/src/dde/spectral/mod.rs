@@ -26,6 +26,7 @@ mod newton;
 mod nodes;
 mod output;
 mod problem;
+mod products;
 mod run;
 mod scalar;
 mod shifted;

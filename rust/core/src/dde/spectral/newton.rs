@@ -8,17 +8,15 @@
 //! J. Factors are used for all sweeps, and for all elements of the same length and order.
 
 use super::delayed::Delayed;
-use super::dense::{Factors, add_multiple, dot};
-use super::jacobian::{Differences, Jacobian, Point};
+use super::dense::{Factors, add_multiple};
+use super::jacobian::{ALONE, Differences, FEW, Jacobian, Point};
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation};
+use super::products::{Rows, multiply};
 use super::scalar::Scalar;
 use super::shifted::Shifted;
 use super::sparsity::Sparsity;
 use crate::{Error, Task};
-
-/// Off-diagonal part of J, relative to its diagonal, that is left to the sweeps.
-const OFF_DIAGONAL: f64 = 1e-3;
 
 /// Largest number of unknowns of a system that is solved as a whole.
 const WHOLE: usize = 100;
@@ -50,6 +48,8 @@ pub(super) struct Newton {
     pub(super) age: u32,
     /// J is full and large: it is not used until sweeps without it fail.
     waits: bool,
+    /// Has J been evaluated, or at least compared with a diagonal?
+    looked: bool,
 }
 
 /// The diagonal of a Jacobian.
@@ -108,14 +108,32 @@ impl Newton {
         self.key = None;
     }
 
+    /// Discard the Jacobian because it was taken at arguments of another kind.
+    pub(super) fn forget(&mut self) {
+        self.turn_off();
+        self.looked = self.waits;
+    }
+
     /// Does a Jacobian of this many components cost little?
     pub(super) fn is_cheap(&self, dim: usize) -> bool {
         self.differences.cost(dim) <= CHEAP
     }
 
-    /// Should the first sweep use a Jacobian, because calls cost more than nodes?
-    pub(super) fn comes_first(&self, dim: usize) -> bool {
-        !self.waits && self.differences.cost(dim) <= WORTH_A_LOOK
+    /// The number of components up to which the first sweep should use any Jacobian, because calls
+    /// cost more than nodes; beyond, and where calls are cheap, it should use a diagonal one. `None`
+    /// where it should not.
+    pub(super) fn comes_first(&self, dim: usize, costly: bool) -> Option<usize> {
+        if self.is_on() {
+            return None;
+        }
+        let any = costly && !self.waits && self.differences.cost(dim) <= WORTH_A_LOOK;
+        let diagonal = !self.looked && dim > FEW;
+        (any || diagonal).then_some(if any { dim } else { 0 })
+    }
+
+    /// Are the components taken as uncoupled?
+    pub(super) fn is_uncoupled(&self) -> bool {
+        self.is_on() && self.diagonal.is_some()
     }
 
     /// Do not use a Jacobian with costly factors until sweeps without it fail.
@@ -140,8 +158,10 @@ impl Newton {
         at: Columns<'_>,
         node: usize,
         delayed: &Delayed,
+        most: usize,
         task: &Task,
     ) -> Result<bool, Error> {
+        self.looked = true;
         let n = at.t.len();
         let dim = at.y.len() / n;
         let pick =
@@ -160,7 +180,7 @@ impl Newton {
             steps: &steps.collect::<Vec<f64>>(),
             inner: &inner.collect::<Vec<bool>>(),
         };
-        self.jacobian = self.differences.jacobian(equation, &point, task)?;
+        self.jacobian = self.differences.jacobian(equation, &point, most, task)?;
         self.key = None;
         self.age = 0;
         let Some(jacobian) = &self.jacobian else {
@@ -176,7 +196,7 @@ impl Newton {
                 off = off.max(value.abs());
             }
         }
-        let alone = off <= OFF_DIAGONAL * on || !Shifted::fits(jacobian, n - 1);
+        let alone = off <= ALONE * on || !Shifted::fits(jacobian, n - 1);
         self.diagonal = alone.then(|| Diagonal::new(&diagonal));
         Ok(true)
     }
@@ -198,15 +218,22 @@ impl Newton {
             }
             _ => return false,
         };
+        let row = Rows::of(order);
+        if let ([single], true) = (&self.single[..], diagonal.entries.len() == 1)
+            && let Some(inverse) = &single.inverse
+        {
+            self.known.clear();
+            self.known.extend_from_slice(residual);
+            multiply((&self.known, row), inverse, order, (residual, row));
+            return true;
+        }
         for (&index, residual) in diagonal.of.iter().zip(residual.chunks_exact_mut(order)) {
             let single = self.single.get(index);
             match single.map(|one| (&one.factors, &one.inverse)) {
                 Some((_, Some(inverse))) => {
                     self.known.clear();
                     self.known.extend_from_slice(residual);
-                    for (step, row) in residual.iter_mut().zip(inverse.chunks_exact(order)) {
-                        *step = dot(row, &self.known);
-                    }
+                    multiply((&self.known, row), inverse, order, (residual, row));
                 }
                 Some((factors, None)) => factors.solve(nodes, residual, &mut self.known),
                 None => {}

@@ -14,6 +14,7 @@ use std::sync::OnceLock;
 
 use super::chebyshev;
 use super::dense::Factors;
+use super::products::{Rows, multiply, transposed};
 
 /// The numbers of nodes to choose from.
 pub(super) const ORDERS: [usize; 9] = [4, 6, 8, 10, 12, 14, 16, 20, 24];
@@ -28,13 +29,15 @@ pub(super) struct Nodes {
     pub(super) points: Vec<f64>,
     /// T_k at the points, row k.
     pub(super) basis: Vec<f64>,
-    /// From values at the N + 1 points to coefficients, row-major.
-    pub(super) to_coefficients: Vec<f64>,
+    /// From values at the N + 1 points to coefficients, a row for each point.
+    to_coefficients: Vec<f64>,
     /// B, N × N row-major.
     pub(super) integrate: Vec<f64>,
-    /// P_k at the N nodes for k below N, a row for each node.
+    /// The transpose of B: what a value at each node adds to the integrals.
+    pub(super) integrals: Vec<f64>,
+    /// P_k at the N nodes for k below N, a row for each k.
     pub(super) legendre: Vec<f64>,
-    /// From values at the N nodes to Legendre coefficients, row-major.
+    /// From values at the N nodes to Legendre coefficients, a row for each node.
     pub(super) to_legendre: Vec<f64>,
     /// Largest |∫ π| over |π(−1)|.
     pub(super) spread: f64,
@@ -73,15 +76,16 @@ impl Nodes {
         for (i, (x, weight)) in points[1..].iter().zip(weights).enumerate() {
             for k in 0..order {
                 let value = if k == 0 { 1.0 } else { legendre(k, *x).1 };
-                legendre_values[i * order + k] = value;
-                to_legendre[k * order + i] = (k as f64 + 0.5) * weight * value;
+                legendre_values[k * order + i] = value;
+                to_legendre[i * order + k] = (k as f64 + 0.5) * weight * value;
             }
         }
         Self {
             order,
             points,
             basis,
-            to_coefficients,
+            to_coefficients: transposed(&to_coefficients, n),
+            integrals: transposed(&integrate, order),
             integrate,
             legendre: legendre_values,
             to_legendre,
@@ -92,11 +96,8 @@ impl Nodes {
     /// Coefficients of a vector function from its values at the N + 1 points.
     pub(super) fn coefficients(&self, values: &[f64], out: &mut [f64]) {
         let n = self.order + 1;
-        for (values, out) in values.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
-            for (out, row) in out.iter_mut().zip(self.to_coefficients.chunks_exact(n)) {
-                *out = super::dense::dot(row, values);
-            }
-        }
+        let rows = Rows::of(n);
+        multiply((values, rows), &self.to_coefficients, n, (out, rows));
     }
 }
 

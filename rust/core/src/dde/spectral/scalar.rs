@@ -8,8 +8,8 @@
 //! which a solution grows that fast are refused. The transformation to coefficients is the
 //! quadrature at the nodes, exact to degree 2N − 2.
 
-use super::dense::dot;
 use super::nodes::Nodes;
+use super::products::{Rows, multiply};
 
 /// Smallest pivot relative to the entries of the system.
 const LEAST: f64 = 1e-10;
@@ -17,10 +17,12 @@ const LEAST: f64 = 1e-10;
 /// The factors for one a.
 #[derive(Debug)]
 pub(super) struct Scalar {
-    a: f64,
     /// Factor on row k + 1 that is subtracted from row k.
     above: Vec<f64>,
-    pivots: Vec<f64>,
+    /// Factor on row k − 1 that is added to row k, once divided by its pivot.
+    below: Vec<f64>,
+    /// 1 over the pivots.
+    inverse: Vec<f64>,
 }
 
 impl Scalar {
@@ -36,44 +38,45 @@ impl Scalar {
             pivots[k] += above[k] * a / odd(k);
         }
         let least = LEAST * (1.0 + a.abs());
-        let regular = pivots.iter().all(|d| d.is_finite() && *d > least);
-        regular.then_some(Self { a, above, pivots })
+        if !pivots.iter().all(|d| d.is_finite() && *d > least) {
+            return None;
+        }
+        // The entry below the diagonal in column k − 1 is −a / (2k − 1).
+        let below = pivots.iter().enumerate();
+        let below = below.map(|(k, pivot)| a / (2.0 * k as f64 - 1.0) / pivot);
+        Some(Self {
+            above,
+            below: below.collect(),
+            inverse: pivots.iter().map(|pivot| 1.0 / pivot).collect(),
+        })
     }
 
     /// Solve in place; `work` is overwritten.
     pub(super) fn solve(&self, nodes: &Nodes, values: &mut [f64], work: &mut Vec<f64>) {
         let order = nodes.order;
-        work.clear();
-        let rows = nodes.to_legendre.chunks_exact(order);
-        work.extend(rows.map(|row| dot(row, values)));
+        let row = Rows::of(order);
+        work.resize(order, 0.0);
+        multiply((values, row), &nodes.to_legendre, order, (work, row));
         let mut higher = 0.0;
         for (x, above) in work.iter_mut().zip(&self.above).rev() {
             *x -= above * higher;
             higher = *x;
         }
         let mut lower = 0.0;
-        for (k, (x, pivot)) in work.iter_mut().zip(&self.pivots).enumerate() {
-            // The entry below the diagonal in column k − 1 is −a / (2k − 1).
-            *x = (*x + self.a / (2.0 * k as f64 - 1.0) * lower) / pivot;
+        for ((x, below), inverse) in work.iter_mut().zip(&self.below).zip(&self.inverse) {
+            *x = *x * inverse + below * lower;
             lower = *x;
         }
-        for (value, row) in values.iter_mut().zip(nodes.legendre.chunks_exact(order)) {
-            *value = dot(row, work);
-        }
+        multiply((work, row), &nodes.legendre, order, (values, row));
     }
 
-    /// The inverse, row-major; it pays where many components share it.
+    /// The inverse, a row for each right-hand side; it pays where many components share it.
     pub(super) fn inverse(&self, nodes: &Nodes) -> Vec<f64> {
         let n = nodes.order;
-        let mut inverse = vec![0.0; n * n];
-        let (mut column, mut work) = (vec![0.0; n], Vec::new());
-        for j in 0..n {
-            column.fill(0.0);
+        let (mut inverse, mut work) = (vec![0.0; n * n], Vec::new());
+        for (j, column) in inverse.chunks_exact_mut(n).enumerate() {
             column[j] = 1.0;
-            self.solve(nodes, &mut column, &mut work);
-            for (row, entry) in inverse.chunks_exact_mut(n).zip(&column) {
-                row[j] = *entry;
-            }
+            self.solve(nodes, column, &mut work);
         }
         inverse
     }
@@ -81,6 +84,7 @@ impl Scalar {
 
 #[cfg(test)]
 mod tests {
+    use super::super::dense::dot;
     use super::super::nodes::{ORDERS, nodes};
     use super::*;
 
@@ -97,9 +101,9 @@ mod tests {
                     .zip(&known)
                     .map(|(row, x)| x - a * dot(row, &known))
                     .collect();
-                let inverse = scalar.inverse(nodes);
-                let rows = inverse.chunks_exact(order);
-                let by_inverse: Vec<f64> = rows.map(|row| dot(row, &found)).collect();
+                let (inverse, row) = (scalar.inverse(nodes), Rows::of(order));
+                let mut by_inverse = vec![0.0; order];
+                multiply((&found, row), &inverse, order, (&mut by_inverse, row));
                 scalar.solve(nodes, &mut found, &mut Vec::new());
                 for (found, known) in found.iter().chain(&by_inverse).zip(known.iter().cycle()) {
                     assert!((found - known).abs() < 1e-9, "{order} {a}: {found} {known}");

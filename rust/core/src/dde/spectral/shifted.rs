@@ -17,6 +17,7 @@ use super::banded::Banded;
 use super::dense::add_multiple;
 use super::jacobian::Jacobian;
 use super::nodes::Nodes;
+use super::products::transposed;
 
 /// Upper limit on the numbers in the factors of all systems together (bounds memory).
 const MOST: usize = 1 << 24;
@@ -181,18 +182,6 @@ impl Shifted {
             }
         }
     }
-}
-
-/// Transpose rows of this length.
-fn transposed(values: &[f64], length: usize) -> Vec<f64> {
-    let rows = values.len() / length;
-    let mut out = vec![0.0; values.len()];
-    for (index, row) in values.chunks_exact(length).enumerate() {
-        for (at, value) in row.iter().enumerate() {
-            out[at * rows + index] = *value;
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use super::element::Element;
 use super::history::History;
 use super::nodes::Nodes;
 use super::problem::Problem;
+use super::products::{Rows, multiply};
 
 /// Largest difference in tolerances: stored pieces and nodes both have errors of a share of one.
 const UNREAD: f64 = 10.0;
@@ -168,8 +169,15 @@ impl Reading {
         let ratio = UNREAD.min((LOOSEST / problem.rtol).max(1.0));
         let mut worst = 0.0_f64;
         for (d, (through, own)) in through.chunks_exact(n).zip(pieces).enumerate() {
-            chebyshev::combine(through, &self.table, m, &mut self.found);
-            chebyshev::combine(own, &self.other, m, &mut self.stored);
+            let (all, found) = (Rows::of(m), &mut self.found);
+            multiply((through, Rows::of(n)), &self.table, m, (found, all));
+            let stored = &mut self.stored;
+            multiply(
+                (own, Rows::of(stretch.terms)),
+                &self.other,
+                m,
+                (stored, all),
+            );
             let pairs = self.found.iter().zip(&self.stored);
             let off = pairs.fold(0.0_f64, |off, (a, b)| off.max((a - b).abs()));
             let own = largest(&self.stored);
