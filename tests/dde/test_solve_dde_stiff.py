@@ -243,6 +243,25 @@ def test_components_that_their_past_alone_couples_take_few_calls(n):
     assert found.nfev <= 3 * (found.n_elements + found.n_rejected) + 1
 
 
+def test_elements_longer_than_the_delay_take_no_jacobian_of_a_large_network():
+    # Of 500 components the last element, two delays long, once had all 500 columns evaluated.
+    n = 500
+    rng = np.random.default_rng(1)
+    past = scipy.sparse.random_array((n, n), density=5 / n, rng=rng, format="csr")
+    widths = []
+
+    def slope(t, y, z):
+        widths.append(t.size)
+        return np.tanh(0.6 * past @ z[0]) - y
+
+    start = rng.normal(size=n)
+    options = {"t_eval": [20.0], "vectorized": True}
+    found = dtm.solve_dde(slope, (0.0, 20.0), start, 1.0, **options)
+    sharp = dtm.solve_dde(slope, (0.0, 20.0), start, 1.0, rtol=1e-10, atol=1e-12, **options)
+    assert max(widths) <= 50
+    np.testing.assert_allclose(found.y, sharp.y, rtol=1e-5, atol=1e-6)
+
+
 @pytest.mark.parametrize("vectorized", [True, False])
 @pytest.mark.parametrize("seed", range(8))
 def test_a_coupling_that_a_look_at_the_diagonal_misses_costs_no_accuracy(seed, vectorized):

@@ -128,14 +128,14 @@ def solve_dde(
 
     Notes
     -----
-    The solution is a polynomial of degree 4 to 24 on each element, by collocation at Radau points
-    (the Radau IIA family), so that stiff equations take long elements too. The Jacobian that this
-    needs is taken by differences; large systems that are coupled by y have one only where sweeps
-    without it fail, banded or full as it comes out, and its diagonal alone beyond 4 million
-    entries. Elements end on breaking points: the start, the jumps, and what follows from them one
-    delay later, an order smoother each time, or as rough as before in neutral equations. Through a
-    breaking point of a neutral equation with a jump of y itself only the step is followed, not the
-    impulse in y'.
+    The solution is a polynomial of degree 4 to 24 on each element, or up to 48 where components
+    are not coupled by y, by collocation at Radau points (the Radau IIA family), so that stiff
+    equations take long elements too. The Jacobian that this needs is taken by differences;
+    large systems that are coupled by y have one only where sweeps without it fail, banded or
+    full as it comes out, and its diagonal alone beyond 4 million entries. Elements end on
+    breaking points: the start, the jumps, and what follows from them one delay later, an order
+    smoother each time, or as rough as before in neutral equations. Through a breaking point of
+    a neutral equation with a jump of y itself only the step is followed, not the impulse in y'.
     Without `dense_output` the past is kept only as far as the largest delay.
 
     Examples

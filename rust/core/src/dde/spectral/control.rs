@@ -8,7 +8,7 @@
 //! the length, an element longer by a factor s has an error s^N times as large.
 
 use super::element::Element;
-use super::nodes::{Nodes, ORDERS};
+use super::nodes::{COUPLED, LARGEST, Nodes, ORDERS};
 
 /// Share of the tolerance that an element may use.
 const SHARE: f64 = 0.2;
@@ -25,6 +25,11 @@ const SAFETY: f64 = 0.95;
 /// Nodes of the preferred order: their number without any digit of the tolerance, and for each
 /// digit.
 const NODES: (f64, f64) = (4.0, 1.4);
+
+/// The same where the components are uncoupled.
+const UNCOUPLED: (f64, f64) = (8.0, 1.6);
+/// Number of components up to which a node costs much less than a call from Python.
+const LIGHT: usize = 64;
 
 /// Verdict about an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,5 +105,18 @@ pub(super) fn preferred(rtol: f64, costly: bool) -> usize {
     } else {
         NODES.0 + NODES.1 * digits
     };
-    order_for(wanted.ceil() as usize, 24)
+    order_for(wanted.ceil() as usize, COUPLED)
+}
+
+/// The same where the components are uncoupled, so that nodes cost less: for costly calls as many
+/// as serve elements as long as delays often are, unless the work for nodes exceeds that of calls.
+pub(super) fn preferred_uncoupled(rtol: f64, costly: bool, dim: usize) -> usize {
+    if !costly {
+        let wanted = UNCOUPLED.0 - UNCOUPLED.1 * rtol.log10();
+        order_for(wanted.ceil() as usize, LARGEST)
+    } else if dim <= LIGHT {
+        LARGEST
+    } else {
+        preferred(rtol, costly)
+    }
 }

@@ -237,7 +237,8 @@ impl Element {
         equation: &mut E,
         task: &Task,
     ) -> Result<bool, Error> {
-        self.linearise_at(self.t.len() / 2, usize::MAX, equation, task)
+        let most = self.newton.worth_renewing();
+        self.linearise_at(self.t.len() / 2, most, equation, task)
     }
 
     fn linearise_at<E: Equation + ?Sized>(
@@ -265,7 +266,8 @@ impl Element {
         equation: &mut E,
         task: &Task,
     ) -> Result<bool, Error> {
-        self.linearise_at(0, usize::MAX, equation, task)
+        let most = self.newton.worth_renewing();
+        self.linearise_at(0, most, equation, task)
     }
 
     /// y_0 + (h/2) B F − Y.

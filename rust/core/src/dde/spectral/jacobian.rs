@@ -111,8 +111,6 @@ pub(super) struct Point<'a> {
 pub(super) struct Differences {
     /// The pattern, the group of each column, and their number.
     known: Option<(Sparsity, Vec<usize>, usize)>,
-    /// Was the last Jacobian taken as its diagonal?
-    alone: bool,
     /// Calls of the right-hand side, and columns in them.
     pub(super) calls: u64,
     pub(super) columns: u64,
@@ -140,7 +138,6 @@ impl Differences {
     pub(super) fn cost(&self, dim: usize) -> usize {
         match &self.known {
             _ if dim <= FEW => dim + 1,
-            None if self.alone => CHECKS + 1,
             Some((_, _, count)) => count + CHECKS + 1,
             None => dim + CHECKS + 1,
         }
@@ -194,10 +191,8 @@ impl Differences {
             }
         }
         if let Some(diagonal) = diagonal(point.steps, &base, &checks) {
-            self.alone = true;
             return Ok(finite(only_diagonal(dim), diagonal));
         }
-        self.alone = false;
         if dim > most {
             return Ok(None);
         }

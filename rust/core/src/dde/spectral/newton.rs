@@ -5,7 +5,8 @@
 //! Picard's iteration. Where J is nearly diagonal, or its factors would be too large, one real
 //! system for each component remains, tridiagonal in the Legendre basis. A small system is solved
 //! as a whole; a large one is divided by the eigenvalues of B into complex systems of the size of
-//! J. Factors are used for all sweeps, and for all elements of the same length and order.
+//! J. Factors are used for all sweeps, and for all elements of the same order and, up to rounding,
+//! the same length.
 
 use super::delayed::Delayed;
 use super::dense::{Factors, add_multiple};
@@ -29,6 +30,9 @@ const WORTH_A_LOOK: usize = 260;
 
 /// Relative difference of entries below which they are equal: the error of differences.
 const SAME_ENTRY: f64 = 1e-6;
+
+/// Relative difference of lengths for which the same factors serve: sweeps correct the rest.
+const SAME_LENGTH: f64 = 1e-10;
 
 /// The current linearisation of a run.
 #[derive(Debug, Default)]
@@ -131,6 +135,15 @@ impl Newton {
         (any || diagonal).then_some(if any { dim } else { 0 })
     }
 
+    /// The number of components up to which a new Jacobian may be another than a diagonal one.
+    pub(super) fn worth_renewing(&self) -> usize {
+        if self.is_uncoupled() {
+            WORTH_A_LOOK
+        } else {
+            usize::MAX
+        }
+    }
+
     /// Are the components taken as uncoupled?
     pub(super) fn is_uncoupled(&self) -> bool {
         self.is_on() && self.diagonal.is_some()
@@ -204,7 +217,10 @@ impl Newton {
     /// Replace the residual (component, node) by the step δ; `false` where the system is singular.
     pub(super) fn solve(&mut self, nodes: &Nodes, half: f64, residual: &mut [f64]) -> bool {
         let order = nodes.order;
-        if self.key != Some((half, order)) && !self.factorise(nodes, half) {
+        let known = self.key.is_some_and(|(length, number)| {
+            number == order && (length - half).abs() <= SAME_LENGTH * half
+        });
+        if !known && !self.factorise(nodes, half) {
             return false;
         }
         if let Some(whole) = &self.whole {

@@ -17,8 +17,10 @@ use super::dense::Factors;
 use super::products::{Rows, multiply, transposed};
 
 /// The numbers of nodes to choose from.
-pub(super) const ORDERS: [usize; 9] = [4, 6, 8, 10, 12, 14, 16, 20, 24];
-const LARGEST: usize = 24;
+pub(super) const ORDERS: [usize; 12] = [4, 6, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48];
+pub(super) const LARGEST: usize = 48;
+/// The largest number for systems of coupled components.
+pub(super) const COUPLED: usize = 24;
 
 /// Points and matrices for one number of nodes.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use super::element::{Begin, Element, Sweeps};
 use super::events::Watch;
 use super::history::Piece;
 use super::newton::Newton;
-use super::nodes::{Nodes, nodes};
+use super::nodes::{COUPLED, Nodes, nodes};
 use super::output::Output;
 use super::problem::{Equation, Outcome, Problem, Solution};
 use super::unread::{Reading, Unread};
@@ -28,6 +28,10 @@ const STALE_SWEEPS: u32 = 4;
 const SLOW_SWEEPS: u32 = 16;
 /// A solution that needs at most one in this many of the coefficients is smooth.
 const FEW_TERMS: usize = 4;
+/// Nodes in addition to the terms that the last element needed: so many, and this part of the terms.
+/// With fewer, more elements are rejected than nodes are saved.
+const SPARE: usize = 6;
+const SPARE_PART: usize = 4;
 /// Factor on the length where sweeps fail or the right-hand side is not finite.
 const RETREAT: f64 = 0.3;
 /// An element that contains its own delayed values needs many sweeps: it must be at least this many
@@ -84,6 +88,8 @@ struct Run<'a> {
     length: f64,
     order: usize,
     preferred: usize,
+    /// Orders to prefer for coupled and for uncoupled components.
+    orders: [usize; 2],
     shortest_delay: f64,
     /// Length of the longest element on which sweeps without a Jacobian failed since the last one
     /// that succeeded.
@@ -110,7 +116,9 @@ impl<'a> Run<'a> {
             .jumps
             .iter()
             .position(|jump| jump.time > problem.start);
-        let preferred = control::preferred(problem.rtol, equation.is_costly());
+        let costly = equation.is_costly();
+        let preferred = control::preferred(problem.rtol, costly);
+        let uncoupled = control::preferred_uncoupled(problem.rtol, costly, problem.dim());
         let delays = problem.delays.iter().copied();
         let mut run = Self {
             problem,
@@ -129,6 +137,7 @@ impl<'a> Run<'a> {
             length: (problem.end - problem.start).min(problem.max_step),
             order: preferred,
             preferred,
+            orders: [preferred, uncoupled],
             shortest_delay: delays.fold(f64::INFINITY, f64::min),
             stalled: 0.0,
             wait: (0, 1),
@@ -154,6 +163,9 @@ impl<'a> Run<'a> {
             let tried = self.solution.n_elements + self.solution.n_rejected;
             if self.problem.max_steps.is_some_and(|most| tried >= most) {
                 return Ok(Some(Outcome::TooMany(start)));
+            }
+            if !self.element.newton.is_uncoupled() {
+                self.order = self.order.min(COUPLED);
             }
             let nodes = nodes(self.order);
             let begin = Begin {
@@ -449,7 +461,11 @@ impl<'a> Run<'a> {
     /// Length and order of the next element.
     fn plan(&mut self, verdict: Verdict, length: f64) {
         let factor = control::factor(verdict.error, self.order);
-        let wanted = length * factor;
+        let mut wanted = length * factor;
+        if self.order < self.preferred {
+            // More nodes serve as well as a shorter element.
+            wanted = wanted.max(length);
+        }
         self.wait.0 = self.wait.0.saturating_sub(1);
         // If a delay limits the length, the factors by which it should grow accumulate.
         self.length = if wanted > self.shortest_delay && !self.problem.neutral {
@@ -459,9 +475,13 @@ impl<'a> Run<'a> {
         };
         let ahead = self.breaks.next().map_or(f64::INFINITY, |point| point.time);
         let room = (ahead - self.solution.end).min(self.longest());
-        // Use fewer nodes where the error does not limit the length.
-        self.order = if wanted > 1.5 * room.min(length) && wanted > room {
-            control::order_for(verdict.terms + 2, self.preferred)
+        self.preferred = self.orders[usize::from(self.element.newton.is_uncoupled())];
+        // Use fewer nodes where the next element is no longer than this one needed to be.
+        let parts = (room / wanted * (1.0 - WHOLE_PARTS)).ceil().max(1.0);
+        let is_equal = parts <= EQUAL && room / parts <= length * (1.0 + WHOLE_PARTS);
+        self.order = if (wanted > 1.5 * room.min(length) && wanted > room) || is_equal {
+            let spare = SPARE + verdict.terms / SPARE_PART;
+            control::order_for(verdict.terms + spare, self.preferred)
         } else {
             self.preferred
         };
