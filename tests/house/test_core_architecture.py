@@ -69,6 +69,7 @@ ORDER = {
         "path",
         "orthogonal",
         "whiten",
+        "noises",
         "kicks",
         "mean",
         "likelihood",

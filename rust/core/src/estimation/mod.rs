@@ -16,6 +16,7 @@ mod kept;
 mod kicks;
 mod likelihood;
 mod mean;
+mod noises;
 mod orthogonal;
 mod path;
 mod plant;

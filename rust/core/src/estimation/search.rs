@@ -83,6 +83,24 @@ impl Value {
     }
 }
 
+/// The function of a search.
+pub(super) trait Function {
+    /// Its value, with slope and curvature if wanted.
+    fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error>;
+
+    /// Its values alone at some places.
+    fn values(&mut self, places: &[Vec<f64>]) -> Result<Vec<f64>, Error> {
+        let value = |place: &Vec<f64>| Ok(self.at(place, Wanted::Value)?.value);
+        places.iter().map(value).collect()
+    }
+}
+
+impl<F: FnMut(&[f64], Wanted) -> Result<Value, Error>> Function for F {
+    fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error> {
+        self(place, wanted)
+    }
+}
+
 /// Where the function is least.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Minimum {
@@ -98,13 +116,13 @@ pub(super) fn minimise(
     variables: &[Variable],
     tolerance: f64,
     known_inverse: &mut Option<Vec<f64>>,
-    mut function: impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+    mut function: impl Function,
 ) -> Result<Minimum, Error> {
     let mut x: Vec<f64> = variables
         .iter()
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
-    let mut found = function(&x, Wanted::Slopes)?;
+    let mut found = function.at(&x, Wanted::Slopes)?;
     let (n, known) = (x.len(), found.slope.len());
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverted(&found.curvature, known) else {
@@ -200,7 +218,7 @@ fn line_search(
     value: f64,
     gradient: &[f64],
     step: &[f64],
-    function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+    function: &mut impl Function,
 ) -> Result<Option<(Value, Vec<f64>)>, Error> {
     let mut share = 1.0;
     let mut trial = x.to_vec();
@@ -210,7 +228,7 @@ fn line_search(
             *trial = (x + share * step).clamp(variable.low, variable.high);
         }
         let moved = difference(&trial, x);
-        let found = function(&trial, Wanted::Slopes)?;
+        let found = function.at(&trial, Wanted::Slopes)?;
         if found.value < value + SUFFICIENT * product(gradient, &moved) && found.value < value {
             x.copy_from_slice(&trial);
             return Ok(Some((found, moved)));
@@ -233,26 +251,37 @@ impl Quotients {
         x: &[f64],
         found: &Value,
         which: Range<usize>,
-        function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+        function: &mut impl Function,
     ) -> Result<Self, Error> {
         let value = found.value;
         let (mut slope, mut curvature) = (Vec::new(), Vec::new());
-        let mut at = x.to_vec();
-        for i in which {
+        // How far a variable may go up and down.
+        let ways = |i: usize| {
             let (variable, step) = (variables[i], steps[i]);
-            let flattest = FLATTEST / (variable.step * variable.step);
-            let (up, down) = (
+            [
                 step.min(variable.high - x[i]),
                 step.min(x[i] - variable.low),
-            );
-            let mut away = |step: f64| -> Result<f64, Error> {
-                at[i] = x[i] + step;
-                let found = function(&at, Wanted::Value)?.value;
-                at[i] = x[i];
-                Ok(found)
-            };
-            let higher = if up > 0.0 { away(up)? } else { value };
-            let lower = if down > 0.0 { away(-down)? } else { value };
+            ]
+        };
+        let mut places = Vec::new();
+        for i in which.clone() {
+            for (way, sign) in ways(i).into_iter().zip([1.0, -1.0]) {
+                if way > 0.0 {
+                    let mut place = x.to_vec();
+                    place[i] += sign * way;
+                    places.push(place);
+                }
+            }
+        }
+        let mut values = function.values(&places)?.into_iter();
+        for i in which {
+            let step = steps[i];
+            let flattest = FLATTEST / (variables[i].step * variables[i].step);
+            let [up, down] = ways(i);
+            let [higher, lower] = [up, down].map(|way| {
+                let away = if way > 0.0 { values.next() } else { None };
+                away.unwrap_or(value)
+            });
             if up > 0.0 && down > 0.0 && higher.is_finite() && lower.is_finite() {
                 let (right, left) = ((higher - value) / up, (value - lower) / down);
                 slope.push((right * down + left * up) / (up + down));
@@ -297,7 +326,7 @@ fn by_quotients(
     steps: &mut [f64],
     x: &[f64],
     found: &Value,
-    function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+    function: &mut impl Function,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     let (n, known) = (x.len(), found.slope.len());
     let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
@@ -452,7 +481,7 @@ mod tests {
                 longest: 1.0,
                 ..one
             });
-            minimise(&around, 1e-9, near, |x, _| {
+            minimise(&around, 1e-9, near, |x: &[f64], _| {
                 evaluations.set(evaluations.get() + 1);
                 let (a, b) = (x[0] + x[1] - place, x[0] - x[1] + 0.3);
                 unknown(50.0 * a * a + 0.5 * b * b + 0.01 * a.powi(4))
@@ -508,7 +537,7 @@ mod tests {
             ..variable(start, -9.0, 9.0)
         };
         let found = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, function);
-        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x, _| {
+        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x: &[f64], _| {
             let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
             unknown(line * line + curve * curve + 0.1 * x[0])
         });
