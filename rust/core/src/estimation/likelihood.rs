@@ -598,6 +598,38 @@ mod tests {
     }
 
     #[test]
+    fn delay_and_zero_of_a_response_that_jumps_are_dependent_at_any_lag() {
+        // Commands arrive between the same rows, whatever the delay in between.
+        let mut rows = recording(300);
+        let step = 0.05;
+        rows.time = (0..300).map(|i| step * f64::from(i)).collect();
+        rows.commands.time = (0..30).map(|i| 10.0 * step * f64::from(i)).collect();
+        rows.commands.value = (0..30).map(|i| f64::from(i % 3) - 0.7).collect();
+        rows.output = gaussian(3, 300);
+        rows.used = vec![true; 300];
+        let rows = rows.checked().unwrap();
+        let by = Derivatives {
+            zero: true,
+            ..by_delay(1)
+        };
+        let plant = Plant::new(&[1.0], &[1.0]).unwrap();
+        for lag in [1e-3, 0.01, 0.03, 0.1, 0.5] {
+            for zero in [-0.1, 1e-3, 0.2] {
+                for noise in [QUIET, WINDY] {
+                    let at = Values {
+                        delay: 0.12,
+                        zero,
+                        ..values(Gain::Eliminated, &[lag])
+                    };
+                    let (wanted, task) = (Wanted::Slopes, Task::new());
+                    let found = evaluate(&rows, &plant, &at, &noise, &by, wanted, &task).unwrap();
+                    assert_eq!(found.objective, f64::INFINITY, "{lag} {zero}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn several_noises_at_once_have_the_objective_of_each() {
         // More rows than a block, more noises than lanes; some scatter, and two have no air.
         let mut rows = rows(300);

@@ -9,6 +9,10 @@ use crate::{Error, Task, memory};
 /// Relative step of the difference quotient by a lag.
 const STEP: f64 = 1e-5;
 
+/// Change of a response, as a share of its largest value, below which it is rounding: a column of
+/// rounding would pass for one that depends on no other.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// What memory is asked for.
 const WHAT: &str = "the columns of the likelihood";
 
@@ -124,10 +128,16 @@ impl Mean {
                 *place = -rate;
             }
         }
+        let rounding = ROUNDING * response.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         let difference = |other: &PlantSpace, step: f64, out: &mut [f64]| {
             respond(other, held, delay, time, out, None, task)?;
             for (out, response) in out.iter_mut().zip(&response) {
-                *out = (*out - response) / step;
+                let change = *out - response;
+                *out = if change.abs() > rounding {
+                    change / step
+                } else {
+                    0.0
+                };
             }
             Ok::<(), Error>(())
         };
@@ -139,7 +149,8 @@ impl Mean {
             }
         }
         if by.zero {
-            let step = values.lags.last().copied().unwrap_or(1.0) * STEP;
+            // The response is linear in it: the quotient is exact, and a long step has the least rounding.
+            let step = values.lags.last().copied().unwrap_or(1.0);
             let other = plant.space(&values.lags, values.zero + step);
             difference(&other, step, place())?;
         }
