@@ -7,12 +7,15 @@ use super::mean::{Derivatives, Gain, Values};
 use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
 use super::rows::Rows;
-use super::search::{Function, Value, Variable, minimise};
+use super::search::{Function, Slack, Value, Variable, minimise};
 use super::variables::{Free, SHORTEST_LAG, Slot, Variables, mean_slots, put};
 use crate::{Error, Task};
 
 /// Rise of the objective by a row of negative delay.
 const PENALTY: f64 = 1e4;
+
+/// A delay of so many rows is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Recordings of one plant with what is unknown about it.
 #[derive(Debug, Clone, PartialEq)]
@@ -276,6 +279,11 @@ impl Model {
         for (slot, value) in slots.iter().zip(&found.place) {
             put(&mut point, *slot, *value);
         }
+        if matches!(point.timing, Timing::Total(_))
+            && point.delay().abs() < ROUNDING * self.row_time
+        {
+            point.timing = Timing::Total(point.lag());
+        }
         Ok(Fit {
             point,
             objective: found.value,
@@ -318,6 +326,27 @@ impl Sum<'_> {
 }
 
 impl Function for Sum<'_> {
+    /// The delay, where it is what is left of delay and lags together.
+    fn slack(&self, place: &[f64]) -> Option<Slack> {
+        let slots = &self.slots[..mean_slots(self.slots)];
+        let mut point = self.trial.clone();
+        for (slot, value) in slots.iter().zip(place) {
+            put(&mut point, *slot, *value);
+        }
+        let by = |slot: &Slot| match slot {
+            Slot::Time | Slot::Zero => 1.0,
+            Slot::Lag(i) => -point.lags[*i],
+            _ => 0.0,
+        };
+        let slope: Vec<f64> = slots.iter().map(by).collect();
+        let is_bound =
+            matches!(point.timing, Timing::Total(_)) && slope.iter().any(|by| *by != 0.0);
+        is_bound.then(|| Slack {
+            value: point.delay(),
+            slope,
+        })
+    }
+
     fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error> {
         let owns = self.moved(place);
         let mut sum = Value::new(self.model.penalty(&self.trial), mean_slots(self.slots));

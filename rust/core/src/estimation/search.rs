@@ -4,9 +4,10 @@
 //! Newton, which cost no evaluation: they are searched alone first, and their curvature is the first
 //! guess of the Hessian. That of the others is made of difference quotients. The inverse Hessian is
 //! then that of Broyden, Fletcher, Goldfarb and Shanno; variables at a bound that would leave it are
-//! held there (Bertsekas 1982). What the known slopes lack is a difference quotient at the start and
-//! at the end of the search. Difference quotients are central, for which the function may have kinks
-//! in its second derivative.
+//! held there (Bertsekas 1982), and steps across a bound on several variables end on it, at the least
+//! value of the quadratic model there (Nocedal & Wright, Numerical Optimization, 18.1). What the known
+//! slopes lack is a difference quotient at the start and at the end of the search. Difference quotients
+//! are central, for which the function may have kinks in its second derivative.
 
 use std::ops::Range;
 
@@ -35,6 +36,9 @@ const STEEPEST: f64 = 0.04;
 
 /// Smallest second derivative by the units of difference quotients.
 const FLATTEST: f64 = 1e-4;
+
+/// A bound on several variables is near where so many steps of difference quotients reach it.
+const NEAR: f64 = 2.0;
 
 /// Added to a known curvature of unit diagonal: bounds its condition.
 const RIDGE: f64 = 1e-7;
@@ -83,8 +87,22 @@ impl Value {
     }
 }
 
+/// A concave function of some of the first variables that may not be below zero, such as a time that
+/// is the difference of others.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Slack {
+    pub(super) value: f64,
+    /// By each variable.
+    pub(super) slope: Vec<f64>,
+}
+
 /// The function of a search.
 pub(super) trait Function {
+    /// What is left up to a bound on several variables; none where there is no such bound.
+    fn slack(&self, _place: &[f64]) -> Option<Slack> {
+        None
+    }
+
     /// Its value, with slope and curvature if wanted.
     fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error>;
 
@@ -122,13 +140,15 @@ pub(super) fn minimise(
         .iter()
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
+    keep_within(variables, &mut x, &function);
     let mut found = function.at(&x, Wanted::Slopes)?;
     let (n, known) = (x.len(), found.slope.len());
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverted(&found.curvature, known) else {
             break;
         };
-        let step = direction(variables, &x, &inverse, &found.slope);
+        let slack = function.slack(&x);
+        let step = direction(variables, &x, &inverse, &found.slope, slack.as_ref());
         if promised(&step, &found.slope) <= tolerance.max(WORTHWHILE) {
             break;
         }
@@ -160,7 +180,8 @@ pub(super) fn minimise(
     }
     let mut stalled = 0;
     for _ in 0..ITERATIONS {
-        let step = direction(variables, &x, &inverse, &gradient);
+        let slack = function.slack(&x);
+        let step = direction(variables, &x, &inverse, &gradient, slack.as_ref());
         if promised(&step, &gradient) <= tolerance {
             if exact {
                 break;
@@ -227,6 +248,7 @@ fn line_search(
         for (((trial, x), variable), step) in places {
             *trial = (x + share * step).clamp(variable.low, variable.high);
         }
+        keep_within(variables, &mut trial, function);
         let moved = difference(&trial, x);
         let found = function.at(&trial, Wanted::Slopes)?;
         if found.value < value + SUFFICIENT * product(gradient, &moved) && found.value < value {
@@ -238,7 +260,57 @@ fn line_search(
     Ok(None)
 }
 
-/// Difference quotients by some of the variables, one-sided at a bound.
+/// Most steps of Newton's to a bound.
+const CORRECTIONS: usize = 8;
+
+/// Move a place beyond the bound on several variables onto it.
+fn keep_within(variables: &[Variable], place: &mut [f64], function: &impl Function) {
+    if let Some(slack) = function.slack(place).filter(|slack| slack.value < 0.0) {
+        let pivot = slack.pivot(variables);
+        keep_slack(variables, place, pivot, 0.0, function);
+    }
+}
+
+/// Move one variable, which has a part in it, until so much is left up to the bound.
+fn keep_slack(
+    variables: &[Variable],
+    place: &mut [f64],
+    pivot: usize,
+    left: f64,
+    function: &impl Function,
+) {
+    for _ in 0..CORRECTIONS {
+        let Some(slack) = function.slack(place) else {
+            return;
+        };
+        let before = place[pivot];
+        let Variable { low, high, .. } = variables[pivot];
+        place[pivot] = (before - (slack.value - left) / slack.slope[pivot]).clamp(low, high);
+        if place[pivot] == before {
+            return;
+        }
+    }
+}
+
+impl Slack {
+    /// The variable that moves the bound most.
+    fn pivot(&self, variables: &[Variable]) -> usize {
+        let reach = |i: &usize| self.slope[*i].abs() * variables[*i].longest;
+        let all = 0..self.slope.len();
+        all.max_by(|i, j| reach(i).total_cmp(&reach(j)))
+            .unwrap_or(0)
+    }
+
+    /// The variable that is moved to stay as far from the bound, where a step of a difference quotient
+    /// might cross it.
+    fn near(&self, variables: &[Variable], steps: &[f64]) -> Option<usize> {
+        let most = steps.iter().zip(&self.slope);
+        let most = most.map(|(step, slope)| (step * slope).abs());
+        (self.value < NEAR * most.fold(0.0, f64::max)).then(|| self.pivot(variables))
+    }
+}
+
+/// Difference quotients by some of the variables, from one side at a bound.
 struct Quotients {
     slope: Vec<f64>,
     curvature: Vec<f64>,
@@ -255,50 +327,65 @@ impl Quotients {
     ) -> Result<Self, Error> {
         let value = found.value;
         let (mut slope, mut curvature) = (Vec::new(), Vec::new());
-        // How far a variable may go up and down.
-        let ways = |i: usize| {
+        // Close to a bound on several variables the others move along it, and one away from it.
+        let slack = function.slack(x);
+        let bound = slack.as_ref().and_then(|slack| {
+            let pivot = slack.near(variables, steps)?;
+            which.contains(&pivot).then_some((slack, pivot))
+        });
+        // The two steps of a variable: to both sides, or one and two to one side.
+        let moves = |i: usize| {
             let (variable, step) = (variables[i], steps[i]);
-            [
+            let (mut up, mut down) = (
                 step.min(variable.high - x[i]),
                 step.min(x[i] - variable.low),
-            ]
+            );
+            if let Some((slack, _)) = bound.filter(|(_, pivot)| *pivot == i) {
+                *(if slack.slope[i] > 0.0 {
+                    &mut down
+                } else {
+                    &mut up
+                }) = 0.0;
+            }
+            if up <= 0.0 {
+                [-down, -2.0 * down]
+            } else if down <= 0.0 {
+                [up, 2.0 * up]
+            } else {
+                [up, -down]
+            }
         };
         let mut places = Vec::new();
         for i in which.clone() {
-            for (way, sign) in ways(i).into_iter().zip([1.0, -1.0]) {
-                if way > 0.0 {
-                    let mut place = x.to_vec();
-                    place[i] += sign * way;
-                    places.push(place);
+            for distance in moves(i) {
+                let mut place = x.to_vec();
+                place[i] += distance;
+                if let Some((slack, pivot)) = bound.filter(|(slack, pivot)| {
+                    *pivot != i && slack.slope.get(i).is_some_and(|by| *by != 0.0)
+                }) {
+                    keep_slack(variables, &mut place, pivot, slack.value, function);
                 }
+                places.push(place);
             }
         }
-        let mut values = function.values(&places)?.into_iter();
-        for i in which {
-            let step = steps[i];
+        let values = function.values(&places)?;
+        for (i, values) in which.clone().zip(values.chunks_exact(2)) {
             let flattest = FLATTEST / (variables[i].step * variables[i].step);
-            let [up, down] = ways(i);
-            let [higher, lower] = [up, down].map(|way| {
-                let away = if way > 0.0 { values.next() } else { None };
-                away.unwrap_or(value)
-            });
-            if up > 0.0 && down > 0.0 && higher.is_finite() && lower.is_finite() {
-                let (right, left) = ((higher - value) / up, (value - lower) / down);
-                slope.push((right * down + left * up) / (up + down));
-                curvature.push((2.0 * (right - left) / (up + down)).max(flattest));
+            let [a, b] = moves(i);
+            let [by_a, by_b] = [(a, values[0]), (b, values[1])].map(|(d, far)| (far - value) / d);
+            if by_a.is_finite() && by_b.is_finite() {
+                slope.push((a * by_b - b * by_a) / (a - b));
+                curvature.push((2.0 * (by_a - by_b) / (a - b)).max(flattest));
             } else {
-                let (far, distance) = if up > 0.0 && higher.is_finite() {
-                    (higher, up)
-                } else {
-                    (lower, -down)
-                };
-                let one_sided = (far - value) / distance;
-                slope.push(if one_sided.is_finite() {
-                    one_sided
-                } else {
-                    0.0
-                });
-                curvature.push((one_sided.abs() / step).max(flattest));
+                let only = if by_a.is_finite() { by_a } else { by_b };
+                slope.push(if only.is_finite() { only } else { 0.0 });
+                curvature.push((only.abs() / steps[i]).max(flattest));
+            }
+        }
+        if let Some((slack, pivot)) = bound {
+            let by_pivot = slope[pivot - which.start] / slack.slope[pivot];
+            for i in which.clone().filter(|i| *i != pivot) {
+                slope[i - which.start] += slack.slope.get(i).unwrap_or(&0.0) * by_pivot;
             }
         }
         Ok(Self { slope, curvature })
@@ -387,8 +474,14 @@ fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
 }
 
 /// −H g over the variables that may move, no longer than allowed; zero for those at a bound that
-/// would leave it.
-fn direction(variables: &[Variable], x: &[f64], inverse: &[f64], gradient: &[f64]) -> Vec<f64> {
+/// would leave it. Where it crosses the bound on several variables, the least on that.
+fn direction(
+    variables: &[Variable],
+    x: &[f64],
+    inverse: &[f64],
+    gradient: &[f64],
+    slack: Option<&Slack>,
+) -> Vec<f64> {
     let n = gradient.len();
     let moving: Vec<bool> = (0..n)
         .map(|i| {
@@ -396,13 +489,30 @@ fn direction(variables: &[Variable], x: &[f64], inverse: &[f64], gradient: &[f64
                 || (x[i] >= variables[i].high && gradient[i] < 0.0))
         })
         .collect();
-    let mut out = vec![0.0; n];
-    let mut scale: f64 = 1.0;
-    for i in (0..n).filter(|i| moving[*i]) {
-        for j in (0..n).filter(|j| moving[*j]) {
-            out[i] -= inverse[i * n + j] * gradient[j];
+    // H times a vector, over those that may move.
+    let times = |vector: &[f64]| -> Vec<f64> {
+        let moved = |i: usize| {
+            let others = (0..vector.len()).filter(|j| moving[*j]);
+            others.map(|j| inverse[i * n + j] * vector[j]).sum::<f64>()
+        };
+        (0..n)
+            .map(|i| if moving[i] { moved(i) } else { 0.0 })
+            .collect()
+    };
+    let mut out = times(gradient);
+    out.iter_mut().for_each(|entry| *entry = -*entry);
+    if let Some(slack) = slack {
+        let beyond = slack.value + product(&slack.slope, &out);
+        let along = times(&slack.slope);
+        let bend = product(&slack.slope, &along);
+        if beyond < 0.0 && bend > 0.0 {
+            let moved = out.iter_mut().zip(along);
+            moved.for_each(|(entry, along)| *entry -= beyond / bend * along);
         }
-        scale = scale.min(variables[i].longest / out[i].abs());
+    }
+    let mut scale: f64 = 1.0;
+    for (entry, variable) in out.iter().zip(variables) {
+        scale = scale.min(variable.longest / entry.abs());
     }
     out.iter_mut().for_each(|entry| *entry *= scale);
     out
@@ -513,6 +623,68 @@ mod tests {
         assert!(
             found.is_ok_and(|found| found.place[0] == 0.0 && (found.place[1] - 2.0).abs() < 1e-4)
         );
+    }
+
+    /// A function of a sum and the logarithm of a part of it, the rest of which is not below zero.
+    struct Parts<F: Fn(f64, f64) -> f64>(F);
+
+    impl<F: Fn(f64, f64) -> f64> Function for Parts<F> {
+        fn slack(&self, place: &[f64]) -> Option<Slack> {
+            let part = place[1].exp();
+            Some(Slack {
+                value: place[0] - part,
+                slope: vec![1.0, -part],
+            })
+        }
+
+        fn at(&mut self, place: &[f64], _: Wanted) -> Result<Value, Error> {
+            let rest = self.slack(place).map_or(0.0, |slack| slack.value);
+            assert!(rest > -1e-12, "{place:?}");
+            unknown(self.0(rest, place[1].exp()))
+        }
+    }
+
+    /// Where it is least: the rest, and the part.
+    fn parts(start: (f64, f64), function: impl Fn(f64, f64) -> f64) -> (f64, f64) {
+        let (rest, part) = start;
+        let logarithm = Variable {
+            step: 0.02,
+            longest: 1.2,
+            ..variable(part.ln(), -9.0, 9.0)
+        };
+        let around = [variable(rest + part, 0.0, 9.0), logarithm];
+        let found = minimise(&around, 1e-12, &mut None, Parts(function)).unwrap();
+        let part = found.place[1].exp();
+        (found.place[0] - part, part)
+    }
+
+    #[test]
+    fn a_minimum_beyond_a_bound_on_two_variables_is_found_on_it() {
+        // Known best is the sum, and without the bound the rest would be −0.02 or −0.3.
+        for far in [0.02, 0.3] {
+            let valley = |rest: f64, part: f64| {
+                let (sum, rest) = (rest + part - 0.5, rest + far);
+                1e4 * sum * sum + rest * rest
+            };
+            for start in [(0.4, 0.1), (0.1, 0.1), (0.0, 0.9), (0.2, 0.05), (-0.3, 0.5)] {
+                let (rest, part) = parts(start, valley);
+                // The slope by the part is zero on the bound.
+                assert!(rest.abs() < 1e-12, "{start:?} {rest}");
+                assert!((part - 0.5).abs() < 1e-5, "{start:?} {part}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bound_on_two_variables_is_left_where_the_function_falls_inwards() {
+        let bowl = |rest: f64, part: f64| {
+            100.0 * (rest - 0.2).powi(2) + 400.0 * (rest + part - 0.7).powi(2)
+        };
+        for start in [(0.0, 0.1), (0.0, 0.9), (0.01, 0.3)] {
+            let (rest, part) = parts(start, bowl);
+            assert!((rest - 0.2).abs() < 1e-3, "{start:?} {rest}");
+            assert!((part - 0.5).abs() < 1e-3, "{start:?} {part}");
+        }
     }
 
     #[test]

@@ -123,11 +123,10 @@ impl Variables<'_> {
                 start: match start.timing {
                     Timing::Delay(time) | Timing::Total(time) => time,
                 },
-                // A zero may be longer than delay and lags.
-                low: if start.zero > 0.0 || self.free.zero {
-                    -self.longest
-                } else {
-                    0.0
+                low: match start.timing {
+                    // A zero may be longer than delay and lags.
+                    Timing::Total(_) if start.zero > 0.0 || self.free.zero => -self.longest,
+                    _ => 0.0,
                 },
                 high: self.longest,
                 step: TIME_STEP * row_time,
