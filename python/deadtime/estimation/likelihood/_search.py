@@ -63,7 +63,10 @@ PRICE_OF_SENSOR, PRICE_OF_TRIM, PRICE_OF_SCATTER = 4.0, 9.0, 4.0
 #: Air with a shorter time constant, in rows, may be coloured noise of the sensor.
 FAST = 3.0
 
-#: Rise of −2 ln L without air up to which it is none.
+#: The shortest lag of a search, in rows.
+SHORTEST = 1e-3
+
+#: Rise of −2 ln L without air, or without a lag, up to which it is none.
 IDLE = 1e-3
 
 #: Times that scatter by more rows than this are no scatter.
@@ -266,7 +269,27 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
     best = min(found, key=_criterion)
     best = min([best, *_with_sensor(best)], key=_criterion_beside_sensor)
     best = without_idle_air(min([best, *_with_scatter(best)], key=_criterion))
-    return without_idle_air(best.moved(best.likelihood.fit(best.numbers)))
+    return _without_idle_lags(without_idle_air(best.moved(best.likelihood.fit(best.numbers))))
+
+
+def _without_idle_lags(fit: NoiseFit) -> NoiseFit:
+    """The fit without lags that make its recordings no likelier than the shortest lag does.
+
+    A search ends at a lag far below the time between rows where the likelihood has a kink over the
+    delay; there rows hardly tell lag and delay apart.
+    """
+    shortest = SHORTEST * float(np.median(np.diff(fit.runs[0].time)))
+    for place, free in enumerate(fit.model.free_lags if "delay" in fit.model.names else []):
+        one = fit.with_gain
+        lags = list(one.lags)
+        late, lags[place] = lags[place] - shortest, shortest
+        for delay in (one.delay, one.delay + late) if free and late > 0.0 else ():
+            without = PlantNumbers(delay, lags, one.noise, one.gain, one.zero)
+            if fit.likelihood.objective(without) < fit.numbers.objective + IDLE:
+                found = fit.likelihood.fit(without)
+                fit = min(fit, fit.moved(found), key=lambda one: one.numbers.objective)
+                break
+    return fit
 
 
 def without_idle_air(fit: NoiseFit) -> NoiseFit:
@@ -322,8 +345,11 @@ def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
             noise.append(changed(one, **{part: getattr(one, part) or 1.0 / size}))
         moved = replace(best, runs=tuple(runs))
         fit = moved.moved(moved.likelihood.fit(with_noise(best.numbers, noise), ROUGH))
+        # No command arrives before it is sent.
+        latest = fit.numbers.delay if part == "arrivals" and "delay" in fit.model.names else np.inf
         if all(
-            scatter_of(fit, run, part) < MOST_SCATTER * float(np.median(np.diff(rows.time)))
+            scatter_of(fit, run, part)
+            < min(latest, MOST_SCATTER * float(np.median(np.diff(rows.time))))
             for run, rows in enumerate(runs)
         ):
             found.append(fit)
