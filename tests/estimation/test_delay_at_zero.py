@@ -48,7 +48,7 @@ def test_where_the_delay_comes_out_at_zero_the_others_are_those_of_no_delay():
     assert at_zero >= 3
 
 
-@pytest.mark.parametrize(("delay", "seed"), [(0.26, 4), (0.195, 5), (0.195, 28)])
+@pytest.mark.parametrize(("delay", "seed"), [(0.26, 4), (0.195, 5)])
 def test_a_lag_that_rows_do_not_tell_from_delay_is_none(delay, seed):
     vehicle = KNOWN.replace(plant=dtm.Integrator(0.9), delay=delay)
     flight = dtm.Experiment.step(8.0, rest=1.04).run(vehicle, noise=0.003, seed=seed)

@@ -73,6 +73,7 @@ ORDER = {
         "kicks",
         "mean",
         "likelihood",
+        "over_delays",
         "search",
         "point",
         "variables",

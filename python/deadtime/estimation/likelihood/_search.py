@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,10 @@ LONGEST = 0.6
 
 #: Steps of the grid over the delay: in rows, and as a share of the delay.
 GRID_STEP, GRID_GROWTH = 1.0, 0.1
+
+#: Parts of a row at which delays of a grid are, where rows are even: times between them differ by
+#: less than this share of a part.
+PARTS_OF_ROW, EVEN = 4, 1e-8
 
 #: Lags of the grid, in rows, factors of it over a time constant, and how much shorter each further
 #: lag is: equal lags have the same effect, so that a search does not move from them.
@@ -413,7 +418,21 @@ def _grid(
     delays = [0.0]
     while delays[-1] < LONGEST * float(rows.time[-1] - rows.time[0]):
         delays.append(delays[-1] + max(GRID_STEP * between, GRID_GROWTH * delays[-1]))
-    return grid_minima(likelihood, delays, grid_lags(model, between), noise, first)[:REFINED]
+    delays = on_parts_of_rows(delays, rows)
+    return grid_minima(likelihood, delays, grid_lags(model, between), noise, first)
+
+
+def on_parts_of_rows(delays: Sequence[float], rows: FlightRows) -> list[float]:
+    """Increasing delays of a grid, moved to parts of a row where rows are even.
+
+    A response serves all delays that are whole rows apart, there.
+    """
+    between = np.diff(rows.time)
+    part = float(np.mean(between)) / PARTS_OF_ROW
+    if np.ptp(between) > EVEN * part:
+        return list(delays)
+    moved: list[float] = (part * np.unique(np.rint(np.asarray(delays) / part))).tolist()
+    return moved
 
 
 def grid_minima(
@@ -423,7 +442,7 @@ def grid_minima(
     noise: list[RowNoise],
     first: PlantNumbers,
 ) -> list[PlantNumbers]:
-    """Local minima over the delay at each set of lags, else as `first`, the lowest first."""
+    """The lowest local minima over the delay at sets of lags, else as `first`, the lowest first."""
     minima: list[PlantNumbers] = []
     for some in lags:
 
@@ -435,10 +454,11 @@ def grid_minima(
         is_least = (values <= padded[:-2]) & (values <= padded[2:])
         # Where the command has no effect yet, the likelihood is infinite.
         places = np.flatnonzero(is_least & np.isfinite(values))
-        found = [at(delays[i], float(values[i])) for i in places.tolist()]
-        # Nor do rows tell the numbers apart in which it has only just begun.
-        minima += [one for one in found if math.isfinite(likelihood.objective(one))]
-    return sorted(minima, key=_objective)
+        minima += [at(delays[i], float(values[i])) for i in places.tolist()]
+    minima.sort(key=_objective)
+    # Nor do rows tell the numbers apart in which it has only just begun.
+    told = (one for one in minima if math.isfinite(likelihood.objective(one)))
+    return list(islice(told, REFINED))
 
 
 def grid_lags(model: PlantModel, between: float) -> list[list[float]]:

@@ -4,6 +4,7 @@
 
 use super::likelihood::{Evaluation, Noise, Wanted, evaluate, objectives};
 use super::mean::{Derivatives, Gain, Values};
+use super::over_delays::over_delays;
 use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
 use super::rows::Rows;
@@ -201,16 +202,25 @@ impl Model {
     ) -> Result<Vec<f64>, Error> {
         self.check(point)?;
         let mut at = point.clone();
-        let mut found = Vec::with_capacity(delays.len());
+        let (values, by) = self.mean(point, None);
+        let mut sums = Vec::with_capacity(delays.len());
         for delay in delays {
             at.timing = Timing::Delay(*delay);
-            let mut sum = self.penalty(&at);
-            for run in 0..self.runs.len() {
-                sum += self.part(run, &at, None, Wanted::Value, task)?.objective;
-            }
-            found.push(sum);
+            sums.push(self.penalty(&at));
         }
-        Ok(found)
+        for (run, (rows, noise)) in self.runs.iter().zip(&point.noise).enumerate() {
+            let all = over_delays(rows, &self.plant, &values, noise, &by, delays, task)?;
+            let mut all = all.into_iter().flatten();
+            for (sum, delay) in sums.iter_mut().zip(delays) {
+                *sum += if let Some(value) = all.next() {
+                    value
+                } else {
+                    at.timing = Timing::Delay(*delay);
+                    self.part(run, &at, None, Wanted::Value, task)?.objective
+                };
+            }
+        }
+        Ok(sums)
     }
 
     /// What a negative delay costs.

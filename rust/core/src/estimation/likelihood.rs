@@ -73,7 +73,7 @@ impl Noise {
         self.parts().iter().try_for_each(Disturbance::check)
     }
 
-    fn disturbances(&self) -> Vec<Disturbance> {
+    pub(super) fn disturbances(&self) -> Vec<Disturbance> {
         let parts = self.parts().into_iter();
         parts.filter(|part| part.deviation > 0.0).collect()
     }
@@ -140,17 +140,17 @@ pub(super) enum Wanted {
 }
 
 /// The numbers of rows and unknowns that an objective depends on.
-struct Counts {
+pub(super) struct Counts {
     /// Rows that are used.
-    used: usize,
+    pub(super) used: usize,
     /// Columns of J.
-    count: usize,
+    pub(super) count: usize,
     /// Those that are linear; a gain that is searched is.
-    first: usize,
+    pub(super) first: usize,
     /// Those that are eliminated.
-    linear: usize,
+    pub(super) linear: usize,
     /// Sum of squares of the output.
-    power: f64,
+    pub(super) power: f64,
 }
 
 impl Counts {
@@ -178,7 +178,7 @@ impl Counts {
     }
 
     /// The least sum of squares, and −2 ln L for these ln det V and ln det XᵀV⁻¹X − ln det XᵀX.
-    fn objective(&self, triangle: &Triangle, log_det: f64, log_gram: f64) -> (f64, f64) {
+    pub(super) fn objective(&self, triangle: &Triangle, log_det: f64, log_gram: f64) -> (f64, f64) {
         let rest = &triangle.column(self.count)[self.linear..];
         let squares = rest
             .iter()

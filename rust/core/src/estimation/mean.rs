@@ -88,11 +88,7 @@ impl Mean {
     ) -> Result<Self, Error> {
         let n = rows.time.len();
         let (linear, count) = sizes(rows, values, by);
-        let base = if plant.integrates() {
-            0.0
-        } else {
-            rows.commands.value.first().copied().unwrap_or(0.0)
-        };
+        let base = base_of(plant, rows);
         let shifted = rows.commands.value.iter().map(|value| value - base);
         let shifted = memory::collected(WHAT, shifted)?;
         let held = Held {
@@ -114,8 +110,7 @@ impl Mean {
             place().fill(1.0);
         }
         if rows.trim {
-            let always = (time[0], f64::INFINITY);
-            pulse(space, always, 0.0, time, place(), task)?;
+            place().copy_from_slice(&trim_of(space, time, task)?);
         }
         for ends in &rows.commands.unknown {
             pulse(space, *ends, delay, time, place(), task)?;
@@ -168,6 +163,22 @@ impl Mean {
             rate,
         })
     }
+}
+
+/// The command that is subtracted from all: a plant that does not integrate is at rest under the first.
+pub(super) fn base_of(plant: &Plant, rows: &Rows) -> f64 {
+    let first = rows.commands.value.first();
+    first
+        .copied()
+        .filter(|_| !plant.integrates())
+        .unwrap_or(0.0)
+}
+
+/// The response to a constant input of one.
+pub(super) fn trim_of(space: &PlantSpace, time: &[f64], task: &Task) -> Result<Vec<f64>, Error> {
+    let mut out = memory::filled(WHAT, 0.0, time.len())?;
+    pulse(space, (time[0], f64::INFINITY), 0.0, time, &mut out, task)?;
+    Ok(out)
 }
 
 /// Linear unknowns, and all columns of J.

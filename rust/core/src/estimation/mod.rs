@@ -18,6 +18,7 @@ mod likelihood;
 mod mean;
 mod noises;
 mod orthogonal;
+mod over_delays;
 mod path;
 mod plant;
 mod point;
