@@ -74,6 +74,7 @@ ORDER = {
         "mean",
         "likelihood",
         "over_delays",
+        "quotients",
         "search",
         "point",
         "variables",

@@ -7,8 +7,9 @@ use super::mean::{Derivatives, Gain, Values};
 use super::over_delays::over_delays;
 use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
+use super::quotients::{Function, Slack, Value, Variable};
 use super::rows::Rows;
-use super::search::{Function, Slack, Value, Variable, minimise};
+use super::search::minimise;
 use super::variables::{Free, SHORTEST_LAG, Slot, Variables, mean_slots, put};
 use crate::{Error, Task};
 

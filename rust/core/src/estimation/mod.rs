@@ -24,6 +24,7 @@ mod plant;
 mod point;
 mod profile;
 mod propagation;
+mod quotients;
 mod rows;
 mod search;
 mod steps;

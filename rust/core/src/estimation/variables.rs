@@ -2,8 +2,8 @@
 
 use super::likelihood::{Evaluation, Noise, Searched};
 use super::point::{Point, Quantity, Timing};
+use super::quotients::{Value, Variable};
 use super::rows::Rows;
-use super::search::{Value, Variable};
 
 /// Shortest lag of a search, as a share of the time between rows; shorter ones act as a delay.
 pub(super) const SHORTEST_LAG: f64 = 1e-3;
