@@ -1,6 +1,7 @@
 """The number of lags is chosen by evidence, and delay and lag together hold whatever it is."""
 
 import deadtime as dtm
+import numpy as np
 import pytest
 from deadtime.estimation import choose_plant
 from vehicles import record_attitude
@@ -34,6 +35,36 @@ def test_a_zero_is_found():
     low, high = choice.ci()
     # The output leads a ramp: the zero is longer than delay and lags.
     assert low < -0.053 < high
+
+
+@pytest.mark.parametrize("louder", [0.0, 1e-12, 3e-12])
+def test_what_cannot_be_told_apart_is_refused_whatever_the_rounding(louder):
+    """Columns of rounding let the search go on to a zero beside no lag, which is no plant."""
+    time = 0.02 * np.arange(200)
+    told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    vehicle = dtm.FactoredPlant([0.15, 0.05]).transfer_function() * dtm.delay(0.047)
+    output = np.ravel(vehicle.simulate(time, told).outputs)
+    output = output + 0.003 * np.random.default_rng(1).standard_normal(200)
+    recording = dtm.Recording(time, told, output * (1.0 + louder), command=told)
+    choice = choose_plant(recording, FLAT, most_lags=2)
+    assert choice.chosen == "2 lags"
+    # With rows and commands at the same times, this holds for any output.
+    assert "delay and zero cannot be told apart" in choice.refusals["1 lag, zero"]
+
+
+def test_a_zero_beside_a_lag_that_comes_out_at_none_is_refused():
+    """Rows at any times, and an output without lag: the zero would be a pulse between rows."""
+    random = np.random.default_rng(2)
+    time = np.sort(random.uniform(0.0, 5.0, 300))
+    sent = 0.02 * np.arange(250)
+    told = 0.2 * np.sign(np.sin(3.7 * sent)) * (sent > 0.3)
+    known = FLAT.replace(plant=dtm.FactoredPlant([0.05], zero=0.01), sample_time=None)
+    late = np.searchsorted(sent, time - 0.047, side="right") - 1
+    output = np.where(late < 0, 0.0, told[late]) + 0.002 * random.standard_normal(time.size)
+    command = told[np.searchsorted(sent, time, side="right") - 1]
+    recording = dtm.Recording(time, command, output, sent=(sent, told))
+    with pytest.raises(dtm.NotIdentifiableError, match=r"the lags come out at zero|told apart"):
+        dtm.estimate_delay(recording, known, free=("delay", "gain", "lag_1", "zero"))
 
 
 def test_an_integrator_is_known_from_the_loop():

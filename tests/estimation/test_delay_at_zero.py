@@ -30,3 +30,28 @@ def test_a_vehicle_that_is_faster_than_its_plant_is_refused(lag):
         assert fit.delay == 0.0
         assert not fit.adequate
         assert WORDS in fit.message
+
+
+def test_where_the_delay_comes_out_at_zero_the_others_are_those_of_no_delay():
+    # The sum of delay and lag is what is searched, so that the bound is one on both together.
+    at_zero = 0
+    for seed in range(12):
+        flight = dtm.Experiment.step(8.0, rest=1.04).run(KNOWN, noise=0.003, seed=seed)
+        fit = dtm.estimate_delay(flight, KNOWN.replace(delay=None), free=("delay", "gain", "lag"))
+        if fit.delay == 0.0:
+            at_zero += 1
+            known = dtm.estimate_delay(flight, KNOWN, free=("gain", "lag"))
+            assert fit.lag == pytest.approx(known.lag, abs=0.02 * known.stderr["lag"])
+            assert fit.gain == pytest.approx(known.gain, abs=0.02 * known.stderr["gain"])
+        else:
+            assert fit.delay > 1e-6
+    assert at_zero >= 3
+
+
+@pytest.mark.parametrize(("delay", "seed"), [(0.26, 4), (0.195, 5)])
+def test_a_lag_that_rows_do_not_tell_from_delay_is_none(delay, seed):
+    vehicle = KNOWN.replace(plant=dtm.Integrator(0.9), delay=delay)
+    flight = dtm.Experiment.step(8.0, rest=1.04).run(vehicle, noise=0.003, seed=seed)
+    fit = dtm.estimate_delay(flight, KNOWN.replace(delay=None), free=("delay", "gain", "lag"))
+    assert fit.lag == 0.0
+    assert fit.delay == pytest.approx(delay, abs=0.004)

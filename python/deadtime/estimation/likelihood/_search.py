@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,10 @@ LONGEST = 0.6
 
 #: Steps of the grid over the delay: in rows, and as a share of the delay.
 GRID_STEP, GRID_GROWTH = 1.0, 0.1
+
+#: Parts of a row at which delays of a grid are, where rows are even: times between them differ by
+#: less than this share of a part.
+PARTS_OF_ROW, EVEN = 4, 1e-8
 
 #: Lags of the grid, in rows, factors of it over a time constant, and how much shorter each further
 #: lag is: equal lags have the same effect, so that a search does not move from them.
@@ -63,7 +68,10 @@ PRICE_OF_SENSOR, PRICE_OF_TRIM, PRICE_OF_SCATTER = 4.0, 9.0, 4.0
 #: Air with a shorter time constant, in rows, may be coloured noise of the sensor.
 FAST = 3.0
 
-#: Rise of −2 ln L without air up to which it is none.
+#: The shortest lag of a search, in rows.
+SHORTEST = 1e-3
+
+#: Rise of −2 ln L without air, or without a lag, up to which it is none.
 IDLE = 1e-3
 
 #: Times that scatter by more rows than this are no scatter.
@@ -266,7 +274,27 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
     best = min(found, key=_criterion)
     best = min([best, *_with_sensor(best)], key=_criterion_beside_sensor)
     best = without_idle_air(min([best, *_with_scatter(best)], key=_criterion))
-    return without_idle_air(best.moved(best.likelihood.fit(best.numbers)))
+    return _without_idle_lags(without_idle_air(best.moved(best.likelihood.fit(best.numbers))))
+
+
+def _without_idle_lags(fit: NoiseFit) -> NoiseFit:
+    """The fit without lags that make its recordings no likelier than the shortest lag does.
+
+    A search ends at a lag far below the time between rows where the likelihood has a kink over the
+    delay; there rows hardly tell lag and delay apart.
+    """
+    shortest = SHORTEST * float(np.median(np.diff(fit.runs[0].time)))
+    for place, free in enumerate(fit.model.free_lags if "delay" in fit.model.names else []):
+        one = fit.with_gain
+        lags = list(one.lags)
+        late, lags[place] = lags[place] - shortest, shortest
+        for delay in (one.delay, one.delay + late) if free and late > 0.0 else ():
+            without = PlantNumbers(delay, lags, one.noise, one.gain, one.zero)
+            if fit.likelihood.objective(without) < fit.numbers.objective + IDLE:
+                found = fit.likelihood.fit(without)
+                fit = min(fit, fit.moved(found), key=lambda one: one.numbers.objective)
+                break
+    return fit
 
 
 def without_idle_air(fit: NoiseFit) -> NoiseFit:
@@ -322,8 +350,11 @@ def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
             noise.append(changed(one, **{part: getattr(one, part) or 1.0 / size}))
         moved = replace(best, runs=tuple(runs))
         fit = moved.moved(moved.likelihood.fit(with_noise(best.numbers, noise), ROUGH))
+        # No command arrives before it is sent.
+        latest = fit.numbers.delay if part == "arrivals" and "delay" in fit.model.names else np.inf
         if all(
-            scatter_of(fit, run, part) < MOST_SCATTER * float(np.median(np.diff(rows.time)))
+            scatter_of(fit, run, part)
+            < min(latest, MOST_SCATTER * float(np.median(np.diff(rows.time))))
             for run, rows in enumerate(runs)
         ):
             found.append(fit)
@@ -387,7 +418,21 @@ def _grid(
     delays = [0.0]
     while delays[-1] < LONGEST * float(rows.time[-1] - rows.time[0]):
         delays.append(delays[-1] + max(GRID_STEP * between, GRID_GROWTH * delays[-1]))
-    return grid_minima(likelihood, delays, grid_lags(model, between), noise, first)[:REFINED]
+    delays = on_parts_of_rows(delays, rows)
+    return grid_minima(likelihood, delays, grid_lags(model, between), noise, first)
+
+
+def on_parts_of_rows(delays: Sequence[float], rows: FlightRows) -> list[float]:
+    """Increasing delays of a grid, moved to parts of a row where rows are even.
+
+    A response serves all delays that are whole rows apart, there.
+    """
+    between = np.diff(rows.time)
+    part = float(np.mean(between)) / PARTS_OF_ROW
+    if np.ptp(between) > EVEN * part:
+        return list(delays)
+    moved: list[float] = (part * np.unique(np.rint(np.asarray(delays) / part))).tolist()
+    return moved
 
 
 def grid_minima(
@@ -397,7 +442,7 @@ def grid_minima(
     noise: list[RowNoise],
     first: PlantNumbers,
 ) -> list[PlantNumbers]:
-    """Local minima over the delay at each set of lags, else as `first`, the lowest first."""
+    """The lowest local minima over the delay at sets of lags, else as `first`, the lowest first."""
     minima: list[PlantNumbers] = []
     for some in lags:
 
@@ -409,10 +454,11 @@ def grid_minima(
         is_least = (values <= padded[:-2]) & (values <= padded[2:])
         # Where the command has no effect yet, the likelihood is infinite.
         places = np.flatnonzero(is_least & np.isfinite(values))
-        found = [at(delays[i], float(values[i])) for i in places.tolist()]
-        # Nor do rows tell the numbers apart in which it has only just begun.
-        minima += [one for one in found if math.isfinite(likelihood.objective(one))]
-    return sorted(minima, key=_objective)
+        minima += [at(delays[i], float(values[i])) for i in places.tolist()]
+    minima.sort(key=_objective)
+    # Nor do rows tell the numbers apart in which it has only just begun.
+    told = (one for one in minima if math.isfinite(likelihood.objective(one)))
+    return list(islice(told, REFINED))
 
 
 def grid_lags(model: PlantModel, between: float) -> list[list[float]]:

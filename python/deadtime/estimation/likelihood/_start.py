@@ -25,6 +25,7 @@ from deadtime.estimation.likelihood._search import (
     PlantModel,
     grid_lags,
     grid_minima,
+    on_parts_of_rows,
     with_noise,
 )
 
@@ -40,9 +41,6 @@ OVERLAP = 4
 #: Most points of the grid over the delay, and its step in rows: the cost has minima less than a row
 #: apart, but not where a lag makes the response smooth.
 MOST_POINTS, SHARP_STEP, SMOOTH_STEP = 600, 0.25, 1.0
-
-#: Minima over the delay that are refined, for each recording and set of lags.
-REFINED = 2
 
 
 def is_long(runs: Sequence[FlightRows]) -> bool:
@@ -131,12 +129,12 @@ def _minima(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> list[Pl
         longest = LONGEST * float(rows.time[-1] - rows.time[0])
         step = (SMOOTH_STEP if any(model.free_lags) else SHARP_STEP) * between
         count = int(min(MOST_POINTS, max(2.0, longest / step)))
-        delays = np.linspace(0.0, longest, count + 1).tolist()
+        delays = on_parts_of_rows(np.linspace(0.0, longest, count + 1).tolist(), rows)
     likelihood = model.likelihood([rows], False)
     return [
         point
         for lags in grid_lags(model, between)
-        for point in grid_minima(likelihood, delays, [lags], first.noise, first)[:REFINED]
+        for point in grid_minima(likelihood, delays, [lags], first.noise, first)
     ]
 
 

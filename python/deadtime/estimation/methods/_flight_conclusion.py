@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.errors import NotIdentifiableError
 from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
@@ -178,7 +179,10 @@ def _outliers(rows: FlightRows) -> int:
 def values_of(
     fit: NoiseFit, names: tuple[str, ...], known: Mapping[str, float]
 ) -> dict[str, float]:
-    """The fitted parameters of the loop; a lag at its lower bound is none."""
+    """The fitted parameters of the loop; a lag at its lower bound is none.
+
+    Beside no lag there is no zero: its effect would be a pulse between rows.
+    """
     numbers = fit.numbers
     least = NO_LAG * 1e-3 * float(np.median(np.diff(fit.runs[0].time)))
     found = {"delay": numbers.delay, "gain": fit.gain, "zero": numbers.zero}
@@ -187,6 +191,12 @@ def values_of(
             found["delay"], lag = found["delay"] + lag, 0.0
         found[name] = lag
     found["delay"] = max(0.0, found["delay"])
+    kept = [found[name] for name in fit.model.lag_names]
+    if numbers.zero and kept and not any(kept) and len(fit.model.den) <= 2:
+        raise NotIdentifiableError(
+            "the lags come out at zero, where a zero has no effect on the rows: leave 'zero' and "
+            "the lags out of free=, or give the plant a further lag"
+        )
     return {name: found[name] for name in names} | {
         "delay": found["delay"] if "delay" in names else known["delay"]
     }

@@ -2,17 +2,22 @@
 //!
 //! Half of the file is its tests.
 
-use super::likelihood::{Evaluation, Noise, Wanted, evaluate};
+use super::likelihood::{Evaluation, Noise, Wanted, evaluate, objectives};
 use super::mean::{Derivatives, Gain, Values};
+use super::over_delays::over_delays;
 use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
+use super::quotients::{Function, Slack, Value, Variable};
 use super::rows::Rows;
-use super::search::{Value, Variable, minimise};
-use super::variables::{Free, SHORTEST_LAG, Variables, mean_slots, put};
+use super::search::minimise;
+use super::variables::{Free, SHORTEST_LAG, Slot, Variables, mean_slots, put};
 use crate::{Error, Task};
 
 /// Rise of the objective by a row of negative delay.
 const PENALTY: f64 = 1e4;
+
+/// A delay of so many rows is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Recordings of one plant with what is unknown about it.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,14 +141,8 @@ impl Model {
         self.part(run, point, None, Wanted::All, task)
     }
 
-    fn part(
-        &self,
-        run: usize,
-        point: &Point,
-        held: Option<Quantity>,
-        wanted: Wanted,
-        task: &Task,
-    ) -> Result<Evaluation, Error> {
+    /// The numbers of the mean at a point, and by which there are derivatives.
+    fn mean(&self, point: &Point, held: Option<Quantity>) -> (Values, Derivatives) {
         let values = Values {
             delay: point.delay().max(0.0),
             lags: point.lags.clone(),
@@ -155,6 +154,18 @@ impl Model {
             lags: self.free.lags.clone(),
             zero: self.free.zero,
         };
+        (values, by)
+    }
+
+    fn part(
+        &self,
+        run: usize,
+        point: &Point,
+        held: Option<Quantity>,
+        wanted: Wanted,
+        task: &Task,
+    ) -> Result<Evaluation, Error> {
+        let (values, by) = self.mean(point, held);
         let (Some(rows), Some(noise)) = (self.runs.get(run), point.noise.get(run)) else {
             refuse!(
                 "recording {run} of {}: give the number of one of them, from zero",
@@ -192,16 +203,25 @@ impl Model {
     ) -> Result<Vec<f64>, Error> {
         self.check(point)?;
         let mut at = point.clone();
-        let mut found = Vec::with_capacity(delays.len());
+        let (values, by) = self.mean(point, None);
+        let mut sums = Vec::with_capacity(delays.len());
         for delay in delays {
             at.timing = Timing::Delay(*delay);
-            let mut sum = self.penalty(&at);
-            for run in 0..self.runs.len() {
-                sum += self.part(run, &at, None, Wanted::Value, task)?.objective;
-            }
-            found.push(sum);
+            sums.push(self.penalty(&at));
         }
-        Ok(found)
+        for (run, (rows, noise)) in self.runs.iter().zip(&point.noise).enumerate() {
+            let all = over_delays(rows, &self.plant, &values, noise, &by, delays, task)?;
+            let mut all = all.into_iter().flatten();
+            for (sum, delay) in sums.iter_mut().zip(delays) {
+                *sum += if let Some(value) = all.next() {
+                    value
+                } else {
+                    at.timing = Timing::Delay(*delay);
+                    self.part(run, &at, None, Wanted::Value, task)?.objective
+                };
+            }
+        }
+        Ok(sums)
     }
 
     /// What a negative delay costs.
@@ -256,48 +276,154 @@ impl Model {
             slots.truncate(mean_slots(&slots));
         }
         let variables: Vec<Variable> = slots.iter().map(|slot| by.variable(*slot, start)).collect();
-        let mut trial = start.clone();
-        // Recordings whose numbers did not change keep their part of the sum.
-        let mut kept: Vec<Option<(Point, Value)>> = vec![None; self.runs.len()];
-        let found = minimise(&variables, tolerance, near, |z, wanted| {
-            for (slot, value) in slots.iter().zip(z) {
-                put(&mut trial, *slot, *value);
-            }
-            let mut sum = Value::new(self.penalty(&trial), mean_slots(&slots));
-            for run in 0..self.runs.len() {
-                let mut own = trial.clone();
-                if self.runs.len() > 1 {
-                    own.noise = trial.noise.get(run).copied().into_iter().collect();
-                }
-                if let Some(Some((_, part))) = kept
-                    .get(run)
-                    .filter(|known| matches!(known, Some((point, _)) if *point == own))
-                {
-                    sum.add(part);
-                    continue;
-                }
-                let part = self.part(run, &trial, held, wanted, task)?;
-                if wanted == Wanted::Value {
-                    sum.value += part.objective;
-                    continue;
-                }
-                let is_gain = matches!(self.gain_at(&trial, held), Gain::Searched(_));
-                let part = by.part(&slots, &trial, is_gain, &part);
-                sum.add(&part);
-                if let Some(place) = kept.get_mut(run) {
-                    *place = Some((own, part));
-                }
-            }
-            Ok(sum)
-        })?;
+        let sum = Sum {
+            model: self,
+            by,
+            slots: &slots,
+            held,
+            trial: start.clone(),
+            kept: vec![None; self.runs.len()],
+            task,
+        };
+        let found = minimise(&variables, tolerance, near, sum)?;
         let mut point = start.clone();
         for (slot, value) in slots.iter().zip(&found.place) {
             put(&mut point, *slot, *value);
+        }
+        if matches!(point.timing, Timing::Total(_))
+            && point.delay().abs() < ROUNDING * self.row_time
+        {
+            point.timing = Timing::Total(point.lag());
         }
         Ok(Fit {
             point,
             objective: found.value,
         })
+    }
+}
+
+/// −2 ln L of all recordings as the function of a search.
+struct Sum<'a> {
+    model: &'a Model,
+    by: Variables<'a>,
+    slots: &'a [Slot],
+    held: Option<Quantity>,
+    trial: Point,
+    /// Recordings whose numbers did not change keep their part of the sum.
+    kept: Vec<Option<(Point, Value)>>,
+    task: &'a Task,
+}
+
+impl Sum<'_> {
+    /// Move to a place; the numbers there that a recording depends on, for each.
+    fn moved(&mut self, place: &[f64]) -> Vec<Point> {
+        for (slot, value) in self.slots.iter().zip(place) {
+            put(&mut self.trial, *slot, *value);
+        }
+        let noise = self.trial.noise.iter();
+        noise
+            .map(|noise| Point {
+                noise: vec![*noise],
+                ..self.trial.clone()
+            })
+            .collect()
+    }
+
+    /// The part of a recording that is kept from these numbers.
+    fn known(&self, run: usize, own: &Point) -> Option<&Value> {
+        let kept = self.kept.get(run)?.as_ref();
+        kept.filter(|(point, _)| point == own).map(|(_, part)| part)
+    }
+}
+
+impl Function for Sum<'_> {
+    /// The delay, where it is what is left of delay and lags together.
+    fn slack(&self, place: &[f64]) -> Option<Slack> {
+        let slots = &self.slots[..mean_slots(self.slots)];
+        let mut point = self.trial.clone();
+        for (slot, value) in slots.iter().zip(place) {
+            put(&mut point, *slot, *value);
+        }
+        let by = |slot: &Slot| match slot {
+            Slot::Time | Slot::Zero => 1.0,
+            Slot::Lag(i) => -point.lags[*i],
+            _ => 0.0,
+        };
+        let slope: Vec<f64> = slots.iter().map(by).collect();
+        let is_bound =
+            matches!(point.timing, Timing::Total(_)) && slope.iter().any(|by| *by != 0.0);
+        is_bound.then(|| Slack {
+            value: point.delay(),
+            slope,
+        })
+    }
+
+    fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error> {
+        let owns = self.moved(place);
+        let mut sum = Value::new(self.model.penalty(&self.trial), mean_slots(self.slots));
+        for (run, own) in owns.into_iter().enumerate() {
+            if let Some(part) = self.known(run, &own) {
+                sum.add(part);
+                continue;
+            }
+            let part = self
+                .model
+                .part(run, &self.trial, self.held, wanted, self.task)?;
+            if wanted == Wanted::Value {
+                sum.value += part.objective;
+                continue;
+            }
+            let is_gain = matches!(
+                self.model.gain_at(&self.trial, self.held),
+                Gain::Searched(_)
+            );
+            let part = self.by.part(self.slots, &self.trial, is_gain, &part);
+            sum.add(&part);
+            if let Some(kept) = self.kept.get_mut(run) {
+                *kept = Some((own, part));
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Places that differ in the noise alone share the mean: those of the last.
+    fn values(&mut self, places: &[Vec<f64>]) -> Result<Vec<f64>, Error> {
+        let mean = mean_slots(self.slots);
+        let Some(last) = places.last() else {
+            return Ok(Vec::new());
+        };
+        let own = places
+            .iter()
+            .take_while(|place| place[..mean] != last[..mean])
+            .count();
+        let mut found = Vec::with_capacity(places.len());
+        for place in &places[..own] {
+            found.push(self.at(place, Wanted::Value)?.value);
+        }
+        let points: Vec<Vec<Point>> = places[own..]
+            .iter()
+            .map(|place| self.moved(place))
+            .collect();
+        let mut sums = vec![self.model.penalty(&self.trial); points.len()];
+        let (values, by) = self.model.mean(&self.trial, self.held);
+        for (run, rows) in self.model.runs.iter().enumerate() {
+            let (mut noises, mut open) = (Vec::new(), Vec::new());
+            for (sum, point) in sums.iter_mut().zip(&points) {
+                if let Some(part) = self.known(run, &point[run]) {
+                    *sum += part.value;
+                } else {
+                    noises.extend(&point[run].noise);
+                    open.push(sum);
+                }
+            }
+            let plant = &self.model.plant;
+            let parts = objectives(rows, plant, &values, &noises, &by, self.task)?;
+            for (sum, part) in open.into_iter().zip(parts) {
+                *sum += part;
+            }
+        }
+        found.extend(sums);
+        Ok(found)
     }
 }
 

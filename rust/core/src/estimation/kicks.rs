@@ -1,6 +1,6 @@
 //! Random changes of the states of a plant at the arrivals of commands.
 
-use super::plant::PlantSpace;
+use super::plant::{MOST_STATES, PlantSpace};
 use super::rows::{Commands, Rows};
 use super::steps::Steps;
 use super::whiten::Kick;
@@ -47,30 +47,38 @@ fn kicks_of<const N: usize>(
     let jumps = if arrivals > 0.0 { time.len() - 1 } else { 0 };
     let mut found = memory::reserved("the errors of commands", uncertain.len() + jumps)?;
     let mut steps = Steps::<N>::new(space);
-    let mut add = |steps: &mut Steps<N>, end: f64, moved: &[f64; N]| {
+    // Ends come in their order, and so do the rows that follow them.
+    let mut add = |steps: &mut Steps<N>, row: &mut usize, end: f64, moved: &[f64; N]| {
         let arrival = end + delay;
-        let row = rows.time.partition_point(|time| *time < arrival);
-        let Some(time) = rows.time.get(row).filter(|_| row > 0) else {
+        while rows.time.get(*row).is_some_and(|time| *time < arrival) {
+            *row += 1;
+        }
+        let Some(time) = rows.time.get(*row).filter(|_| *row > 0) else {
             return;
         };
-        let state = steps.at(time - arrival, *time).apply(moved, 0.0).to_vec();
-        found.push(Kick { row, state });
+        let mut state = [0.0; MOST_STATES];
+        state[..N].copy_from_slice(&steps.at(time - arrival, *time).apply(moved, 0.0));
+        found.push(Kick { row: *row, state });
     };
+    let mut row = 0;
     for (start, end, deviation) in uncertain {
         let moved = steps
             .at(end - start, *end)
             .apply(&[0.0; N], sensor * deviation);
-        add(&mut steps, *end, &moved);
+        add(&mut steps, &mut row, *end, &moved);
     }
     if arrivals > 0.0 {
+        let mut row = 0;
         let by_jump: [f64; N] = std::array::from_fn(|i| space.b[i]);
         for (end, pair) in time.iter().skip(1).zip(value.windows(2)) {
             let jump = arrivals * (pair[1] - pair[0]);
             if jump != 0.0 {
-                add(&mut steps, *end, &by_jump.map(|b| b * jump));
+                add(&mut steps, &mut row, *end, &by_jump.map(|b| b * jump));
             }
         }
-        found.sort_by_key(|kick| kick.row);
+        if !uncertain.is_empty() {
+            found.sort_by_key(|kick| kick.row);
+        }
     }
     Ok(found)
 }

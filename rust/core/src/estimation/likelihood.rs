@@ -18,6 +18,7 @@
 use super::disturbance::{Disturbance, Entry, Joint};
 use super::kicks::kicks;
 use super::mean::{Derivatives, Gain, Mean, Values, sizes};
+use super::noises::{One, Shared, triangles};
 use super::orthogonal::Triangle;
 use super::path::dot;
 use super::plant::Plant;
@@ -72,7 +73,7 @@ impl Noise {
         self.parts().iter().try_for_each(Disturbance::check)
     }
 
-    fn disturbances(&self) -> Vec<Disturbance> {
+    pub(super) fn disturbances(&self) -> Vec<Disturbance> {
         let parts = self.parts().into_iter();
         parts.filter(|part| part.deviation > 0.0).collect()
     }
@@ -138,6 +139,113 @@ pub(super) enum Wanted {
     All,
 }
 
+/// The numbers of rows and unknowns that an objective depends on.
+pub(super) struct Counts {
+    /// Rows that are used.
+    pub(super) used: usize,
+    /// Columns of J.
+    pub(super) count: usize,
+    /// Those that are linear; a gain that is searched is.
+    pub(super) first: usize,
+    /// Those that are eliminated.
+    pub(super) linear: usize,
+    /// Sum of squares of the output.
+    pub(super) power: f64,
+}
+
+impl Counts {
+    /// The rows and unknowns of a mean, whose columns are cleared in rows that are not used.
+    fn of(rows: &Rows, mean: &mut Mean, values: &Values, count: usize) -> Self {
+        let n = rows.time.len();
+        let used = rows.used.iter().filter(|used| **used).count();
+        if used < n {
+            for column in mean.columns.chunks_exact_mut(n) {
+                clear(column, &rows.used);
+            }
+        }
+        let recorded = rows.output.iter().zip(&rows.used);
+        Self {
+            used,
+            count,
+            // The derivatives of the others follow it.
+            first: mean.linear + usize::from(matches!(values.gain, Gain::Searched(_))),
+            linear: mean.linear,
+            power: recorded
+                .filter(|(_, used)| **used)
+                .map(|(y, _)| y * y)
+                .sum(),
+        }
+    }
+
+    /// The least sum of squares, and −2 ln L for these ln det V and ln det XᵀV⁻¹X − ln det XᵀX.
+    pub(super) fn objective(&self, triangle: &Triangle, log_det: f64, log_gram: f64) -> (f64, f64) {
+        let rest = &triangle.column(self.count)[self.linear..];
+        let squares = rest
+            .iter()
+            .map(|e| e * e)
+            .sum::<f64>()
+            .max(ROUNDING * self.power);
+        let m = (self.used - self.first) as f64;
+        let objective = m * (squares / m).max(f64::MIN_POSITIVE).ln() + log_det + log_gram;
+        let is_certain = objective.is_finite() && !triangle.is_dependent(self.count);
+        (squares, if is_certain { objective } else { f64::INFINITY })
+    }
+}
+
+/// −2 ln L under each of these noises, as `evaluate` for `Wanted::Value`.
+pub(super) fn objectives(
+    rows: &Rows,
+    plant: &Plant,
+    values: &Values,
+    noises: &[Noise],
+    by: &Derivatives,
+    task: &Task,
+) -> Result<Vec<f64>, Error> {
+    let parts: Vec<Vec<Disturbance>> = noises.iter().map(Noise::disturbances).collect();
+    let alike = parts.windows(2).all(|pair| pair[0].len() == pair[1].len());
+    if noises.len() < 2 || !alike || !rows.commands.uncertain.is_empty() {
+        let one = |noise| evaluate(rows, plant, values, noise, by, Wanted::Value, task);
+        return noises
+            .iter()
+            .map(|noise| Ok(one(noise)?.objective))
+            .collect();
+    }
+    let n = rows.time.len();
+    let by = Derivatives::none();
+    let (_, count) = sizes(rows, values, &by);
+    let space = plant.space(&values.lags, values.zero);
+    let mut mean = Mean::new(rows, plant, &space, values, &by, task)?;
+    let counts = Counts::of(rows, &mut mean, values, count);
+    let plain = Triangle::new(&mean.columns, n, counts.first, task)?.log_det(counts.first);
+    let scatters = |noise: &Noise| noise.arrivals.hypot(noise.stamps);
+    let kicked = noises.iter().any(|noise| scatters(noise) > 0.0);
+    let kicks = kicks(rows, &space, values.delay, f64::from(u8::from(kicked)), 1.0)?;
+    let shared = Shared {
+        time: &rows.time,
+        used: &rows.used,
+        speed: &rows.speed,
+        columns: &mean.columns,
+        kicks: &kicks,
+    };
+    let each: Result<Vec<One>, Error> = noises
+        .iter()
+        .zip(&parts)
+        .map(|(noise, parts)| {
+            Ok(One {
+                joint: Joint::new(&space, parts)?,
+                stamps: noise.stamps,
+                kick: scatters(noise),
+            })
+        })
+        .collect();
+    let triangles = triangles(shared, &each?, task)?;
+    let objective = |(log_det, triangle): (f64, Triangle)| {
+        let log_gram = triangle.log_det(counts.first) - plain;
+        counts.objective(&triangle, log_det, log_gram).1
+    };
+    Ok(triangles.into_iter().map(objective).collect())
+}
+
 pub(super) fn evaluate(
     rows: &Rows,
     plant: &Plant,
@@ -160,24 +268,14 @@ pub(super) fn evaluate(
     let space = plant.space(&values.lags, values.zero);
     let mut mean = Mean::new(rows, plant, &space, values, by, task)?;
     let (linear, all) = (mean.linear, count + 1);
-    // A gain that is searched is linear too; the derivatives of the others follow it.
-    let first = linear + usize::from(matches!(values.gain, Gain::Searched(_)));
     let mut raw = Vec::new();
     if wanted == Wanted::All {
         // The linear columns and the output, to compute residuals from.
         raw = memory::copied(WHAT, &mean.columns[..linear * n])?;
         memory::append(WHAT, &mut raw, &mean.columns[count * n..])?;
     }
-    if used < n {
-        for column in mean.columns.chunks_exact_mut(n) {
-            clear(column, &rows.used);
-        }
-    }
-    let recorded = rows.output.iter().zip(&rows.used);
-    let power: f64 = recorded
-        .filter(|(_, used)| **used)
-        .map(|(y, _)| y * y)
-        .sum();
+    let counts = Counts::of(rows, &mut mean, values, count);
+    let first = counts.first;
     let disturbances = noise.disturbances();
     let kicks = kicks(
         rows,
@@ -209,18 +307,11 @@ pub(super) fn evaluate(
     if !is_white {
         log_gram += triangle.log_det(first);
     }
-    let (parts, rest) = triangle.column(count).split_at(linear);
-    let squares = rest
-        .iter()
-        .map(|e| e * e)
-        .sum::<f64>()
-        .max(ROUNDING * power);
+    let (squares, objective) = counts.objective(&triangle, log_det, log_gram);
     let freedom = used - count;
     let variance = (squares / freedom as f64).max(f64::MIN_POSITIVE);
     let m = (used - first) as f64;
-    let objective = m * (squares / m).max(f64::MIN_POSITIVE).ln() + log_det + log_gram;
-    let is_certain = objective.is_finite() && !triangle.is_dependent(count);
-    let solved = triangle.solve(parts);
+    let solved = triangle.solve(&triangle.column(count)[..linear]);
     let gain = match values.gain {
         Gain::Eliminated => solved.first().copied().unwrap_or(0.0),
         Gain::Searched(gain) | Gain::Known(gain) => gain,
@@ -230,7 +321,7 @@ pub(super) fn evaluate(
         .map(|column| if column < first { 1.0 } else { gain })
         .collect();
     let mut found = Evaluation {
-        objective: if is_certain { objective } else { f64::INFINITY },
+        objective,
         log_det,
         variance,
         freedom,
@@ -503,6 +594,71 @@ mod tests {
             let found = at(&rows, &values(Gain::Eliminated, &[]), &noise);
             let (objective, _) = dense(&rows, &noise, &kicks, None);
             assert!((found.objective - objective).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn delay_and_zero_of_a_response_that_jumps_are_dependent_at_any_lag() {
+        // Commands arrive between the same rows, whatever the delay in between.
+        let mut rows = recording(300);
+        let step = 0.05;
+        rows.time = (0..300).map(|i| step * f64::from(i)).collect();
+        rows.commands.time = (0..30).map(|i| 10.0 * step * f64::from(i)).collect();
+        rows.commands.value = (0..30).map(|i| f64::from(i % 3) - 0.7).collect();
+        rows.output = gaussian(3, 300);
+        rows.used = vec![true; 300];
+        let rows = rows.checked().unwrap();
+        let by = Derivatives {
+            zero: true,
+            ..by_delay(1)
+        };
+        let plant = Plant::new(&[1.0], &[1.0]).unwrap();
+        for lag in [1e-3, 0.01, 0.03, 0.1, 0.5] {
+            for zero in [-0.1, 1e-3, 0.2] {
+                for noise in [QUIET, WINDY] {
+                    let at = Values {
+                        delay: 0.12,
+                        zero,
+                        ..values(Gain::Eliminated, &[lag])
+                    };
+                    let (wanted, task) = (Wanted::Slopes, Task::new());
+                    let found = evaluate(&rows, &plant, &at, &noise, &by, wanted, &task).unwrap();
+                    assert_eq!(found.objective, f64::INFINITY, "{lag} {zero}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn several_noises_at_once_have_the_objective_of_each() {
+        // More rows than a block, more noises than lanes; some scatter, and two have no air.
+        let mut rows = rows(300);
+        rows.speed = rows.time.iter().map(|t| (3.0 * t).sin()).collect();
+        let mut computed = rows.clone();
+        computed.commands.uncertain = vec![(2.0, 2.3, 0.5)];
+        let noise = |k: u32| Noise {
+            air: if k < 2 { 0.0 } else { 0.3 * f64::from(k) },
+            stamps: f64::from(k % 3),
+            arrivals: f64::from(k % 4),
+            ..WINDY
+        };
+        let (plant, task) = (integrator(), Task::new());
+        for rows in [rows, computed] {
+            let rows = rows.checked().unwrap();
+            for gain in [Gain::Eliminated, Gain::Searched(0.8), Gain::Known(0.8)] {
+                for noises in [(0..2), (2..13), (0..13)] {
+                    let noises: Vec<Noise> = noises.map(noise).collect();
+                    let (values, by) = (values(gain, &[0.1, 0.03]), by_delay(2));
+                    let found = objectives(&rows, &plant, &values, &noises, &by, &task).unwrap();
+                    assert_eq!(found.len(), noises.len());
+                    for (found, noise) in found.iter().zip(&noises) {
+                        let one =
+                            evaluate(&rows, &plant, &values, noise, &by, Wanted::Value, &task);
+                        let expected = one.unwrap().objective;
+                        assert!((found - expected).abs() < 1e-9 * expected.abs());
+                    }
+                }
+            }
         }
     }
 

@@ -9,6 +9,10 @@ use crate::{Error, Task, memory};
 /// Relative step of the difference quotient by a lag.
 const STEP: f64 = 1e-5;
 
+/// Change of a response, as a share of its largest value, below which it is rounding: a column of
+/// rounding would pass for one that depends on no other.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// What memory is asked for.
 const WHAT: &str = "the columns of the likelihood";
 
@@ -84,11 +88,7 @@ impl Mean {
     ) -> Result<Self, Error> {
         let n = rows.time.len();
         let (linear, count) = sizes(rows, values, by);
-        let base = if plant.integrates() {
-            0.0
-        } else {
-            rows.commands.value.first().copied().unwrap_or(0.0)
-        };
+        let base = base_of(plant, rows);
         let shifted = rows.commands.value.iter().map(|value| value - base);
         let shifted = memory::collected(WHAT, shifted)?;
         let held = Held {
@@ -110,8 +110,7 @@ impl Mean {
             place().fill(1.0);
         }
         if rows.trim {
-            let always = (time[0], f64::INFINITY);
-            pulse(space, always, 0.0, time, place(), task)?;
+            place().copy_from_slice(&trim_of(space, time, task)?);
         }
         for ends in &rows.commands.unknown {
             pulse(space, *ends, delay, time, place(), task)?;
@@ -124,10 +123,16 @@ impl Mean {
                 *place = -rate;
             }
         }
+        let rounding = ROUNDING * response.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         let difference = |other: &PlantSpace, step: f64, out: &mut [f64]| {
             respond(other, held, delay, time, out, None, task)?;
             for (out, response) in out.iter_mut().zip(&response) {
-                *out = (*out - response) / step;
+                let change = *out - response;
+                *out = if change.abs() > rounding {
+                    change / step
+                } else {
+                    0.0
+                };
             }
             Ok::<(), Error>(())
         };
@@ -139,7 +144,8 @@ impl Mean {
             }
         }
         if by.zero {
-            let step = values.lags.last().copied().unwrap_or(1.0) * STEP;
+            // The response is linear in it: the quotient is exact, and a long step has the least rounding.
+            let step = values.lags.last().copied().unwrap_or(1.0);
             let other = plant.space(&values.lags, values.zero + step);
             difference(&other, step, place())?;
         }
@@ -157,6 +163,22 @@ impl Mean {
             rate,
         })
     }
+}
+
+/// The command that is subtracted from all: a plant that does not integrate is at rest under the first.
+pub(super) fn base_of(plant: &Plant, rows: &Rows) -> f64 {
+    let first = rows.commands.value.first();
+    first
+        .copied()
+        .filter(|_| !plant.integrates())
+        .unwrap_or(0.0)
+}
+
+/// The response to a constant input of one.
+pub(super) fn trim_of(space: &PlantSpace, time: &[f64], task: &Task) -> Result<Vec<f64>, Error> {
+    let mut out = memory::filled(WHAT, 0.0, time.len())?;
+    pulse(space, (time[0], f64::INFINITY), 0.0, time, &mut out, task)?;
+    Ok(out)
 }
 
 /// Linear unknowns, and all columns of J.

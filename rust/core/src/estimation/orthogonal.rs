@@ -5,7 +5,10 @@
 //! Householder's reflections (Björck 1967); with the target as a last column it holds the solution
 //! and the sum of squares, and Q is not needed.
 
+use pulp::{Simd, WithSimd};
+
 use super::path::dot;
+use crate::simd::Instructions;
 use crate::{Error, Task, memory};
 
 /// Norm of what is left of a column, as a share of its norm, below which it depends on the others.
@@ -14,6 +17,23 @@ const DEPENDENT: f64 = 1e-9;
 /// Rows of a block, and the least as a multiple of the columns.
 const BLOCK: usize = 256;
 const BLOCK_SHARE: usize = 2;
+
+/// Columns, for the same operations in the same order in wider registers where the machine has them.
+struct Columns<'a> {
+    columns: &'a [f64],
+    length: usize,
+    count: usize,
+    task: &'a Task,
+}
+
+impl WithSimd for Columns<'_> {
+    type Output = Result<Triangle, Error>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        Triangle::made(self.columns, self.length, self.count, self.task)
+    }
+}
 
 /// R of some columns.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,8 +50,12 @@ impl Triangle {
         count: usize,
         task: &Task,
     ) -> Result<Self, Error> {
-        // The same operations in the same order, in wider registers where the machine has them.
-        pulp::Arch::new().dispatch(|| Self::made(columns, length, count, task))
+        Instructions::chosen().run(Columns {
+            columns,
+            length,
+            count,
+            task,
+        })
     }
 
     #[inline(always)]
@@ -69,6 +93,11 @@ impl Triangle {
             }
         }
         Ok(Self { factor })
+    }
+
+    /// R with these columns, each down to its diagonal.
+    pub(super) fn of(factor: Vec<f64>) -> Self {
+        Self { factor }
     }
 
     /// A column of R down to its diagonal.

@@ -60,7 +60,10 @@ impl Quantity {
             }
             Self::Total => {
                 let late = point.total() - point.delay();
-                if value < late && late > 0.0 {
+                if value <= 0.0 && model.free.zero {
+                    // No lag is below zero: the zero is longer than the lags.
+                    held.zero += late - value;
+                } else if value < late && value > 0.0 {
                     let share = value / late;
                     let lags = held.lags.iter_mut().zip(&model.free.lags);
                     lags.filter(|(_, free)| **free)
@@ -386,6 +389,18 @@ mod tests {
         let (whole, other) = end(f64::INFINITY);
         assert!(whole > first);
         assert!(other.objective <= lowest.objective);
+    }
+
+    #[test]
+    fn lags_stay_lags_where_the_sum_is_held_below_zero() {
+        let (mut model, best) = fitted(&[0.17]);
+        model.free.zero = true;
+        for value in [-0.2, 0.0, 0.1] {
+            let held = Quantity::Total.held(&best.point, value, &model);
+            assert!(held.lags[0] > 0.0);
+            assert!((held.total() - value).abs() < 1e-15);
+            assert!(held.delay() > -1e-15, "{held:?}");
+        }
     }
 
     #[test]

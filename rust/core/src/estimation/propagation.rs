@@ -59,11 +59,23 @@ impl<const N: usize> Propagation<N> {
         found
     }
 
-    /// Φ P Φᵀ + Q.
+    /// Φ P Φᵀ + Q for a symmetric P.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "entries of two matrices by the same numbers"
+    )]
     #[inline(always)]
     pub(super) fn predicted(&self, p: &Square<N>) -> Square<N> {
-        let mut next = self.moved(p);
-        add(&mut next, &self.q);
+        let left = product(&self.phi, p);
+        let mut next = self.q;
+        for i in 0..N {
+            for j in 0..=i {
+                for (x, y) in left[i].iter().zip(&self.phi[j]) {
+                    next[i][j] += x * y;
+                }
+                next[j][i] = next[i][j];
+            }
+        }
         next
     }
 

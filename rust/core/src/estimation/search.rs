@@ -4,13 +4,12 @@
 //! Newton, which cost no evaluation: they are searched alone first, and their curvature is the first
 //! guess of the Hessian. That of the others is made of difference quotients. The inverse Hessian is
 //! then that of Broyden, Fletcher, Goldfarb and Shanno; variables at a bound that would leave it are
-//! held there (Bertsekas 1982). What the known slopes lack is a difference quotient at the start and
-//! at the end of the search. Difference quotients are central, for which the function may have kinks
-//! in its second derivative.
-
-use std::ops::Range;
+//! held there (Bertsekas 1982), and steps across a bound on several variables end on it, at the least
+//! value of the quadratic model there (Nocedal & Wright, Numerical Optimization, 18.1). What the known
+//! slopes lack is a difference quotient at the start and at the end of the search.
 
 use super::likelihood::Wanted;
+use super::quotients::{Function, Quotients, Slack, Value, Variable, keep_within, shorten};
 use crate::Error;
 
 /// Most iterations, and those over the first variables alone.
@@ -29,59 +28,11 @@ const SHORTER: f64 = 0.4;
 /// Share of the predicted decrease that a step has to reach (Armijo).
 const SUFFICIENT: f64 = 1e-4;
 
-/// Largest change of the gradient over a step of difference quotients, times that step: where the
-/// function is steep, a long step sees its third derivative.
-const STEEPEST: f64 = 0.04;
-
-/// Smallest second derivative by the units of difference quotients.
-const FLATTEST: f64 = 1e-4;
-
 /// Added to a known curvature of unit diagonal: bounds its condition.
 const RIDGE: f64 = 1e-7;
 
 /// Decrease that matters: a step over the first variables alone has to promise and bring it.
 const WORTHWHILE: f64 = 0.02;
-
-/// A variable: where it starts and may go, the longest step of its difference quotients, and that of
-/// the search.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Variable {
-    pub(super) start: f64,
-    pub(super) low: f64,
-    pub(super) high: f64,
-    pub(super) step: f64,
-    pub(super) longest: f64,
-}
-
-/// The function, and the known part of its slope and curvature by the first variables, which need not
-/// be there where the value alone is wanted.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Value {
-    pub(super) value: f64,
-    pub(super) slope: Vec<f64>,
-    /// Row-major.
-    pub(super) curvature: Vec<f64>,
-}
-
-impl Value {
-    /// Flat in the first `count` variables.
-    pub(super) fn new(value: f64, count: usize) -> Self {
-        Self {
-            value,
-            slope: vec![0.0; count],
-            curvature: vec![0.0; count * count],
-        }
-    }
-
-    /// Add another function of the same variables.
-    pub(super) fn add(&mut self, other: &Self) {
-        self.value += other.value;
-        let to = self.slope.iter_mut().chain(&mut self.curvature);
-        for (to, from) in to.zip(other.slope.iter().chain(&other.curvature)) {
-            *to += from;
-        }
-    }
-}
 
 /// Where the function is least.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,19 +49,21 @@ pub(super) fn minimise(
     variables: &[Variable],
     tolerance: f64,
     known_inverse: &mut Option<Vec<f64>>,
-    mut function: impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+    mut function: impl Function,
 ) -> Result<Minimum, Error> {
     let mut x: Vec<f64> = variables
         .iter()
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
-    let mut found = function(&x, Wanted::Slopes)?;
+    keep_within(variables, &mut x, &function);
+    let mut found = function.at(&x, Wanted::Slopes)?;
     let (n, known) = (x.len(), found.slope.len());
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverted(&found.curvature, known) else {
             break;
         };
-        let step = direction(variables, &x, &inverse, &found.slope);
+        let slack = function.slack(&x);
+        let step = direction(variables, &x, &inverse, &found.slope, slack.as_ref());
         if promised(&step, &found.slope) <= tolerance.max(WORTHWHILE) {
             break;
         }
@@ -142,7 +95,8 @@ pub(super) fn minimise(
     }
     let mut stalled = 0;
     for _ in 0..ITERATIONS {
-        let step = direction(variables, &x, &inverse, &gradient);
+        let slack = function.slack(&x);
+        let step = direction(variables, &x, &inverse, &gradient, slack.as_ref());
         if promised(&step, &gradient) <= tolerance {
             if exact {
                 break;
@@ -200,7 +154,7 @@ fn line_search(
     value: f64,
     gradient: &[f64],
     step: &[f64],
-    function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+    function: &mut impl Function,
 ) -> Result<Option<(Value, Vec<f64>)>, Error> {
     let mut share = 1.0;
     let mut trial = x.to_vec();
@@ -209,8 +163,9 @@ fn line_search(
         for (((trial, x), variable), step) in places {
             *trial = (x + share * step).clamp(variable.low, variable.high);
         }
+        keep_within(variables, &mut trial, function);
         let moved = difference(&trial, x);
-        let found = function(&trial, Wanted::Slopes)?;
+        let found = function.at(&trial, Wanted::Slopes)?;
         if found.value < value + SUFFICIENT * product(gradient, &moved) && found.value < value {
             x.copy_from_slice(&trial);
             return Ok(Some((found, moved)));
@@ -218,73 +173,6 @@ fn line_search(
         share *= SHORTER;
     }
     Ok(None)
-}
-
-/// Difference quotients by some of the variables, one-sided at a bound.
-struct Quotients {
-    slope: Vec<f64>,
-    curvature: Vec<f64>,
-}
-
-impl Quotients {
-    fn new(
-        variables: &[Variable],
-        steps: &[f64],
-        x: &[f64],
-        found: &Value,
-        which: Range<usize>,
-        function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
-    ) -> Result<Self, Error> {
-        let value = found.value;
-        let (mut slope, mut curvature) = (Vec::new(), Vec::new());
-        let mut at = x.to_vec();
-        for i in which {
-            let (variable, step) = (variables[i], steps[i]);
-            let flattest = FLATTEST / (variable.step * variable.step);
-            let (up, down) = (
-                step.min(variable.high - x[i]),
-                step.min(x[i] - variable.low),
-            );
-            let mut away = |step: f64| -> Result<f64, Error> {
-                at[i] = x[i] + step;
-                let found = function(&at, Wanted::Value)?.value;
-                at[i] = x[i];
-                Ok(found)
-            };
-            let higher = if up > 0.0 { away(up)? } else { value };
-            let lower = if down > 0.0 { away(-down)? } else { value };
-            if up > 0.0 && down > 0.0 && higher.is_finite() && lower.is_finite() {
-                let (right, left) = ((higher - value) / up, (value - lower) / down);
-                slope.push((right * down + left * up) / (up + down));
-                curvature.push((2.0 * (right - left) / (up + down)).max(flattest));
-            } else {
-                let (far, distance) = if up > 0.0 && higher.is_finite() {
-                    (higher, up)
-                } else {
-                    (lower, -down)
-                };
-                let one_sided = (far - value) / distance;
-                slope.push(if one_sided.is_finite() {
-                    one_sided
-                } else {
-                    0.0
-                });
-                curvature.push((one_sided.abs() / step).max(flattest));
-            }
-        }
-        Ok(Self { slope, curvature })
-    }
-}
-
-/// Fit the steps of difference quotients to these second derivatives; is one much shorter?
-fn shorten(variables: &[Variable], curvature: &[f64], steps: &mut [f64]) -> bool {
-    let mut is_shorter = false;
-    for ((variable, bend), step) in variables.iter().zip(curvature).zip(steps) {
-        let before = *step;
-        *step = variable.step.min((STEEPEST / bend).sqrt());
-        is_shorter |= *step < 0.5 * before;
-    }
-    is_shorter
 }
 
 /// The gradient, and the inverse of the Hessian: the known curvature of the first variables, and that
@@ -297,7 +185,7 @@ fn by_quotients(
     steps: &mut [f64],
     x: &[f64],
     found: &Value,
-    function: &mut impl FnMut(&[f64], Wanted) -> Result<Value, Error>,
+    function: &mut impl Function,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     let (n, known) = (x.len(), found.slope.len());
     let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
@@ -358,8 +246,14 @@ fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
 }
 
 /// −H g over the variables that may move, no longer than allowed; zero for those at a bound that
-/// would leave it.
-fn direction(variables: &[Variable], x: &[f64], inverse: &[f64], gradient: &[f64]) -> Vec<f64> {
+/// would leave it. Where it crosses the bound on several variables, the least on that.
+fn direction(
+    variables: &[Variable],
+    x: &[f64],
+    inverse: &[f64],
+    gradient: &[f64],
+    slack: Option<&Slack>,
+) -> Vec<f64> {
     let n = gradient.len();
     let moving: Vec<bool> = (0..n)
         .map(|i| {
@@ -367,13 +261,30 @@ fn direction(variables: &[Variable], x: &[f64], inverse: &[f64], gradient: &[f64
                 || (x[i] >= variables[i].high && gradient[i] < 0.0))
         })
         .collect();
-    let mut out = vec![0.0; n];
-    let mut scale: f64 = 1.0;
-    for i in (0..n).filter(|i| moving[*i]) {
-        for j in (0..n).filter(|j| moving[*j]) {
-            out[i] -= inverse[i * n + j] * gradient[j];
+    // H times a vector, over those that may move.
+    let times = |vector: &[f64]| -> Vec<f64> {
+        let moved = |i: usize| {
+            let others = (0..vector.len()).filter(|j| moving[*j]);
+            others.map(|j| inverse[i * n + j] * vector[j]).sum::<f64>()
+        };
+        (0..n)
+            .map(|i| if moving[i] { moved(i) } else { 0.0 })
+            .collect()
+    };
+    let mut out = times(gradient);
+    out.iter_mut().for_each(|entry| *entry = -*entry);
+    if let Some(slack) = slack {
+        let beyond = slack.value + product(&slack.slope, &out);
+        let along = times(&slack.slope);
+        let bend = product(&slack.slope, &along);
+        if beyond < 0.0 && bend > 0.0 {
+            let moved = out.iter_mut().zip(along);
+            moved.for_each(|(entry, along)| *entry -= beyond / bend * along);
         }
-        scale = scale.min(variables[i].longest / out[i].abs());
+    }
+    let mut scale: f64 = 1.0;
+    for (entry, variable) in out.iter().zip(variables) {
+        scale = scale.min(variable.longest / entry.abs());
     }
     out.iter_mut().for_each(|entry| *entry *= scale);
     out
@@ -452,7 +363,7 @@ mod tests {
                 longest: 1.0,
                 ..one
             });
-            minimise(&around, 1e-9, near, |x, _| {
+            minimise(&around, 1e-9, near, |x: &[f64], _| {
                 evaluations.set(evaluations.get() + 1);
                 let (a, b) = (x[0] + x[1] - place, x[0] - x[1] + 0.3);
                 unknown(50.0 * a * a + 0.5 * b * b + 0.01 * a.powi(4))
@@ -486,6 +397,68 @@ mod tests {
         );
     }
 
+    /// A function of a sum and the logarithm of a part of it, the rest of which is not below zero.
+    struct Parts<F: Fn(f64, f64) -> f64>(F);
+
+    impl<F: Fn(f64, f64) -> f64> Function for Parts<F> {
+        fn slack(&self, place: &[f64]) -> Option<Slack> {
+            let part = place[1].exp();
+            Some(Slack {
+                value: place[0] - part,
+                slope: vec![1.0, -part],
+            })
+        }
+
+        fn at(&mut self, place: &[f64], _: Wanted) -> Result<Value, Error> {
+            let rest = self.slack(place).map_or(0.0, |slack| slack.value);
+            assert!(rest > -1e-12, "{place:?}");
+            unknown(self.0(rest, place[1].exp()))
+        }
+    }
+
+    /// Where it is least: the rest, and the part.
+    fn parts(start: (f64, f64), function: impl Fn(f64, f64) -> f64) -> (f64, f64) {
+        let (rest, part) = start;
+        let logarithm = Variable {
+            step: 0.02,
+            longest: 1.2,
+            ..variable(part.ln(), -9.0, 9.0)
+        };
+        let around = [variable(rest + part, 0.0, 9.0), logarithm];
+        let found = minimise(&around, 1e-12, &mut None, Parts(function)).unwrap();
+        let part = found.place[1].exp();
+        (found.place[0] - part, part)
+    }
+
+    #[test]
+    fn a_minimum_beyond_a_bound_on_two_variables_is_found_on_it() {
+        // Known best is the sum, and without the bound the rest would be −0.02 or −0.3.
+        for far in [0.02, 0.3] {
+            let valley = |rest: f64, part: f64| {
+                let (sum, rest) = (rest + part - 0.5, rest + far);
+                1e4 * sum * sum + rest * rest
+            };
+            for start in [(0.4, 0.1), (0.1, 0.1), (0.0, 0.9), (0.2, 0.05), (-0.3, 0.5)] {
+                let (rest, part) = parts(start, valley);
+                // The slope by the part is zero on the bound.
+                assert!(rest.abs() < 1e-12, "{start:?} {rest}");
+                assert!((part - 0.5).abs() < 1e-5, "{start:?} {part}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bound_on_two_variables_is_left_where_the_function_falls_inwards() {
+        let bowl = |rest: f64, part: f64| {
+            100.0 * (rest - 0.2).powi(2) + 400.0 * (rest + part - 0.7).powi(2)
+        };
+        for start in [(0.0, 0.1), (0.0, 0.9), (0.01, 0.3)] {
+            let (rest, part) = parts(start, bowl);
+            assert!((rest - 0.2).abs() < 1e-3, "{start:?} {rest}");
+            assert!((part - 0.5).abs() < 1e-3, "{start:?} {part}");
+        }
+    }
+
     #[test]
     fn a_known_slope_saves_evaluations_and_what_it_lacks_is_found() {
         // The sum of squares of a line and a curve, and a part whose slope is not known.
@@ -508,7 +481,7 @@ mod tests {
             ..variable(start, -9.0, 9.0)
         };
         let found = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, function);
-        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x, _| {
+        let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x: &[f64], _| {
             let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
             unknown(line * line + curve * curve + 0.1 * x[0])
         });

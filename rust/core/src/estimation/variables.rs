@@ -2,8 +2,8 @@
 
 use super::likelihood::{Evaluation, Noise, Searched};
 use super::point::{Point, Quantity, Timing};
+use super::quotients::{Value, Variable};
 use super::rows::Rows;
-use super::search::{Value, Variable};
 
 /// Shortest lag of a search, as a share of the time between rows; shorter ones act as a delay.
 pub(super) const SHORTEST_LAG: f64 = 1e-3;
@@ -123,11 +123,10 @@ impl Variables<'_> {
                 start: match start.timing {
                     Timing::Delay(time) | Timing::Total(time) => time,
                 },
-                // A zero may be longer than delay and lags.
-                low: if start.zero > 0.0 || self.free.zero {
-                    -self.longest
-                } else {
-                    0.0
+                low: match start.timing {
+                    // A zero may be longer than delay and lags.
+                    Timing::Total(_) if start.zero > 0.0 || self.free.zero => -self.longest,
+                    _ => 0.0,
                 },
                 high: self.longest,
                 step: TIME_STEP * row_time,

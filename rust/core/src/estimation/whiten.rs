@@ -7,12 +7,16 @@
 //! are computed once. The work is linear in the rows; on rows of equal spacing the gain converges
 //! and is kept.
 
+use pulp::bytemuck::cast_slice_mut;
+use pulp::{Simd, WithSimd};
+
 use super::disturbance::{Disturbance, Joint};
 use super::kept::{Kept, SAME, SAME_STEP};
-use super::path::{SETTLED, dot, settled};
-use super::plant::Plant;
+use super::path::{SETTLED, settled};
+use super::plant::{MOST_STATES, Plant};
 use super::propagation::{Propagation, Square};
 use super::rows::check_times;
+use crate::simd::Instructions;
 use crate::{Error, Task};
 
 /// Change of the covariance of the states from row to row, as a share of their deviations, below
@@ -22,6 +26,12 @@ const CONVERGED: f64 = 1e-13;
 
 /// Rows between two checks for a stop.
 const CHECKED: usize = 4096;
+
+/// Steps from row to row that differ by less than this share of the time and of the step are one.
+pub(super) const SAME_ROWS: (f64, f64) = (SAME, SAME_STEP);
+
+/// Largest product of variances of which the logarithm is taken together.
+pub(super) const LARGE: f64 = 1e140;
 
 /// Columns, one after the other and each as long as `time`, whitened by disturbances of a plant and
 /// white noise of variance one.
@@ -60,8 +70,8 @@ pub fn whiten(
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Kick {
     pub(super) row: usize,
-    /// Its standard deviation, state by state: one random number moves all.
-    pub(super) state: Vec<f64>,
+    /// Its standard deviation, state by state, zero beyond the last: one random number moves all.
+    pub(super) state: [f64; MOST_STATES],
 }
 
 /// What is known of each row.
@@ -73,8 +83,8 @@ pub(super) struct Known<'a> {
     pub(super) variances: &'a [f64],
 }
 
-/// Columns that are whitened together.
-const LANES: usize = 8;
+/// Rows whose columns are brought into lanes together.
+const BLOCK: usize = 64;
 
 /// Whiten the columns in place; rows that are not `used` become zero. Returns ln det V.
 pub(super) fn whiten_in_place(
@@ -85,25 +95,74 @@ pub(super) fn whiten_in_place(
     kicks: &[Kick],
     task: &Task,
 ) -> Result<f64, Error> {
-    let mut log_det = 0.0;
-    // The same operations in the same order, in wider registers where the machine has them.
-    let machine = pulp::Arch::new();
-    for group in columns.chunks_mut(LANES * time.len()) {
-        log_det = match joint.c.len() {
-            0 => machine.dispatch(|| pass::<0>(time, known, group, joint, kicks, task))?,
-            1 => machine.dispatch(|| pass::<1>(time, known, group, joint, kicks, task))?,
-            2 => machine.dispatch(|| pass::<2>(time, known, group, joint, kicks, task))?,
-            3 => machine.dispatch(|| pass::<3>(time, known, group, joint, kicks, task))?,
-            4 => machine.dispatch(|| pass::<4>(time, known, group, joint, kicks, task))?,
-            5 => machine.dispatch(|| pass::<5>(time, known, group, joint, kicks, task))?,
-            6 => machine.dispatch(|| pass::<6>(time, known, group, joint, kicks, task))?,
-            7 => machine.dispatch(|| pass::<7>(time, known, group, joint, kicks, task))?,
-            8 => machine.dispatch(|| pass::<8>(time, known, group, joint, kicks, task))?,
-            n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
+    let set = Instructions::chosen();
+    macro_rules! run {
+        ($states:literal) => {
+            set.run(Passes::<$states> {
+                time,
+                known,
+                columns,
+                joint,
+                kicks,
+                task,
+            })
         };
     }
-    Ok(log_det)
+    match joint.c.len() {
+        0 => run!(0),
+        1 => run!(1),
+        2 => run!(2),
+        3 => run!(3),
+        4 => run!(4),
+        5 => run!(5),
+        6 => run!(6),
+        7 => run!(7),
+        8 => run!(8),
+        n => refuse!("{n} states of plant and noise: the likelihood takes up to 8"),
+    }
 }
+
+/// Passes with N states over a column in each lane. The same operations in the same order whatever
+/// the registers of the machine.
+struct Passes<'a, const N: usize> {
+    time: &'a [f64],
+    known: Known<'a>,
+    columns: &'a mut [f64],
+    joint: &'a Joint,
+    kicks: &'a [Kick],
+    task: &'a Task,
+}
+
+impl<const N: usize> WithSimd for Passes<'_, N> {
+    type Output = Result<f64, Error>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self {
+            time,
+            known,
+            columns,
+            joint,
+            kicks,
+            task,
+        } = self;
+        let mut log_det = 0.0;
+        // Where registers are short two of them share the work on the covariance.
+        let is_wide = S::F64_LANES >= WIDE || columns.len() <= S::F64_LANES * time.len();
+        let lanes = if is_wide { 1 } else { 2 } * S::F64_LANES;
+        for group in columns.chunks_mut(lanes * time.len()) {
+            log_det = if is_wide {
+                pass::<S, N, 1>(simd, time, known, group, joint, kicks, task)?
+            } else {
+                pass::<S, N, 2>(simd, time, known, group, joint, kicks, task)?
+            };
+        }
+        Ok(log_det)
+    }
+}
+
+/// Lanes of a register that are enough for the columns of a plant.
+const WIDE: usize = 8;
 
 fn square<const N: usize>(flat: &[f64]) -> Square<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| flat[i * N + j]))
@@ -119,9 +178,14 @@ fn has_converged<const N: usize>(p: &Square<N>, before: &Square<N>) -> bool {
     })
 }
 
-/// One pass over up to `LANES` columns with N states.
+/// One pass with N states over a column in each lane of K registers.
+#[expect(
+    clippy::needless_range_loop,
+    reason = "entries of two matrices by the same numbers"
+)]
 #[inline(always)]
-fn pass<const N: usize>(
+fn pass<S: Simd, const N: usize, const K: usize>(
+    simd: S,
     time: &[f64],
     known: Known<'_>,
     columns: &mut [f64],
@@ -130,9 +194,11 @@ fn pass<const N: usize>(
     task: &Task,
 ) -> Result<f64, Error> {
     let rows = time.len();
-    let count = columns.len() / rows;
-    let c: [f64; N] = std::array::from_fn(|i| joint.c[i]);
-    let mut states = [[0.0; LANES]; N];
+    let zero = [simd.splat_f64s(0.0); K];
+    let mut block = [zero; BLOCK];
+    let mut c = [0.0; N];
+    c.copy_from_slice(&joint.c);
+    let mut states = [zero; N];
     let mut p = square::<N>(&joint.start);
     let (a, noise) = (square::<N>(&joint.a), square::<N>(&joint.noise));
     let mut steps = Kept::new();
@@ -140,18 +206,24 @@ fn pass<const N: usize>(
     let (mut step, mut steady) = (f64::NAN, false);
     // The covariance of the row before, if that was used and as far away as this one.
     let mut before = None;
-    let (mut factor, mut log_variance, mut log_det) = (0.0, 0.0, 0.0);
+    let (mut factor, mut variance, mut large, mut log_det) = (0.0, 1.0, 1.0, 0.0);
     let mut kicks = kicks.iter().peekable();
     for row in 0..rows {
         if row % CHECKED == CHECKED - 1 {
             task.check()?;
         }
         if row % SETTLED as usize == 0 {
-            states = states.map(|lanes| lanes.map(settled));
+            for state in cast_slice_mut::<_, f64>(states.as_flattened_mut()) {
+                *state = settled(*state);
+            }
         }
+        if row % BLOCK == 0 {
+            transposed::<S, K>(&mut block, columns, rows, row, |lane, entry| *lane = *entry);
+        }
+        let place = row % BLOCK;
         if row > 0 {
             let between = time[row] - time[row - 1];
-            let tolerance = SAME * time[row].abs() + SAME_STEP * between;
+            let tolerance = SAME_ROWS.0 * time[row].abs() + SAME_ROWS.1 * between;
             // No step is known before the first.
             if step.is_nan() || (between - step).abs() > tolerance {
                 (step, steady, before) = (between, false, None);
@@ -170,62 +242,96 @@ fn pass<const N: usize>(
                     }
                 }
             }
-            let mut moved = [[0.0; LANES]; N];
-            for (moved, phi) in moved.iter_mut().zip(&by_step.phi) {
-                for (phi, state) in phi.iter().zip(&states) {
-                    for (moved, state) in moved.iter_mut().zip(state) {
-                        *moved += phi * state;
+            let mut moved = [zero; N];
+            for i in 0..N {
+                for j in 0..N {
+                    let phi = simd.splat_f64s(by_step.phi[i][j]);
+                    for k in 0..K {
+                        moved[i][k] = simd.mul_add_e_f64s(phi, states[j][k], moved[i][k]);
                     }
                 }
             }
             states = moved;
         }
-        if !known.used[row] {
-            for column in 0..count {
-                columns[column * rows + row] = 0.0;
-            }
-            continue;
-        }
-        let white = known.variances.get(row).copied().unwrap_or(1.0);
-        if !steady {
-            steady = known.variances.is_empty()
-                && before.is_some_and(|before| has_converged(&p, &before));
-            before = Some(p);
-            let pc: [f64; N] = std::array::from_fn(|i| dot(&p[i], &c));
-            let variance = white + dot(&pc, &c);
-            (factor, log_variance) = (1.0 / variance.sqrt(), variance.ln());
-            gain = pc.map(|pc| pc / variance);
-            for (p, left) in p.iter_mut().zip(&pc) {
-                for (p, right) in p.iter_mut().zip(&gain) {
-                    *p -= left * right;
+        if known.used[row] {
+            let white = known.variances.get(row).copied().unwrap_or(1.0);
+            if !steady {
+                steady = known.variances.is_empty()
+                    && before.is_some_and(|before| has_converged(&p, &before));
+                before = Some(p);
+                let mut pc = [0.0; N];
+                variance = white;
+                for i in 0..N {
+                    for j in 0..N {
+                        pc[i] += p[i][j] * c[j];
+                    }
+                    variance += pc[i] * c[i];
+                }
+                let inverse = 1.0 / variance;
+                factor = inverse.sqrt();
+                gain = pc.map(|pc| pc * inverse);
+                for i in 0..N {
+                    for j in 0..N {
+                        p[i][j] -= pc[i] * gain[j];
+                    }
                 }
             }
-        }
-        log_det += log_variance;
-        let mut innovation = [0.0; LANES];
-        for (column, innovation) in innovation.iter_mut().enumerate().take(count) {
-            *innovation = columns[column * rows + row];
-        }
-        for (c, state) in c.iter().zip(&states) {
-            for (innovation, state) in innovation.iter_mut().zip(state) {
-                *innovation -= c * state;
+            if large * variance < LARGE {
+                large *= variance;
+            } else {
+                log_det += large.ln() + variance.ln();
+                large = 1.0;
             }
-        }
-        for (gain, state) in gain.iter().zip(&mut states) {
-            for (state, innovation) in state.iter_mut().zip(&innovation) {
-                *state += gain * innovation;
+            let scale = simd.splat_f64s(factor);
+            for k in 0..K {
+                let mut innovation = block[place][k];
+                for i in 0..N {
+                    let c = simd.splat_f64s(c[i]);
+                    innovation = simd.negate_mul_add_e_f64s(c, states[i][k], innovation);
+                }
+                for i in 0..N {
+                    let gain = simd.splat_f64s(gain[i]);
+                    states[i][k] = simd.mul_add_e_f64s(gain, innovation, states[i][k]);
+                }
+                block[place][k] = simd.mul_f64s(innovation, scale);
             }
+        } else {
+            block[place] = zero;
         }
-        for (column, innovation) in innovation.iter().enumerate().take(count) {
-            columns[column * rows + row] = innovation * factor;
+        if place == BLOCK - 1 || row == rows - 1 {
+            let first = row - place;
+            transposed::<S, K>(&mut block, columns, rows, first, |lane, entry| {
+                *entry = *lane
+            });
         }
     }
-    Ok(log_det)
+    Ok(log_det + large.ln())
+}
+
+/// Copy between the columns, from a row on, and the lanes of a block.
+#[inline(always)]
+fn transposed<S: Simd, const K: usize>(
+    block: &mut [[S::f64s; K]; BLOCK],
+    columns: &mut [f64],
+    rows: usize,
+    first: usize,
+    copy: impl Fn(&mut f64, &mut f64),
+) {
+    let last = rows.min(first + BLOCK);
+    let lanes = K * S::F64_LANES;
+    let block = cast_slice_mut::<_, f64>(block.as_flattened_mut());
+    for (column, entries) in columns.chunks_exact_mut(rows).enumerate() {
+        let places = block.chunks_exact_mut(lanes);
+        for (entry, lane) in entries[first..last].iter_mut().zip(places) {
+            copy(&mut lane[column], entry);
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::disturbance::Entry;
+    use super::super::path::dot;
     use super::super::tests::{cholesky, coloured, forward, gaussian, integrated, log_det};
     use super::*;
 
@@ -410,9 +516,10 @@ mod tests {
     #[test]
     fn the_error_of_a_command_moves_all_later_rows() {
         let time = even(150);
-        let kick = |row, size| Kick {
-            row,
-            state: vec![size],
+        let kick = |row, size| {
+            let mut state = [0.0; MOST_STATES];
+            state[0] = size;
+            Kick { row, state }
         };
         let kicks = [kick(40, 0.6), kick(40, 0.8), kick(120, 2.0)];
         for parts in [&[] as &[_], &[AIR]] {
@@ -424,12 +531,8 @@ mod tests {
                     }
                 }
             }
-            let mut padded = kicks.to_vec();
-            for kick in &mut padded {
-                kick.state.resize(1 + parts.len(), 0.0);
-            }
             for used in [vec![true; 150], lost(150)] {
-                compare(&time, &used, &joint(&[1.0, 0.0], parts), &padded, &v);
+                compare(&time, &used, &joint(&[1.0, 0.0], parts), &kicks, &v);
             }
         }
     }
