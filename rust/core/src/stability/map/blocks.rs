@@ -23,6 +23,9 @@ const SIDE: usize = 64;
 /// The family of a map over its grid; `None` where points are not in order, or a root stays on the
 /// edge.
 pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
+    if IS_PAGE {
+        return None;
+    }
     let [first, second] = map.axes;
     let places = [first.parameter, second.parameter];
     let specification = map.question.specification;
@@ -35,6 +38,9 @@ pub(crate) fn grid<'a>(map: &Map<'a>) -> Option<Grid<'a, 2>> {
     })
 }
 
+/// A page maps no family that needs blocks, and has no room for them.
+const IS_PAGE: bool = cfg!(target_family = "wasm");
+
 /// The index of the axis along the rows, and the crossings of each.
 pub(crate) type Crossed = (usize, Vec<Vec<Crossing>>);
 
@@ -44,7 +50,7 @@ pub(crate) type Crossed = (usize, Vec<Vec<Crossing>>);
 /// # Errors
 /// [`Error::Interrupted`] alone.
 pub(crate) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
-    if grid(map).is_none() {
+    if IS_PAGE || grid(map).is_none() {
         return Ok(None);
     }
     let [first, second] = map.axes;
