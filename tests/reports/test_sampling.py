@@ -31,8 +31,8 @@ DOUBTED = {
     ("long height", "clocks drift by 100 ppm, scattered stamps"),
 }
 
-#: Logs of the survey (`benches/README.md` has what came out of more), and the probability of a
-#: false alarm at either end.
+#: Logs of the survey (`docs/theory/measured-estimates.md` has what came out of more), and the
+#: probability of a false alarm at either end.
 LOGS, ALARM = int(os.environ.get("DEADTIME_LOGS", "5")), 0.01
 
 
