@@ -43,7 +43,7 @@ ROOMS = sorted(room for room in dtm._ROOMS if room != "_base.errors")
 
 def test_the_reference_has_a_page_for_each_room():
     pages = {path.stem for path in (DOCS / "reference").glob("*.md")}
-    assert pages == {*ROOMS, "index", "errors"}
+    assert pages == {*ROOMS, "index", "errors", "json"}
     index = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
     for room in ROOMS:
         page = (DOCS / "reference" / f"{room}.md").read_text(encoding="utf-8")
