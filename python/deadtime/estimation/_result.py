@@ -227,7 +227,7 @@ class DelayEstimate(ReadOnlyArrays):
         return (max(low, floor_of(name)), value + reach)
 
     def explore(self) -> Explorer:
-        """Return a page with the fitted loop and the 95 % interval of its delay.
+        """Return a page with the fitted loop, and the interval of its delay if it is adequate.
 
         Returns
         -------
@@ -239,7 +239,8 @@ class DelayEstimate(ReadOnlyArrays):
         ValueError
             If the explorer has no such loop.
         """
-        interval = self.ci() if self.calibrated and "delay" in self.free else None
+        known = self.calibrated and self.adequate and "delay" in self.free
+        interval = self.ci() if known else None
         return explorer_of(self.loop.specification, interval=interval)
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
