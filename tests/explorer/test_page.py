@@ -265,6 +265,22 @@ def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, f
     assert page.tab.locator("#map .end").count() == 2
 
 
+def test_a_fit_that_is_not_adequate_is_not_taken_over(page: Page, tmp_path: Path) -> None:
+    recording, _, _ = recorded_step(0, 0.15, 0.0)
+    columns = (recording.time, recording.reference, recording.output, recording.command)
+    log = tmp_path / "lagging.csv"
+    head = "time,reference,output,command"
+    np.savetxt(log, np.column_stack(columns), delimiter=",", header=head, comments="")
+    before = page.drawn["state"]
+    page.tab.set_input_files("#file", log)
+    page.tab.wait_for_function("() => document.getElementById('estimate').textContent")
+    assert "does not explain the recording" in page.tab.inner_text("#estimate")
+    assert page.drawn["state"] == before
+    page.tab.check("#fit-lag")
+    page.tab.click("#fit")
+    assert page.drawn["state"]["interval"] is not None
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -241,7 +241,8 @@ class DelayEstimate(ReadOnlyArrays):
         """
         known = self.calibrated and self.adequate and "delay" in self.free
         interval = self.ci() if known else None
-        return explorer_of(self.loop.specification, interval=interval)
+        page = explorer_of(self.loop.specification, interval=interval)
+        return page if self.adequate else replace(page, title="A fitted loop, not adequate")
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
         """Profile likelihood: the increase of the cost when one quantity is held.

@@ -128,8 +128,11 @@ class RecordingView {
       const found = this.kernels.estimate(loop, rows, commandsOf(rows, loop), this.lag.checked);
       this.show(rows, found);
       this.found = found;
-      const numbers = { delay: found.delay.value, gain: found.gain.value, lag: found.lag.value };
-      this.take({ ...numbers, interval: [found.delay.low, found.delay.high] });
+      // A fit that does not explain the recording leaves the loop of the page as it was.
+      if (!found.adequate || !(found.gain.value > 0)) return;
+      const { delay, gain, lag } = found;
+      const interval = [delay.low, delay.high];
+      this.take({ delay: delay.value, gain: gain.value, lag: lag.value, interval });
     } catch (error) {
       this.say(error.message);
     }
@@ -150,7 +153,8 @@ class RecordingView {
       found.adequate
         ? "The model explains the recording."
         : "The model does not explain the recording, so the intervals are an indication only: " +
-            (found.white < 0.01 ? "what is left is not white noise." : "the plant lacks a lag."),
+            (found.white < 0.01 ? "what is left is not white noise" : "the plant lacks a lag") +
+            ". The loop of this page stays as it was.",
     );
     this.result.replaceChildren(
       ...lines.map((line) => Object.assign(document.createElement("span"), { textContent: line })),
