@@ -6,6 +6,8 @@
 //! Σ ln S_i = ln det V (Harvey 1989, section 3.4). All columns see the same covariance, so the gains
 //! are computed once. The work is linear in the rows; on rows of equal spacing the gain converges
 //! and is kept.
+//!
+//! Nearly half of the file is its tests, which compare with dense matrices.
 
 use pulp::bytemuck::cast_slice_mut;
 use pulp::{Simd, WithSimd};
