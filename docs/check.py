@@ -1,13 +1,15 @@
 """Check built pages: ``python docs/check.py docs/_build/html``.
 
-Every link inside of the pages leads somewhere, and every public name of every room, methods and
-attributes of its classes included, has an entry in the reference.
+Every link inside of the pages leads somewhere, a page loads nothing from the network, and every
+public name of every room, methods and attributes of its classes included, has an entry in the
+reference.
 """
 
 from __future__ import annotations
 
 import importlib
 import inspect
+import re
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
@@ -20,13 +22,18 @@ import deadtime as dtm
 VALUES = {"roots.s", "loops.PAIR", "experiments.Noise"}
 
 
+#: An address of the network, not one of a namespace of XML.
+NETWORK = r"(?:https?:)?//[^/\s]"
+
+
 class Page(HTMLParser):
-    """Links and anchors of a page."""
+    """Links and anchors of a page, and what it loads."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.links: list[str] = []
         self.anchors: set[str] = set()
+        self.loaded: list[str] = []
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -34,6 +41,30 @@ class Page(HTMLParser):
         values = dict(attrs)
         self.anchors |= {name for name in (values.get("id"), values.get("name")) if name}
         self.links += [link for link in (values.get("href"), values.get("src")) if link]
+        shown = ["src", "srcset", "poster", "data"] + ["href"] * (tag in ("link", "image", "use"))
+        self.loaded += [values[name] or "" for name in shown if name in values]
+        self.loaded += addresses_in_styles(values.get("style") or "")
+
+    def handle_data(self, data: str) -> None:
+        """Keep what its styles load."""
+        if self.cdata_elem == "style":
+            self.loaded += addresses_in_styles(data)
+
+
+def addresses_in_styles(text: str) -> list[str]:
+    """What a style sheet loads."""
+    return re.findall(r"""(?:url\(\s*|@import\s+)["']?([^"')\s]+)""", text)
+
+
+def loaded_from_the_network(root: Path) -> Iterator[str]:
+    """Scripts, styles, fonts and pictures that a page takes from another host."""
+    loaded = {path: Page(path).loaded for path in root.rglob("*.html")}
+    for path in root.rglob("*.css"):
+        loaded[path] = addresses_in_styles(path.read_text(encoding="utf-8"))
+    for path, addresses in loaded.items():
+        for address in addresses:
+            if re.match(NETWORK, address) or re.search(rf",\s*{NETWORK}", address):
+                yield f"{path.relative_to(root)}: loads {address} from the network"
 
 
 def broken_links(root: Path) -> Iterator[str]:
@@ -82,11 +113,14 @@ def members(kind: type) -> Iterator[str]:
 def main() -> int:
     """Print what is wrong, and return the exit code."""
     root = Path(sys.argv[1])
-    wrong = list(broken_links(root))
+    wrong = [*broken_links(root), *loaded_from_the_network(root)]
     entries = set().union(*(Page(path).anchors for path in (root / "reference").glob("*.html")))
     names = list(public_names())
     wrong += [f"{name}: no entry in the reference" for name in names if name not in entries]
-    print("\n".join(wrong) or f"all links lead somewhere, {len(names)} public names have entries")
+    print(
+        "\n".join(wrong)
+        or f"all links lead somewhere, nothing is loaded, {len(names)} names have entries"
+    )
     return bool(wrong)
 
 

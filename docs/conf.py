@@ -1,9 +1,13 @@
 """Sphinx configuration."""
 
+import sys
 import tempfile
 from importlib.metadata import version as installed_version
+from pathlib import Path
 
 import deadtime as dtm
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 project = "deadtime"
 author = "The deadtime developers"
@@ -12,8 +16,8 @@ extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx_copybutton",
+    "formulas",
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 autodoc_default_options = {
@@ -24,8 +28,10 @@ autodoc_member_order = "groupwise"
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 exclude_patterns = ["_build", "paper/reproduction-numbers.md"]
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "deadtime"
+html_show_copyright = False
 html_static_path = ["styles"]
 html_css_files = ["pages.css"]
 html_theme_options = {
