@@ -17,7 +17,9 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
     "formulas",
+    "used_in",
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 autodoc_default_options = {
@@ -40,6 +42,27 @@ html_theme_options = {
 }
 # What a reader copies is what a console takes.
 copybutton_prompt_text = ">>> "
+
+# The examples are run by the build, which ends at the first that fails.
+_SECTIONS = "roots maps loops design estimation vehicles delay_equations paper"
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "examples",
+    "subsection_order": [f"../examples/{section}" for section in _SECTIONS.split()],
+    "within_subsection_order": "FileNameSortKey",
+    "filename_pattern": r"\.py$",
+    "abort_on_example_error": True,
+    "capture_repr": (),
+    "download_all_examples": False,
+    "image_srcset": ["2x"],
+    "min_reported_time": 3600,
+    "nested_sections": False,
+    "show_signature": False,
+    "write_computation_times": False,
+    # Entries of the reference show the examples that use them.
+    "backreferences_dir": "examples/backreferences",
+    "doc_module": ("deadtime",),
+}
 
 # The explorer of the first page.
 _explorer = tempfile.mkdtemp(prefix="deadtime-docs-")
