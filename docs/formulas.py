@@ -1,5 +1,6 @@
 """Formulas as MathML, which browsers draw without a script."""
 
+import re
 from typing import Any
 
 from docutils import nodes
@@ -10,15 +11,21 @@ from sphinx.writers.html5 import HTML5Translator
 _LATEX = LatexToMathML()
 
 
+def _mathml(node: nodes.Element, displayed: bool) -> str:
+    formula = _LATEX.convert_with_local_state(node.astext(), displaystyle=displayed)
+    # Fonts draw a prime at its height, and an exponent would raise it once more.
+    primed = r"((?:<(m[in])>[^<]*</\2>)+)(<mo>[′″‴]</mo>)"
+    formula = re.sub(rf"<msup>{primed}</msup>", r"\1\3", formula)
+    return re.sub(rf"<msubsup>{primed}</msubsup>", r"<msub>\1</msub>\3", formula)
+
+
 def _inline(writer: HTML5Translator, node: nodes.math) -> None:
-    formula = _LATEX.convert_with_local_state(node.astext(), displaystyle=False)
-    writer.body.append(f'<span class="math">{formula}</span>')
+    writer.body.append(f'<span class="math">{_mathml(node, displayed=False)}</span>')
     raise nodes.SkipNode
 
 
 def _block(writer: HTML5Translator, node: nodes.math_block) -> None:
-    formula = _LATEX.convert_with_local_state(node.astext(), displaystyle=True)
-    writer.body.append(f'<div class="math">{formula}</div>')
+    writer.body.append(f'<div class="math">{_mathml(node, displayed=True)}</div>')
     raise nodes.SkipNode
 
 
