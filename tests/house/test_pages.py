@@ -48,6 +48,7 @@ def test_the_reference_has_a_page_for_each_room():
     for room in ROOMS:
         page = (DOCS / "reference" / f"{room}.md").read_text(encoding="utf-8")
         assert f"automodule:: deadtime.{room}\n" in page
+        assert "`_" not in getattr(dtm, room).__doc__, f"{room} shows the name of a private file"
         (row,) = re.findall(rf"^\| \[`{room}`\].*$", index, re.MULTILINE)
         assert re.findall(r"`(\w+)`", row.split("|")[3]) == dtm._ROOMS[room].split()
 
@@ -63,6 +64,13 @@ def test_every_public_name_and_method_of_a_room_is_described(room):
                     assert inspect.getdoc(getattr(thing, method)), f"{name}.{method}"
         if callable(thing):
             assert inspect.getdoc(thing), name
+
+
+def test_the_citation_is_that_of_this_version():
+    cargo = (ROOT / "Cargo.toml").read_text(encoding="utf-8")
+    (version,) = re.findall(r'^version = "(.+)"', cargo, re.MULTILINE)
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version = {{{version}}}" in (DOCS / "start/citing.md").read_text(encoding="utf-8")
 
 
 def test_each_promise_names_a_test_or_survey_that_exists():
