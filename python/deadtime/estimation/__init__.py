@@ -1,10 +1,14 @@
 """Estimate the delay of a control loop from a recording, with a confidence interval.
 
-`_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several plants,
-`_result` is what they return, `_shared` combines several.
-`methods` holds one file a method, `data` what they read from a recording, `models` what they fit,
-`fit` least squares, profiles and residuals, `planning` the bounds of planned experiments.
+`estimate_delay` chooses and runs a method, `compare_methods` runs several, and `choose_plant`
+tries several plants. `identifiability` says before an experiment what it will tell, and
+`shared_number` combines estimates of one number. Each method is a class that holds its options.
 """
+
+# The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
+# plants, `_result` is what they return, `_shared` combines several. `methods` holds one file a
+# method, `data` what they read from a recording, `models` what they fit, `fit` least squares,
+# profiles and residuals, `planning` the bounds of planned experiments.
 
 from deadtime.estimation._choose import PlantChoice, choose_plant
 from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods

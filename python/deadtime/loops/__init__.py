@@ -1,10 +1,14 @@
 """Control loops with a delay: plant, controller, hold and limit.
 
-`_control_loop` is the loop, `_plants`, `_controllers` and `_derivative_filter` are its parts.
-`_specification` checks them and builds the equations of `_model`; `_in_time`, `_poles` and `_gain`
-hold the questions that a loop answers, `_run`, `_stability` and the `_sampled_*` files how.
-`_sweep` runs many loops, `_fixed_step` imitates block diagrams in fixed steps.
+`ControlLoop` joins a plant, such as `Integrator`, and a controller, such as `PV`, and answers
+questions about poles, margins and responses. `sweep` simulates many loops, `simulate_fixed_step`
+imitates block diagrams that are run in fixed steps.
 """
+
+# The files. `_control_loop` is the loop, `_plants`, `_controllers` and `_derivative_filter` are its
+# parts. `_specification` checks them and builds the equations of `_model`; `_in_time`, `_poles` and
+# `_gain` hold the questions that a loop answers, `_run`, `_stability` and the `_sampled_*` files
+# how. `_sweep` runs many loops, `_fixed_step` imitates block diagrams in fixed steps.
 
 from deadtime._base.explorer import Explorer
 from deadtime.loops._control_loop import ControlLoop

@@ -1,11 +1,16 @@
 """Quasi-polynomials, their characteristic roots, and where roots cross the imaginary axis.
 
-`_quasipolynomial` and `_parametric` are the functions, `_characteristic` the questions about
-their roots, `_root_set`, `_chains`, `_sensitivity` and `_expansion` the answers. `_crossings`
-varies one number. `_determinant` and `_matrix_roots` serve systems of matrices, `_scalar_delay`
-the scalar equation. `certificate` holds proofs of root counts and an independent program that
-checks them.
+`s` and `delay` make a `QuasiPolynomial`, which answers questions about its roots. With `parameters`
+it is a `ParametricQuasiPolynomial`, whose numbers have names; `crossings` varies one of them.
+`dde_roots` serves the scalar equation. A `Certificate` is the proof of a count, which an
+independent program checks.
 """
+
+# The files. `_quasipolynomial` and `_parametric` are the functions, `_characteristic` the questions
+# about their roots, `_root_set`, `_chains`, `_sensitivity` and `_expansion` the answers.
+# `_crossings` varies one number. `_determinant` and `_matrix_roots` serve systems of matrices,
+# `_scalar_delay` the scalar equation. `certificate` holds proofs of root counts and an independent
+# program that checks them.
 
 from deadtime.roots._chains import Chain
 from deadtime.roots._crossings import Crossings, crossings, delay_margin

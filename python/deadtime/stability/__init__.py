@@ -1,9 +1,13 @@
 """Stability over ranges of gains and delays: maps, proved boxes, robust maps, stability radius.
 
-`_map` is `stability_map`, `_boundaries` its crossing curves; `_boxes`, `_robust` and `_radius`
-prove what holds for whole ranges; `_tiles` divides maps too large for one call. `_arguments`
-reads axes and intervals.
+`stability_map` counts unstable roots over two numbers, and `tiles` divides maps that are too large
+for one call. `proved_boxes`, `largest_stable_box`, `robust_map` and `stability_radius` prove what
+holds for whole ranges.
 """
+
+# The files. `_map` is `stability_map`, `_boundaries` its crossing curves; `_boxes`, `_robust` and
+# `_radius` prove what holds for whole ranges; `_tiles` divides maps too large for one call.
+# `_arguments` reads axes and intervals.
 
 from deadtime.stability._boxes import ProvedBoxes, largest_stable_box, proved_boxes
 from deadtime.stability._map import MapStatus, StabilityMap, stability_map

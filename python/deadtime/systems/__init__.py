@@ -1,10 +1,14 @@
 """Linear systems with delays: transfer functions, systems of matrices, and their responses.
 
-`_transfer` and `_delay_system` are the systems, made of `_parts`, `_frequency_domain` and
-`_delay_matrices`; `_poles` and `_responses` hold what both are asked; `_margins` holds the margins
-of a loop; `_interchange` converts from and to
-other packages; `_realisation`, `_signals` and `_run` simulate; `_response` is the result.
+A `TransferFunction` is a ratio of quasi-polynomials, a `DelaySystem` consists of matrices for each
+delay. Both have poles, margins, frequency responses and responses over time. Transfer functions are
+converted from and to those of other packages.
 """
+
+# The files. `_transfer` and `_delay_system` are the systems, made of `_parts`, `_frequency_domain`
+# and `_delay_matrices`; `_poles` and `_responses` hold what both are asked; `_margins` holds the
+# margins of a loop; `_interchange` converts from and to other packages; `_realisation`, `_signals`
+# and `_run` simulate; `_response` is the result.
 
 from deadtime.systems._delay_system import DelaySystem
 from deadtime.systems._margins import Margins

@@ -1,11 +1,14 @@
 """Choose the gains of a loop whose delay is known up to an interval.
 
-`_problem` holds what is free and what is not known, `_region` the region of an estimate,
-`_stabilising` where to look for gains, `_objectives` what is made best, `_margins` what must hold.
-`_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the delay at which
-they are worst and repeats the search until it finds none that is worse, and `_made` puts the result
-together. `_filter_choice` chooses the filter of the derivative.
+`design` looks for gains that are best in the worst case over delay and gain of the plant and keep
+their margins there, and `design_filter` chooses the filter of the derivative.
 """
+
+# The files. `_problem` holds what is free and what is not known, `_region` the region of an
+# estimate, `_stabilising` where to look for gains, `_objectives` what is made best, `_margins` what
+# must hold. `_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the
+# delay at which they are worst and repeats the search until it finds none that is worse, and
+# `_made` puts the result together. `_filter_choice` chooses the filter of the derivative.
 
 from deadtime.tuning._design import design
 from deadtime.tuning._filter_choice import design_filter
