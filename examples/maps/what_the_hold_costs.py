@@ -3,8 +3,8 @@ What the hold of a sampled loop costs
 =====================================
 
 A controller that runs every ``sample_time`` seconds and holds its command is not a continuous one.
-The largest stable gain falls with the sample time. Half a sample of further delay is the rule of
-thumb for it; above, the gain that leaves the hold out is on the unsafe side everywhere.
+The largest stable gain falls with the sample time. Half a sample of further delay is a rule of
+thumb for it. Leaving the hold out is on the unsafe side at every sample time.
 """
 
 import deadtime as dtm

@@ -3,8 +3,8 @@ The latency of an attitude loop
 ===============================
 
 ``latency`` takes the log of an autopilot, or a recording, and says for each loop how long the
-vehicle takes to respond, and what that costs in gain. Here the roll angle follows its setpoint
-after 47 ms of delay and a lag of 80 ms.
+vehicle takes to respond, with an interval. Here the roll angle follows its setpoint after 47 ms of
+delay and a lag of 80 ms.
 """
 
 import deadtime as dtm
