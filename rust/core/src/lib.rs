@@ -2,13 +2,14 @@
 //! differential equations, the likelihood of recordings.
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
-//! Python. Dependencies run one way: error, simd ← lambertw; error ← elementary ← quasipoly ← roots
+//! Python. Dependencies run one way: error, simd ← lambertw; eigenvalues ← roots, dde; error ← elementary ← quasipoly ← roots
 //! ← stability ← frequency; quasipoly ← dde ← estimation, stability.
 
 #[macro_use]
 pub mod error;
 
 pub mod dde;
+mod eigenvalues;
 pub mod elementary;
 pub mod estimation;
 pub mod frequency;

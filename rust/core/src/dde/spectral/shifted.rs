@@ -9,8 +9,7 @@
 
 use std::sync::OnceLock;
 
-use faer::linalg::solvers::{DenseSolveCore, PartialPivLu, Solve};
-use faer::{ColMut, Mat};
+use nalgebra::{DMatrix, DVector, DVectorViewMut, Dyn, LU};
 use num_complex::Complex64;
 
 use super::banded::Banded;
@@ -18,9 +17,12 @@ use super::dense::add_multiple;
 use super::jacobian::Jacobian;
 use super::nodes::{COUPLED, Nodes};
 use super::products::transposed;
+use crate::eigenvalues::eigenvalues;
 
 /// Upper limit on the numbers in the factors of all systems together (bounds memory).
 const MOST: usize = 1 << 24;
+/// Steps of Rayleigh quotient iteration.
+const ITERATIONS: usize = 4;
 /// Number of refinement steps. Each reduces the error by a factor that depends on the condition of
 /// V. The remaining error is rough from node to node, and affects the defect at the start of an
 /// element, a derivative, long before the values.
@@ -47,17 +49,20 @@ fn modes(nodes: &Nodes) -> &'static [Mode] {
     static TABLES: [OnceLock<Vec<Mode>>; COUPLED + 1] = [const { OnceLock::new() }; COUPLED + 1];
     TABLES[nodes.order.min(COUPLED)].get_or_init(|| {
         let n = nodes.order;
-        let matrix = Mat::from_fn(n, n, |i, j| nodes.integrate[i * n + j]);
-        let Ok(found) = matrix.eigen() else {
+        let found = eigenvalues(&nodes.integrate, n).unwrap_or_default();
+        let pairs = found
+            .iter()
+            .map(|value| eigenpair(&nodes.integrate, n, *value));
+        let (found, columns): (Vec<_>, Vec<_>) = pairs.flatten().unzip();
+        let vectors = (columns.len() == n).then(|| DMatrix::from_columns(&columns));
+        let inverse = vectors.clone().and_then(DMatrix::try_inverse);
+        let (Some(vectors), Some(inverse)) = (vectors, inverse) else {
             return Vec::new();
         };
-        let vectors = found.U().to_owned();
-        let inverse = vectors.partial_piv_lu().inverse();
-        let values = found.S().column_vector();
-        let modes = (0..n).filter(|k| values[*k].im >= 0.0).map(|k| {
-            let weight = if values[k].im > 0.0 { 2.0 } else { 1.0 };
+        let modes = (0..n).filter(|k| found[*k].im >= 0.0).map(|k| {
+            let weight = if found[k].im > 0.0 { 2.0 } else { 1.0 };
             Mode {
-                value: values[k],
+                value: found[k],
                 into: (0..n)
                     .map(|i| (inverse[(k, i)].re, inverse[(k, i)].im))
                     .unzip(),
@@ -70,11 +75,32 @@ fn modes(nodes: &Nodes) -> &'static [Mode] {
     })
 }
 
+/// Eigenvalue and eigenvector of a real matrix, row-major, close to a computed eigenvalue, by
+/// Rayleigh quotient iteration: their residual is that of rounding.
+fn eigenpair(
+    matrix: &[f64],
+    n: usize,
+    value: Complex64,
+) -> Option<(Complex64, DVector<Complex64>)> {
+    let matrix = DMatrix::from_row_slice(n, n, matrix).map(Complex64::from);
+    let start = (value, DVector::from_element(n, Complex64::ONE));
+    (0..ITERATIONS).try_fold(start, |(value, vector), _| {
+        // Beside the eigenvalue, by its own rounding error, so that there are factors.
+        let near = value * (1.0 + 4.0 * f64::EPSILON);
+        let shifted = &matrix - DMatrix::from_diagonal_element(n, n, near);
+        let vector = shifted.lu().solve(&vector)?;
+        let length = vector.norm();
+        let vector = vector.unscale(length);
+        let quotient = vector.dotc(&(&matrix * &vector));
+        (length.is_finite() && quotient.is_finite()).then_some((quotient, vector))
+    })
+}
+
 /// The factors of one system.
 #[derive(Debug)]
 enum Factors {
     Banded(Banded),
-    Full(PartialPivLu<Complex64>),
+    Full(LU<Complex64, Dyn, Dyn>),
 }
 
 /// The factors of all systems for one length and order.
@@ -111,11 +137,12 @@ impl Shifted {
         let factors = modes.iter().map(|mode| {
             let factor = -half * mode.value;
             if full {
-                let mut matrix = Mat::<Complex64>::identity(n, n);
+                let mut matrix = DMatrix::<Complex64>::identity(n, n);
                 for (row, column, value) in jacobian.entries() {
                     matrix[(jacobian.place[row], jacobian.place[column])] += factor * value;
                 }
-                Some(Factors::Full(matrix.partial_piv_lu()))
+                let factors = matrix.lu();
+                factors.is_invertible().then_some(Factors::Full(factors))
             } else {
                 let mut matrix = Banded::new(n, band);
                 for (row, column, value) in jacobian.entries() {
@@ -173,7 +200,9 @@ impl Shifted {
             }
             match factors {
                 Factors::Banded(factors) => factors.solve(&mut x),
-                Factors::Full(factors) => factors.solve_in_place(ColMut::from_slice_mut(&mut x)),
+                Factors::Full(factors) => {
+                    factors.solve_mut(&mut DVectorViewMut::from_slice(&mut x, dim));
+                }
             }
             for ((place, re), im) in self.place.iter().zip(&mut re).zip(&mut im) {
                 (*re, *im) = (x[*place].re, x[*place].im);

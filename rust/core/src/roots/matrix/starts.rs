@@ -4,13 +4,13 @@
 //! of K (Ruhe 1973). They are close to roots of det M while |s − x| is small compared with one over
 //! the delays. The point is moved to the largest real part among them. Nothing here is proved.
 
-use faer::MatRef;
 use num_complex::Complex64;
 
 use super::factor::factor;
 use super::simple_root::Dense;
 use super::system::CharacteristicMatrix;
 use super::walker::{MatrixWalker, NEAR_ROOT};
+use crate::eigenvalues::eigenvalues;
 
 /// Upper limit on the points at which M is linearised.
 const MAX_POINTS: usize = 4;
@@ -98,11 +98,9 @@ fn linearised(
         // G carries the factor e^(s τ_c) of its row.
         *row.get_mut(i)? -= system.delays().get(*reference)?;
     }
-    let eigenvalues = MatRef::from_row_major_slice(&k, n, n).eigenvalues().ok()?;
     let least = LEAST * system.longest();
-    let found = eigenvalues
+    let found = eigenvalues(&k, n)?
         .into_iter()
-        .map(|mu| Complex64::new(mu.re, mu.im))
         .filter(|mu| mu.im >= 0.0 && mu.norm() > least)
         .map(|mu| {
             let s = z - mu.inv();

@@ -190,32 +190,13 @@ pub(crate) fn eigenvalues(
     size: usize,
 ) -> Result<Vec<Complex64>, Error> {
     balance(&mut matrix, states, size);
-    by_schur(&matrix, size).ok_or_else(|| Error::Convergence {
+    crate::eigenvalues::eigenvalues(&matrix, size).ok_or_else(|| Error::Convergence {
         what: "the eigenvalues of the transition matrix",
         best: Complex64::new(f64::NAN, f64::NAN),
         advice: "the loop is scaled too badly: choose units in which its gains are moderate"
             .to_owned(),
     })
 }
-
-#[cfg(not(target_family = "wasm"))]
-fn by_schur(matrix: &[f64], size: usize) -> Option<Vec<Complex64>> {
-    let matrix = faer::MatRef::from_row_major_slice(matrix, size, size);
-    matrix.eigenvalues().ok()
-}
-
-/// The same in a page, where kernels for large matrices are too much to carry.
-#[cfg(target_family = "wasm")]
-fn by_schur(matrix: &[f64], size: usize) -> Option<Vec<Complex64>> {
-    let matrix = nalgebra::DMatrix::from_row_slice(size, size, matrix);
-    let schur = nalgebra::Schur::try_new(matrix, f64::EPSILON, MOST_TURNS * size)?;
-    let found = schur.complex_eigenvalues();
-    Some(found.iter().map(|z| Complex64::new(z.re, z.im)).collect())
-}
-
-/// Upper limit on the turns of the QR algorithm for each eigenvalue.
-#[cfg(target_family = "wasm")]
-const MOST_TURNS: usize = 60;
 
 /// `out` += A B for square matrices of side n.
 fn product(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
