@@ -1,10 +1,14 @@
 """What a notebook shows of results, and the version."""
 
+import base64
+import sys
 from importlib.metadata import version
 
 import deadtime as dtm
 import pytest
 from deadtime import delay, s
+from matplotlib import pyplot
+from step_recordings import record_step
 
 Kp, tau_d = dtm.parameters("Kp tau_d")
 
@@ -25,17 +29,56 @@ def test_formulas_in_latex(shown, text):
     assert shown._repr_latex_() == f"${text}$"
 
 
-def test_tables_in_html():
-    roots = (s + delay(1.0)).roots(re=(-8, 2), im=(0, 200))._repr_html_()
-    assert "32 roots in re=(-8, 2), im=(0, 200), 12 of 32 shown" in roots
-    assert roots.count("<tr>") == 13
-    margins = (2.0 / s * delay(0.36)).margin()._repr_html_()
-    assert "<td>delay</td><td>0.425398 s</td><td>2</td>" in margins
-    assert "not stable" in (9.0 / s * delay(0.36)).margin()._repr_html_()
-    (Kv,) = dtm.parameters("Kv")
-    h = s + (Kp + Kv * s) * delay(0.36)
-    chart = dtm.stability_map(h, {"Kp": (0.1, 6), "Kv": (-1.2, 0.9)}, (5, 4), abscissa=False)
-    assert "<td>infinitely many</td><td>5</td>" in chart._repr_html_()
+def test_margins_are_a_table_in_markdown():
+    margins = (2.0 / s * delay(0.36)).margin()._repr_markdown_()
+    assert "| delay | 0.425398 s | 2 |" in margins.splitlines()
+    assert (9.0 / s * delay(0.36)).margin()._repr_markdown_() is None
+
+
+LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
+
+#: What a notebook shows by a picture, and words of the text below.
+PICTURED = {
+    "Certificate": (lambda: (s + delay(1.0)).certify((-1, 1), (0, 9)), "1 root"),
+    "ControlLoop": (lambda: LOOP, "PV(Kp=1.8"),
+    "DelayEstimate": (
+        lambda: dtm.estimate_delay(*record_step(rest=1.0), free=("delay",)),
+        "model adequate",
+    ),
+    "Design": (
+        lambda: dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5)),
+        "least margins",
+    ),
+    "Identifiability": (
+        lambda: dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01),
+        "delay",
+    ),
+    "Response": (LOOP.step_response, "&lt;Response: 1 output at"),
+    "RootSet": (lambda: (s + delay(1.0)).roots(re=(-8, 2), im=(0, 200)), "RootSet: 32 roots"),
+    "StabilityMap": (
+        lambda: dtm.stability_map(s + Kp * delay(tau_d), {"Kp": (0.1, 6), "tau_d": (0, 1)}, (5, 4)),
+        "of 20 stable",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PICTURED)
+def test_results_are_shown_by_a_picture_and_their_text(name, monkeypatch):
+    make, words = PICTURED[name]
+    result, windows = make(), pyplot.get_fignums()
+    shown = result._repr_html_()
+    data = base64.b64decode(shown.split("base64,")[1].split('"')[0])
+    assert data.startswith(b"\x89PNG")
+    assert words in shown
+    assert len(shown) < 200_000
+    # A window of pyplot would show the picture twice.
+    assert pyplot.get_fignums() == windows
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert result._repr_html_() is None
+
+
+def test_what_has_no_picture_is_shown_as_text():
+    assert LOOP.replace(delay=None)._repr_html_() is None
 
 
 def test_the_version_is_that_of_the_installed_package():

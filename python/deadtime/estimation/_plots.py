@@ -112,7 +112,7 @@ def _plot_profile(ax: Axes, fit: DelayEstimate) -> None:
 def plot_identifiability(plan: Identifiability, axes: Sequence[Axes] | None = None) -> list[Axes]:
     """The expected recording, its sensitivities; delay against lag where both are free."""
     both = plan.correlation is not None
-    axes = _new_axes(both) if axes is None else list(axes)
+    axes = planned_axes(plan) if axes is None else list(axes)
     if len(axes) != 2 + both:
         raise ValueError(f"ax holds {len(axes)} axes: give {2 + both}")
     for one in axes:
@@ -124,8 +124,11 @@ def plot_identifiability(plan: Identifiability, axes: Sequence[Axes] | None = No
     return axes
 
 
-def _new_axes(both: bool) -> list[Axes]:
-    figure = shown_figure(10.0 if both else 7.0, 5.0)
+def planned_axes(plan: Identifiability, figure: Figure | None = None) -> list[Axes]:
+    """Lay out the axes of `plot_identifiability` on a figure, by default a new one of pyplot."""
+    both = plan.correlation is not None
+    if figure is None:
+        figure = shown_figure(10.0 if both else 7.0, 5.0)
     grid = figure.add_gridspec(2, 1 + both, width_ratios=[3.0, 2.0][: 1 + both])
     upper = figure.add_subplot(grid[0, 0])
     axes = [upper, figure.add_subplot(grid[1, 0], sharex=upper)]

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.digits import between, stated
+from deadtime._base.drawing import empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime._base.validation import real_array
 from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
@@ -30,6 +32,7 @@ from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -76,7 +79,7 @@ class FittedRun(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayEstimate(ReadOnlyArrays):
+class DelayEstimate(ReadOnlyArrays, Pictured):
     """An estimated delay, with the fitted loop and the uncertainty of every fitted parameter.
 
     Attributes
@@ -387,6 +390,13 @@ class DelayEstimate(ReadOnlyArrays):
         from deadtime.estimation._plots import plot_estimate
 
         return plot_estimate(self, ax)
+
+    def _picture(self) -> Figure:
+        from deadtime.estimation._plots import estimate_axes
+
+        figure = empty_figure(10.0, 4.6)
+        self.plot(estimate_axes(self, figure))
+        return figure
 
     def __repr__(self) -> str:
         error = self.stderr["delay"] if self.calibrated and "delay" in self.stderr else math.nan

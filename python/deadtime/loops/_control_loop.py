@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from deadtime._base.drawing import new_figure
 from deadtime._base.explorer import Explorer
+from deadtime._base.notebook import Pictured
 from deadtime._base.validation import non_negative
 from deadtime.loops._controllers import Controller
 from deadtime.loops._explored import explorer_of
@@ -17,9 +19,12 @@ from deadtime.loops._plants import Plant
 from deadtime.loops._poles import LoopPoles
 from deadtime.loops._specification import LoopSpecification
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @dataclass(frozen=True, init=False)
-class ControlLoop(LoopInTime, LoopPoles, LoopGain):
+class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
     """A plant under feedback with one delay in the loop.
 
     The command u of the controller is limited, delayed by `delay` and reaches the plant as w.
@@ -196,6 +201,14 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain):
         [0.0, 6.0]
         """
         return explorer_of(self.specification, ranges)
+
+    def _picture(self) -> Figure | None:
+        """The step response, for a notebook."""
+        if self.delay is None:
+            return None
+        figure, axes = new_figure()
+        self.step_response().plot(axes, inputs=True)
+        return figure
 
 
 #: What a loop is made from.

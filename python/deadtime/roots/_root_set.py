@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.page import table, table_row
+from deadtime._base.notebook import Pictured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,7 @@ _SHOWN = 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RootSet(ReadOnlyArrays):
+class RootSet(ReadOnlyArrays, Pictured):
     """Roots of a quasi-polynomial, each the centre of a disc proved to hold it.
 
     Behaves like the array of its roots: it has a length, can be indexed and iterated over, and
@@ -116,18 +116,6 @@ class RootSet(ReadOnlyArrays):
         axes = shown_axes(ax)
         plot_root_set(axes, self, chains)
         return axes
-
-    def _repr_html_(self) -> str:
-        (a, b), (c, d) = self.region
-        more = "" if len(self) <= _SHOWN else f", {_SHOWN} of {len(self)} shown"
-        rows = [
-            table_row((f"{z:.12g}", f"{radius:.1e}", str(multiplicity)), "td", 3)
-            for z, radius, multiplicity in zip(
-                self.roots.tolist(), self.radii, self.multiplicities, strict=True
-            )
-        ]
-        caption = f"{self.counted} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g}){more}"
-        return table(("root in 1/s", "within", "multiplicity"), rows[:_SHOWN], caption)
 
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region

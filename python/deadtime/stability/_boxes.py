@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import (
     Range,
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ProvedBoxes(ReadOnlyArrays):
+class ProvedBoxes(ReadOnlyArrays, Pictured):
     """Ranges of parameters divided into boxes with a proved count; made by `proved_boxes`.
 
     Attributes

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.extras import library
 from deadtime._base.frozen import ReadOnlyArrays, read_only
-from deadtime._base.page import table, table_row
+from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop, Explorer
@@ -47,7 +47,7 @@ class MapStatus(IntEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StabilityMap(ReadOnlyArrays):
+class StabilityMap(ReadOnlyArrays, Pictured):
     """Stability over two parameters; made by `stability_map`.
 
     Attributes
@@ -287,15 +287,6 @@ class StabilityMap(ReadOnlyArrays):
         )
         data["abscissa"].attrs["units"] = "1/s"
         return data
-
-    def _repr_html_(self) -> str:
-        numbers, cells = np.unique(self.unstable, return_counts=True)
-        names = {-1: "infinitely many", -2: "not known"}
-        rows = [
-            table_row((names.get(number, str(number)), str(count)), "td", 2)
-            for number, count in zip(numbers.tolist(), cells.tolist(), strict=True)
-        ]
-        return table(("unstable roots", "cells"), rows, repr(self).strip("<>"))
 
     def __repr__(self) -> str:
         stable = f"{int(self.stable.sum())} of {self.stable.size} stable"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, Range, thread_number
 from deadtime.roots._family import HasFamily, family_of
@@ -28,7 +29,7 @@ _CELL_BOXES = 1000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RobustMap(ReadOnlyArrays):
+class RobustMap(ReadOnlyArrays, Pictured):
     """Stability over two parameters for all values of others; made by `robust_map`.
 
     Attributes

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from deadtime import _deadtime
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.page import table, table_row
 from deadtime._deadtime import loop_margins
 from deadtime.roots import QuasiPolynomial
 
@@ -85,16 +84,14 @@ class Margins(ReadOnlyArrays):
             raise ValueError("the loop is not stable as it is: it has no delay margin")
         return self.delay_margin
 
-    def _repr_html_(self) -> str:
+    def _repr_markdown_(self) -> str | None:
         if not self.stable:
-            return table(("the closed loop is not stable as it is",), (), "Margins")
-        rows = [
-            table_row(
-                (name, f"{value:.6g}{unit}", "" if math.isnan(omega) else f"{omega:.6g}"), "td", 3
-            )
-            for name, value, unit, omega in self._four()
-        ]
-        return table(("margin", "value", "at rad/s"), rows, "Margins")
+            return None
+        rows = [("margin", "value", "at rad/s"), ("---",) * 3]
+        for name, value, unit, omega in self._four():
+            at = "" if math.isnan(omega) else f"{omega:.6g}"
+            rows.append((name, f"{value:.6g}{unit}", at))
+        return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
     def _four(self) -> tuple[tuple[str, float, str, float], ...]:
         """Name, value, unit and frequency of each margin."""

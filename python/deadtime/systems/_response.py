@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime._base.validation import finite, positive, real_array
 from deadtime.systems._step_metrics import OneSignal
 
@@ -48,7 +49,7 @@ class RepeatedRun(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(ReadOnlyArrays):
+class Response(ReadOnlyArrays, Pictured):
     """Outputs and inputs of a loop or a system over time.
 
     Unpacks into ``time, outputs``. A signal of one component has the shape (n,), as in

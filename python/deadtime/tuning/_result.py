@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from deadtime._base.digits import between
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime.loops import ControlLoop, Explorer
 from deadtime.loops._explored import explorer_of
 from deadtime.stability import StabilityMap
@@ -57,7 +58,7 @@ class Trade(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(ReadOnlyArrays):
+class Design(ReadOnlyArrays, Pictured):
     """Gains, and the loop that has them; made by `design`.
 
     Attributes
@@ -196,6 +197,9 @@ class Design(ReadOnlyArrays):
         lines += [trade.words for trade in self.traded]
         return "\n".join(lines)
 
+    def _picture(self) -> Figure:
+        return self.plot()
+
     def plot(self) -> Figure:
         """Draw map, step response, and the Bode plot of the loop with its margins.
 
@@ -244,7 +248,7 @@ def figure_in_words(objective: ObjectiveName, value: float) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FilterChoice(ReadOnlyArrays):
+class FilterChoice(ReadOnlyArrays, Pictured):
     """How the corner of a filter was chosen; made by `design_filter`.
 
     Attributes
@@ -316,6 +320,9 @@ class FilterChoice(ReadOnlyArrays):
         if self.noise is not None:
             words += f", a standard deviation of {self.noise * self.noise_gain:.3g}"
         return words
+
+    def _picture(self) -> Figure:
+        return self.plot()
 
     def plot(self) -> Figure:
         """Draw the costs of each corner, the controller with and without filter, and the margins.

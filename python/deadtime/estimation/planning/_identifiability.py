@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from deadtime._base.digits import stated
+from deadtime._base.drawing import empty_figure
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress
 from deadtime._base.validation import finite, positive, whole_number
 from deadtime.estimation._estimate import estimate_delay, method_of
@@ -41,10 +43,11 @@ from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identifiability(ReadOnlyArrays):
+class Identifiability(ReadOnlyArrays, Pictured):
     """Smallest possible errors of the parameters of a loop, from a planned experiment.
 
     Attributes
@@ -226,6 +229,13 @@ class Identifiability(ReadOnlyArrays):
         from deadtime.estimation._plots import plot_identifiability
 
         return plot_identifiability(self, ax)
+
+    def _picture(self) -> Figure:
+        from deadtime.estimation._plots import planned_axes
+
+        figure = empty_figure(10.0, 5.0)
+        self.plot(planned_axes(self, figure))
+        return figure
 
     def __repr__(self) -> str:
         known = with_sums(self.loop)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from deadtime._base.digits import stated
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
+from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
 from deadtime._base.progress import Stages, stage_report
 from deadtime.estimation import SharedNumber, shared_number
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Latency(ReadOnlyArrays):
+class Latency(ReadOnlyArrays, Pictured):
     """Where in a vehicle the time goes, from one log.
 
     Attributes
@@ -180,6 +181,9 @@ class Latency(ReadOnlyArrays):
         from deadtime.reports.latencies._plots import plot_latency
 
         return plot_latency(self.source, self.estimated)
+
+    def _picture(self) -> Figure | None:
+        return self.plot() if self.estimated else None
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write one HTML file with all of it: the budget, each fit and the gains.

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
 
+from deadtime._base.notebook import Pictured
 from deadtime.roots.certificate._check import check
 from deadtime.roots.certificate._form import check_form
 from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Range, Segment
@@ -23,7 +24,7 @@ _FORMAT: Final = "deadtime certificate"
 
 
 @dataclass(frozen=True)
-class Certificate(Proof):
+class Certificate(Proof, Pictured):
     """The proved number of roots in a region, with everything needed to check the proof.
 
     Made by `QuasiPolynomial.certify`. It contains the function, the region, the number and the
