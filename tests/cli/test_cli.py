@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from browser import check_page
 from command_line import found, one_clear_line, run
 from deadtime.roots import Certificate
 from flights import flight_path
@@ -77,6 +78,10 @@ def test_the_report_is_valid_and_says_what_its_pictures_show(demo):
     assert page.count('role="img"') == 3
     assert '<html lang="en">' in page
     assert '<th scope="col">' in page
+
+
+def test_the_report_in_a_browser(demo):
+    check_page(demo[0] / "demo" / "report.html")
 
 
 def test_a_narrow_terminal_leaves_out_no_digits(demo):
@@ -288,7 +293,8 @@ def test_without_its_extras_it_says_how_to_get_them():
 def test_importing_the_package_needs_no_extra():
     code = (
         "import sys; import deadtime; "
-        "extras = {'matplotlib', 'typer', 'rich'} & set(sys.modules); print(extras or 'none')"
+        "extras = {'matplotlib', 'typer', 'rich', 'jinja2'} & set(sys.modules); "
+        "print(extras or 'none')"
     )
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True

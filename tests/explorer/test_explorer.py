@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_line import run
 from deadtime.loops._explored import described
-from deadtime.tuning._live import live_section
+from deadtime.tuning._live import live_design
 
 LOOP = dtm.ControlLoop(dtm.Integrator(0.9, 0.1), dtm.PV(1.5, 0.13), delay=0.36, limit=1.0)
 
@@ -103,14 +103,14 @@ def test_a_design_opens_with_the_interval_of_its_delay_and_stands_in_reports() -
     found = dtm.design(LOOP, controller=dtm.PV, delay=(0.3, 0.4), shape=(9, 9))
     state = found.explore().state
     assert (state["Kp"], state["interval"]) == (found.gains["Kp"], [0.3, 0.4])
-    heading, frame = live_section(found)
-    assert heading.startswith("<h2>")
-    assert "<iframe" in frame
-    assert "<script" not in frame
+    shown = live_design(found)
+    assert shown is not None
+    assert shown.frame.startswith("<iframe")
+    assert "<script" not in shown.frame
     G = 1 / (dtm.s + dtm.delay(0.1))
     inside = dtm.ControlLoop(G, dtm.P(0.5), delay=0.1)
     ranges = {"Kp": (0.1, 0.6)}
-    assert live_section(dtm.design(inside, controller=dtm.P, ranges=ranges)) == []
+    assert live_design(dtm.design(inside, controller=dtm.P, ranges=ranges)) is None
 
 
 def test_the_command_writes_the_page_of_a_loop_and_of_a_recording(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import deadtime as dtm
 import numpy as np
 import pytest
+from browser import check_tab, chromium
 from web_kernels import recorded_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.5, 0.13), delay=0.36, limit=1.0)
@@ -19,14 +19,8 @@ RANGES = {"Kp": (0.0, 6.0), "Kv": (-0.9, 0.9)}
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is None:
-        pytest.skip("there is no chromium on this machine")
-    with playwright.sync_playwright() as run:
-        started = run.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with chromium() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -194,13 +188,9 @@ def test_what_is_saved_can_be_read(page: Page, tmp_path: Path) -> None:
 def test_no_serious_finding_of_axe_and_nothing_cut_off(
     browser: Any, address: str, scheme: str, width: int
 ) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is missing")
     size = {"width": width, "height": 900}
     opened = Page(browser, address, viewport=size, color_scheme=scheme, reduced_motion="reduce")
-    assert opened.tab.evaluate("() => document.documentElement.scrollWidth") <= width
-    found = axe.Axe().run(opened.tab).response["violations"]
-    serious = [one for one in found if one["impact"] in ("serious", "critical")]
-    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in serious] == []
+    check_tab(opened.tab, width)
     opened.close()
 
 

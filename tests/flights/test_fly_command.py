@@ -12,6 +12,7 @@ import sys
 import time
 
 import pytest
+from browser import check_page
 from command_line import run
 from deadtime._cli.fly import _free_folder
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
@@ -34,12 +35,17 @@ def running(pid):
     return True
 
 
-@pytest.mark.survey
-def test_the_whole_experiment_in_virtual_time(tmp_path):
-    folder = tmp_path / "new" / "flight"
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fly") / "new" / "flight"
     done = run_fly("--virtual-time", "--folder", folder, "--seed", 3, "--json")
     assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+    return folder, json.loads(done.stdout)
+
+
+@pytest.mark.survey
+def test_the_whole_experiment_in_virtual_time(whole):
+    folder, result = whole
     assert result["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
     assert 0.33 < result["overshoot_method"][1] < 0.38
     assert result["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
@@ -57,6 +63,11 @@ def test_the_whole_experiment_in_virtual_time(tmp_path):
     again = run_fly("--virtual-time", "--folder", folder)
     assert again.returncode == 1
     assert "holds recordings already" in again.stderr
+
+
+@pytest.mark.survey
+def test_its_page_in_a_browser(whole):
+    check_page(whole[0] / "report.html")
 
 
 def test_a_real_host_needs_consent_and_shows_the_limits():

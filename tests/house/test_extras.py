@@ -128,6 +128,15 @@ def test_commands_that_draw_ask_for_it_before_they_work(arguments, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_pages_without_their_engine_say_which_line_installs_it(tmp_path):
+    done = without(["jinja2"], "demo", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "pip install 'deadtime[cli]'" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+    assert without(["jinja2"], "explore", "--out", "page.html", cwd=tmp_path).returncode == 0
+
+
 @pytest.mark.parametrize(
     ("head", "library"),
     [(b"PAR1", "pyarrow"), (b"ARROW1\0\0", "pyarrow"), (b"MATLAB 7.3 MAT-file", "h5py")],

@@ -51,4 +51,4 @@ def test_a_package_that_comes_along_has_a_permissive_licence(name):
 
 
 def test_what_the_package_needs_is_looked_at():
-    assert {"numpy", "scipy", "matplotlib", "typer", "rich"} <= set(installed(NAMED))
+    assert {"numpy", "scipy", "matplotlib", "typer", "rich", "jinja2"} <= set(installed(NAMED))

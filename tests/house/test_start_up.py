@@ -6,7 +6,9 @@ import sys
 import pytest
 
 #: What is slow to load and loaded where it is used.
-SLOW = ("scipy.", "matplotlib.", "pydantic.", "rich.", "typer.", "control.", "numpy.ma.")
+SLOW = (
+    "scipy.", "matplotlib.", "pydantic.", "rich.", "typer.", "jinja2.", "control.", "numpy.ma.",
+)  # fmt: skip
 
 
 def loaded(command):

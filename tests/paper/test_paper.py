@@ -7,15 +7,17 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
 import pytest
+from browser import check_page
 from deadtime import paper
 from deadtime.estimation import Overshoot
 from deadtime.paper import Comparison, Verdict, agreeing_digits, printed_digits
-from deadtime.paper._page import render_reproduction
+from deadtime.paper._page import render_reproduction, write_reproduction
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
@@ -385,6 +387,11 @@ def test_the_page_is_valid_and_fetches_nothing(found):
     assert set(used) <= set(names)
     assert 'src="' not in page
     assert found.summary() in page
+
+
+def test_the_page_in_a_browser(found, tmp_path):
+    some = replace(found, parts={name: found.parts[name] for name in ("table1", "gap")})
+    check_page(write_reproduction(some, tmp_path / "paper.html", {}))
 
 
 def test_the_manual_shows_these_numbers(found):

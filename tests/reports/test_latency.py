@@ -5,6 +5,7 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
+from browser import check_page
 from deadtime._base.digits import between, rounded, shown, stated
 from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
 from flights import flight_path
@@ -105,6 +106,21 @@ def test_summary_dict_and_page(found, tmp_path):
     assert "src=" not in page
     assert "<link" not in page
     assert found.plot().axes[0].get_xlabel().endswith("[ms]")
+
+
+def test_names_from_a_log_are_text_in_the_page(found, tmp_path):
+    bad = "<script>alert(1)</script>"
+    one = replace(found.loops[0], loop=bad, estimate=None, refusal=bad)
+    stages = {bad: found.stages["roll rate"]}
+    hostile = replace(found, source=bad, vehicle=bad, loops=(one,), remarks=(bad,), stages=stages)
+    page = hostile.report(tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    # Title, heading, vehicle, headline, the stages, the loop with its refusal, the remark.
+    assert page.count("&lt;script&gt;") == 7 + len(stages[bad])
+
+
+def test_the_page_in_a_browser(found, tmp_path):
+    check_page(found.report(tmp_path / "page.html"))
 
 
 def test_without_excitation_every_loop_is_refused_by_name(tmp_path):

@@ -81,7 +81,8 @@ def as_svg(figure: Figure, name: str) -> str:
     """A figure as an SVG element to be put into a page; the same picture gives the same text.
 
     Matplotlib gives the parts of every picture the same identifiers; `name` before them makes
-    those of one page different.
+    those of one page different. Black, white and grey become the colours of the page, light or
+    dark.
     """
     import matplotlib
 
@@ -90,7 +91,17 @@ def as_svg(figure: Figure, name: str) -> str:
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     drawing = text.getvalue()
     drawing = drawing[drawing.index("<svg") :]
-    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", drawing)
+    drawing = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", drawing)
+    return re.sub(r"\b(fill|stroke): #([0-9a-f]{2})\2\2\b", _of_page, drawing)
+
+
+def _of_page(grey: re.Match[str]) -> str:
+    """A grey as a mixture of the ink and the ground of a page."""
+    ink = round(100.0 * (1.0 - int(grey[2], 16) / 255.0))
+    mixed = {0: "var(--ground)", 100: "var(--ink)"}.get(
+        ink, f"color-mix(in srgb, var(--ink) {ink}%, var(--ground))"
+    )
+    return f"{grey[1]}: {mixed}"
 
 
 def bare_axes(ax: Axes) -> Axes:

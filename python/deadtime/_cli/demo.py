@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from deadtime._base.drawing import check_matplotlib
+from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.comparisons import estimates_table
 from deadtime._cli.show import print_json, print_points, print_table, print_text, stages
@@ -25,7 +25,7 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Fly a simulated loop with known truth and find its delay and its gains; no hardware."""
-    check_matplotlib()
+    check_pages()
     with stages(6, quiet=as_json) as begin:
         begin("flying the simulated loop")
         flight = demo_recording(seed)

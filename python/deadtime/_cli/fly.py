@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from deadtime._base.drawing import check_matplotlib
+from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
@@ -104,7 +104,7 @@ def command(
         limits=Limits(max_climb=max_climb, max_height=max_height),
     )
     plan.check()
-    check_matplotlib()  # needed for the report; fail before anything flies
+    check_pages()  # needed for the report; fail before anything flies
     if host is not None:
         _ask_for_consent(host, plan, consent, virtual_time)
     elif not as_json:

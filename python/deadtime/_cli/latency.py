@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from deadtime._base.digits import between, stated
-from deadtime._base.drawing import check_matplotlib
+from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_table, print_text, results, results_table
 from deadtime.recordings import Log, open_log
@@ -47,7 +47,7 @@ def command(
     if len(logs) > 2:
         raise ValueError(f"{len(logs)} logs were given: give one, or two to compare")
     if out is not None:
-        check_matplotlib()
+        check_pages()
         if len(logs) > 1:
             raise ValueError("--out writes the page of one log: give one, or leave it out")
     found = [_told(open_log(one, flight=flight), axis, loop, as_json) for one in logs]

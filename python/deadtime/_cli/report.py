@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from deadtime._base.drawing import check_matplotlib
+from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_text, stages
 from deadtime.recordings import read_recording
@@ -31,7 +31,7 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Write one page about a recording: delay, map of gains, a controller to try."""
-    check_matplotlib()
+    check_pages()
     recording = read_recording(file, time=time, reference=reference, output=output, command=command)
     loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit, plant=plant)
     with stages(5, quiet=as_json) as begin:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from deadtime._base.drawing import check_matplotlib
+from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.show import (
     print_json,
@@ -50,7 +50,7 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Reproduce the paper on delays in quadrotor control: each printed number beside ours."""
-    check_matplotlib()
+    check_pages()
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
     count = len(PARTS) if names is None else len(set(names))
     with stages(count + 1, quiet=as_json) as begin:

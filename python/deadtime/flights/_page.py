@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from deadtime._base.digits import stated
 from deadtime._base.drawing import new_figure
-from deadtime._base.page import escaped, page, picture, table, table_row, write_page
+from deadtime._base.page import page, write_page
 from deadtime.flights._learn import COLUMNS, FlightStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
-from deadtime.tuning._live import live_section
+from deadtime.tuning._live import live_design
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PARTS = ("what", "time", "95 % interval")
 
@@ -22,27 +26,23 @@ def write_flight_page(study: FlightStudy, path: Path, vehicle: str) -> Path:
 
 def render(study: FlightStudy, vehicle: str) -> str:
     """The page as text."""
-    learned = study.learned
-    body = [
-        f"<p>{escaped(_described(study, vehicle))}</p>",
-        f'<p class="verdict">{escaped(study.verdict())}</p>',
-        "<h2>Before and after</h2>",
-        _checked(study),
-        table(COLUMNS, [table_row(row, "td", len(COLUMNS)) for row in study.rows()]),
-        "<p>Settled: the mean time until a step stays within 5 %, or within three times the noise "
-        "of the height where that is more. The paper's delay is read from the overshoot, with a "
-        "gain of 1 and no lag; where it does not determine one, there is none. Missed: samples "
-        "that the control loop skipped.</p>",
-        "<h2>What the delay consists of</h2>",
-        table(PARTS, [table_row(row, "td", len(PARTS)) for row in study.parts()]),
-        f"<p>{escaped(_fitted(study))}</p>",
-        _learned(study),
-        _telemetry(study),
-        "<h2>The gains</h2>",
-        f"<pre>{escaped(learned.designed.summary())}</pre>",
-        *live_section(learned.designed),
-    ]
-    return page(f"Steps flown by {vehicle}", body)
+    designed = study.learned.designed
+    return page(
+        "flights/page.html",
+        title=f"Steps flown by {vehicle}",
+        described=_described(study, vehicle),
+        verdict=study.verdict(),
+        heads=COLUMNS,
+        rows=study.rows(),
+        parts_heads=PARTS,
+        parts=study.parts(),
+        fitted=_fitted(study),
+        checked=_checked(study),
+        learned=_learned(study),
+        telemetry=_telemetry(study),
+        gains=designed.summary(),
+        explorer=live_design(designed),
+    )
 
 
 def _described(study: FlightStudy, vehicle: str) -> str:
@@ -55,12 +55,10 @@ def _described(study: FlightStudy, vehicle: str) -> str:
     )
 
 
-def _checked(study: FlightStudy) -> str:
+def _checked(study: FlightStudy) -> Figure:
     figure, axes = new_figure(7.5, 4.6, rows=2)
     plot_checked(axes, [study.before, *study.checked])
-    return picture(
-        "checked", figure, "The first step of each flight, with the heights as received."
-    )
+    return figure
 
 
 def _fitted(study: FlightStudy) -> str:
@@ -80,25 +78,22 @@ def _fitted(study: FlightStudy) -> str:
     return words
 
 
-def _learned(study: FlightStudy) -> str:
+def _learned(study: FlightStudy) -> Figure:
     flights = study.learned.flights
     figure, axes = new_figure(7.5, 0.6 + 2.0 * len(flights), rows=len(flights), even=True)
     shown = [axes] if len(flights) == 1 else list(axes)
     plot_learned(shown, flights, study.learned.fit)
-    return picture("learned", figure, "The flights from which the delay was estimated.")
+    return figure
 
 
-def _telemetry(study: FlightStudy) -> str:
+def _telemetry(study: FlightStudy) -> Figure | None:
+    """What the vehicle reported of a step, if the delay was divided by that."""
     flight = study.before
     if study.learned.split is None or flight.telemetry is None:
-        return ""
+        return None
     telemetry = read_telemetry(flight.telemetry, flight.recording)
     if telemetry is None:
-        return ""
+        return None
     figure, axes = new_figure(7.5, 4.2, rows=2)
     plot_telemetry(axes, telemetry, flight)
-    caption = (
-        "One step as reported by the vehicle: the link from the command to the echoed setpoint, "
-        "the vehicle from there to its climb."
-    )
-    return picture("telemetry", figure, caption)
+    return figure

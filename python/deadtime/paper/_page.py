@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from deadtime._base.page import escaped, page, picture, table, table_row, write_page
+from deadtime._base.page import page, write_page
 from deadtime.loops import PV, ControlLoop, Integrator
-from deadtime.paper import TITLES, Comparison, Grid, Part, Reproduction, Verdict
+from deadtime.paper import TITLES, Comparison, Reproduction, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-STYLE = """
-body { max-width: 66rem; }
-td { vertical-align: top; }
-table.numbers td:nth-child(2), table.numbers th:nth-child(2) { text-align: left; }
-table.numbers td:last-child, table.numbers th:last-child { text-align: left; font-size: .85rem; }
-tr.good td:nth-child(5) { color: #1d7a3e; }
-tr.partly td:nth-child(5) { color: #9a6700; }
-tr.bad td:nth-child(5) { color: #b3261e; font-weight: 600; }
-tr.measured td { color: #666; }
-nav a { margin-right: .8rem; }
-"""
 
 HEADS = ("where", "what", "printed", "ours", "verdict", "why, and with which model")
 
@@ -53,6 +40,7 @@ CAPTIONS = {
 LOOP = ControlLoop(Integrator(), PV(Kp=2.0, Kv=0.3), delay=0.36, limit=1.0)
 RANGES = {"Kp": (0.0, 6.0), "Kv": (-1.0, 1.0)}
 
+#: Class of a row of the table.
 CLASSES = {
     Verdict.EXACT: "good",
     Verdict.CONFIRMED: "good",
@@ -72,42 +60,25 @@ def write_reproduction(
 
 def render_reproduction(found: Reproduction, figures: dict[str, Figure] | None = None) -> str:
     """The page as text."""
-    drawn = found.figures() if figures is None else figures
-    links = " ".join(
-        f'<a href="#{name}">{escaped(TITLES[name].split(":")[0])}</a>' for name in found.parts
+    parts = found.parts
+    return page(
+        "paper/page.html",
+        title="A paper on delays in quadrotor control, reproduced",
+        verdict=found.summary(),
+        titles=TITLES,
+        captions=CAPTIONS,
+        parts=parts,
+        figures=found.figures() if figures is None else figures,
+        heads=HEADS,
+        rows={name: list(map(_row, part.comparisons)) for name, part in parts.items()},
+        kinds={
+            name: [CLASSES[one.verdict] for one in part.comparisons] for name, part in parts.items()
+        },
+        explorer=LOOP.explore(RANGES),
     )
-    body = [
-        "<p>S. K. Armah and S. Yi, “Analysis of Time Delays in Quadrotor Systems and Design of "
-        "Control”: every printed number beside the one computed with this package. The "
-        "verdicts are computed from the digits.</p>",
-        f'<p class="verdict">{escaped(found.summary())}</p>',
-        f"<nav>{links}</nav>",
-    ]
-    for name, part in found.parts.items():
-        body += _part(name, part, drawn.get(name))
-    body += ["<h2>The loop of the paper, live</h2>", LOOP.explore(RANGES).frame]
-    return page("A paper on delays in quadrotor control, reproduced", body, STYLE)
 
 
-def _part(name: str, part: Part, figure: Figure | None) -> Iterator[str]:
-    yield f'<section id="{name}"><h2>{escaped(TITLES[name])}</h2>'
-    yield from (f"<p>{escaped(sentence)}</p>" for sentence in part.findings())
-    if figure is not None:
-        yield picture(f"{name}-drawing", figure, CAPTIONS[name])
-    if part.comparisons:
-        rows = [_compared(one) for one in part.comparisons]
-        yield table(HEADS, rows).replace("<table>", '<table class="numbers">', 1)
-    yield from (_grid(grid) for grid in part.grids())
-    yield "</section>"
-
-
-def _compared(one: Comparison) -> str:
+def _row(one: Comparison) -> tuple[str, ...]:
+    """A row of the table."""
     why = "; ".join(words for words in (one.model, one.note) if words)
-    cells = (one.where, one.quantity, one.printed, one.shown, one.outcome, why)
-    row = table_row(cells, "td", len(HEADS))
-    return row.replace("<tr>", f'<tr class="{CLASSES[one.verdict]}">', 1)
-
-
-def _grid(grid: Grid) -> str:
-    width = len(grid.heads)
-    return table(grid.heads, [table_row(row, "td", width) for row in grid.rows], grid.title)
+    return (one.where, one.quantity, one.printed, one.shown, one.outcome, why)

@@ -1,14 +1,14 @@
-"""The part of a page in which a designed loop is looked at live."""
+"""The explorer of a designed loop for a page."""
 
 from __future__ import annotations
 
+from deadtime._base.explorer import Explorer
 from deadtime.tuning._result import Design
 
 
-def live_section(design: Design) -> list[str]:
-    """Heading and explorer of the designed loop; nothing where the explorer has no such loop."""
+def live_design(design: Design) -> Explorer | None:
+    """The explorer of the designed loop; None where it has no such loop."""
     try:
-        frame = design.explore().frame
+        return design.explore()
     except ValueError:
-        return []
-    return ["<h2>The designed loop, live</h2>", frame]
+        return None

@@ -16,6 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from deadtime._base.page import write_page
+
 #: The scripts of the page; a later one uses what the earlier ones define.
 SCRIPTS = (
     *("kernels", "state", "drawing", "map_view", "panels", "recording", "controls", "downloads"),
@@ -65,7 +67,7 @@ class Explorer:
         parts = {
             "title": html.escape(self.title),
             "heading": html.escape(self.title),
-            "style": _part("page.css"),
+            "style": _theme() + _part("page.css"),
             "version": html.escape(version("deadtime")),
             "given": given,
             "kernels": _kernels(),
@@ -90,10 +92,7 @@ class Explorer:
         OSError
             If the file cannot be written.
         """
-        place = Path(path)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(self.html, encoding="utf-8")
-        return place
+        return write_page(self.html, Path(path))
 
     def show(self) -> Path:
         """Write the page to a temporary file and open it in the browser.
@@ -133,6 +132,12 @@ def kernels() -> bytes:
 @cache
 def _kernels() -> str:
     return base64.b64encode(kernels()).decode("ascii")
+
+
+@cache
+def _theme() -> str:
+    """The style that the explorer shares with the other pages."""
+    return (_PLACE.parent / "templates" / "theme.css").read_text(encoding="utf-8")
 
 
 @cache
