@@ -99,6 +99,18 @@ def test_a_rational_plant_keeps_its_gain_apart() -> None:
     assert (state["gain"], state["num"], state["den"]) == (0.5, [2.0], [1.0, 3.0, 0.0])
 
 
+def test_a_plant_of_factors_with_one_lag_has_its_slider() -> None:
+    factors = dtm.FactoredPlant([0.2], gain=0.9, integrator=True)
+    state = described(dtm.ControlLoop(factors, dtm.P(1.0), delay=0.1).specification)
+    assert (state["plant"], state["gain"], state["lag"]) == ("integrator", 0.9, 0.2)
+    factors = dtm.FactoredPlant([0.2], gain=0.9)
+    state = described(dtm.ControlLoop(factors, dtm.P(1.0), delay=0.1).specification)
+    assert (state["plant"], state["gain"], state["lag"]) == ("first_order", 0.9, 0.2)
+    factors = dtm.FactoredPlant([0.2], gain=0.9, zero=0.1)
+    state = described(dtm.ControlLoop(factors, dtm.P(1.0), delay=0.1).specification)
+    assert (state["plant"], state["num"]) == ("rational", [0.1, 1.0])
+
+
 def test_a_design_opens_with_the_interval_of_its_delay_and_stands_in_reports() -> None:
     found = dtm.design(LOOP, controller=dtm.PV, delay=(0.3, 0.4), shape=(9, 9))
     state = found.explore().state

@@ -1,5 +1,6 @@
 """The latency report, on logs with known truth and on recorded flights."""
 
+import re
 from dataclasses import replace
 
 import deadtime as dtm
@@ -8,6 +9,7 @@ import pytest
 from browser import check_page
 from deadtime._base.digits import between, rounded, shown, stated
 from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
+from deadtime.reports.latencies._live import around_the_vehicle
 from flights import flight_path
 from hypothesis import given
 from hypothesis import strategies as st
@@ -102,6 +104,8 @@ def test_summary_dict_and_page(found, tmp_path):
     intervals = told["loops"][0]["estimate"]["interval_95"]
     assert intervals == {"delay+lag": list(own.sum_of()[2])}
     page = found.report(tmp_path / "page.html").read_text(encoding="utf-8")
+    page, frames = re.subn(r"<iframe .*?</iframe>", "", page, flags=re.DOTALL)
+    assert frames == 1
     assert page.count("<svg") == 1 + len(found.estimated)
     assert "src=" not in page
     assert "<link" not in page
@@ -121,6 +125,21 @@ def test_names_from_a_log_are_text_in_the_page(found, tmp_path):
 
 def test_the_page_in_a_browser(found, tmp_path):
     check_page(found.report(tmp_path / "page.html"))
+
+
+def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_adequate(found):
+    around = around_the_vehicle(found.estimated)
+    one = found.loop("roll rate", "actuator")
+    state = around.explorer.state
+    assert (state["plant"], state["controller"], state["Kp"]) == ("integrator", "P", one.cost.flown)
+    assert state["interval"] == list(one.estimate.ci())
+    assert state["x_range"][1] > one.cost.largest
+    assert "the gain that is flown" in around.words
+    for flown, margin in ((None, None), (one.cost.flown, np.nan)):
+        other = replace(one, cost=replace(one.cost, flown=flown, delay_margin=margin))
+        assert around_the_vehicle([other]).explorer.state["Kp"] == one.cost.well_damped
+    doubted = replace(one, estimate=replace(one.estimate, adequate=False))
+    assert around_the_vehicle([doubted, found.loop("roll rate")]) is None
 
 
 def test_without_excitation_every_loop_is_refused_by_name(tmp_path):

@@ -20,6 +20,7 @@ from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
 from deadtime.loops import (
+    Controller,
     ControlLoop,
     Explorer,
     FactoredPlant,
@@ -229,8 +230,19 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         low = value - reach
         return (max(low, floor_of(name)), value + reach)
 
-    def explore(self) -> Explorer:
+    def explore(
+        self,
+        controller: Controller | None = None,
+        ranges: Mapping[str, tuple[float, float]] | None = None,
+    ) -> Explorer:
         """Return a page with the fitted loop, and the interval of its delay if it is adequate.
+
+        Parameters
+        ----------
+        controller : P, PI, PD, PV or PID, optional
+            Shown around the fitted plant instead of that of the recording.
+        ranges : mapping of str to (low, high), optional
+            As of `deadtime.ControlLoop.explore`.
 
         Returns
         -------
@@ -244,7 +256,8 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         """
         known = self.calibrated and self.adequate and "delay" in self.free
         interval = self.ci() if known else None
-        page = explorer_of(self.loop.specification, interval=interval)
+        loop = self.loop if controller is None else self.loop.replace(controller=controller)
+        page = explorer_of(loop.specification, ranges, interval)
         return page if self.adequate else replace(page, title="A fitted loop, not adequate")
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:

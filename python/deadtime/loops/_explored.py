@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from deadtime._base.explorer import Explorer
+from deadtime.loops._factored_plant import FactoredPlant
 from deadtime.loops._model import refuse_discretised
-from deadtime.loops._plants import FirstOrder, Integrator
+from deadtime.loops._plants import FirstOrder, Integrator, Plant
 from deadtime.loops._specification import LoopSpecification
 
 #: Gains on the axes reach to so many times the loop's own.
@@ -38,7 +39,7 @@ def explorer_of(
 
 def described(loop: LoopSpecification) -> dict[str, Any]:
     """The numbers of a loop by the names of the explorer; raises where that has no such loop."""
-    controller, plant = loop.controller, loop.plant
+    controller, plant = loop.controller, _simplest(loop.plant)
     if not plant.is_rational or not plant.is_linear:
         raise ValueError(
             f"{type(plant).__name__}: the explorer shows plants that are linear, and rational but "
@@ -72,6 +73,13 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
         "num": np.asarray(num / gain).tolist(),
         "den": np.asarray(den).tolist(),
     }
+
+
+def _simplest(plant: Plant) -> Plant:
+    """An integrator or a lag for a plant of factors that is one, since these have a slider."""
+    if not isinstance(plant, FactoredPlant) or len(plant.lags) != 1 or plant.has_pair or plant.zero:
+        return plant
+    return (Integrator if plant.integrator else FirstOrder)(plant.gain, plant.lags[0])
 
 
 def _ranges(loop: LoopSpecification) -> dict[str, tuple[float, float]]:

@@ -9,6 +9,7 @@ from deadtime._base.page import page
 from deadtime.recordings.logs import Link
 from deadtime.reports.latencies._budget import Stage
 from deadtime.reports.latencies._filters import FilterDelay
+from deadtime.reports.latencies._live import around_the_vehicle
 from deadtime.reports.latencies._plots import plot_fit, plot_latency
 from deadtime.reports.latencies._relation import LoopLatency
 from deadtime.reports.latencies._words import cost_in_words, numbers_of, why_inadequate
@@ -39,6 +40,7 @@ def render(
         fits=[_fit(one) for one in estimated],
         refused=[one for one in loops if one.estimate is None],
         remarks=remarks,
+        around=around_the_vehicle(estimated),
     )
 
 
