@@ -77,8 +77,20 @@ def test_results_are_shown_by_a_picture_and_their_text(name, monkeypatch):
     assert result._repr_html_() is None
 
 
-def test_what_has_no_picture_is_shown_as_text():
-    assert LOOP.replace(delay=None)._repr_html_() is None
+@pytest.mark.parametrize(
+    "loop",
+    [
+        LOOP.replace(delay=None),
+        # No step response of its own length, an impulse in it, and one that overflows.
+        dtm.ControlLoop(dtm.RateLimited(dtm.Integrator(), 1.0), dtm.P(1.0), delay=0.3),
+        dtm.ControlLoop(1 / (s + delay(0.1)), dtm.PD(1.0, 0.1), delay=0.3),
+        dtm.ControlLoop(dtm.RationalPlant([1.0], [1.0, -1.0]), dtm.P(50.0), delay=0.3, limit=1.0),
+    ],
+)
+def test_a_loop_without_a_step_response_is_shown_as_text(loop):
+    with pytest.raises(ValueError, match=r"."):
+        loop.step_response()
+    assert loop._repr_html_() is None
 
 
 def test_the_version_is_that_of_the_installed_package():

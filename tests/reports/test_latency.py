@@ -110,6 +110,7 @@ def test_summary_dict_and_page(found, tmp_path):
     assert "src=" not in page
     assert "<link" not in page
     assert found.plot().axes[0].get_xlabel().endswith("[ms]")
+    assert "roll rate, actuator to response" in found._repr_html_()
 
 
 def test_names_from_a_log_are_text_in_the_page(found, tmp_path):
@@ -149,6 +150,7 @@ def test_without_excitation_every_loop_is_refused_by_name(tmp_path):
         assert one.refusal
         assert f"{one.name}: {one.refusal}" in still.summary()
     assert "no loop in it tells" in still.headline()
+    assert still._repr_html_() is None
     with pytest.raises(ValueError, match="no loop tells how long"):
         still.plot()
 

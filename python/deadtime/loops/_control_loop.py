@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
 
 from deadtime._base.drawing import new_figure
+from deadtime._base.errors import DeadtimeError
 from deadtime._base.explorer import Explorer
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import non_negative
@@ -203,11 +204,13 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         return explorer_of(self.specification, ranges)
 
     def _picture(self) -> Figure | None:
-        """The step response, for a notebook."""
-        if self.delay is None:
+        """The step response, for a notebook; None for a loop that has none."""
+        try:
+            response = self.step_response()
+        except (ValueError, DeadtimeError):
             return None
         figure, axes = new_figure()
-        self.step_response().plot(axes, inputs=True)
+        response.plot(axes, inputs=True)
         return figure
 
 
