@@ -6,7 +6,7 @@ import asyncio
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Self
 
 from deadtime._base.errors import FlightAbortedError, LinkError
 from deadtime._base.validation import finite
@@ -23,6 +23,7 @@ from deadtime.links.ardrone2.reader import (
 )
 from deadtime.links.clock import now
 from deadtime.links.safety import Limits, UnitCommand
+from deadtime.links.uninterrupted import note, uninterrupted
 from deadtime.links.vehicle import VehicleState
 
 #: Longest wait for the first navdata, and for the end of bootstrap, s.
@@ -154,7 +155,7 @@ class ARDrone2:
         try:
             await self._configure()
         except BaseException as error:
-            _note(error, await self._settings.put_back(self._link))
+            note(error, await self._settings.put_back(self._link))
             self._link.shut()
             raise
 
@@ -361,7 +362,7 @@ class ARDrone2:
             If it has landed and its settings could not be restored.
         """
         try:
-            await _uninterrupted(self._end())
+            await uninterrupted(self._end())
         finally:
             self._link.shut()
             self._vz_max = None
@@ -370,7 +371,7 @@ class ARDrone2:
         try:
             await self.land()
         except LinkError as error:
-            _note(error, await self._settings.put_back(self._link))
+            note(error, await self._settings.put_back(self._link))
             raise
         kept = await self._settings.put_back(self._link)
         if kept is not None:
@@ -437,13 +438,7 @@ class ARDrone2:
         except LinkError as problem:
             if error is None:
                 raise
-            _note(error, str(problem), *getattr(problem, "__notes__", ()))
-
-
-def _note(error: BaseException, *notes: str | None) -> None:
-    for note in notes:
-        if note is not None:
-            error.add_note(note)
+            note(error, str(problem), *getattr(problem, "__notes__", ()))
 
 
 def _is_up(navdata: Navdata) -> bool:
@@ -452,26 +447,3 @@ def _is_up(navdata: Navdata) -> bool:
 
 def _has_state(navdata: Navdata) -> bool:
     return navdata.demo is not None
-
-
-async def _uninterrupted(landing: Any) -> None:
-    """Complete a landing, which takes a bounded time, before a cancellation takes effect."""
-    task = asyncio.ensure_future(landing)
-    interrupted = False
-    while not task.done():
-        try:
-            await asyncio.shield(task)
-        except asyncio.CancelledError:
-            if task.cancelled():
-                raise
-            interrupted = True
-        except LinkError:
-            break
-    if not interrupted:
-        task.result()
-        return
-    cancelled = asyncio.CancelledError()
-    problem = task.exception()
-    if problem is not None:
-        _note(cancelled, str(problem), *getattr(problem, "__notes__", ()))
-    raise cancelled
