@@ -1,0 +1,7 @@
+"""Multicopters with ArduPilot or PX4, over MAVLink 2."""
+
+from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink.client import MAVLinkVehicle
+from deadtime.links.mavlink.time_sync import LinkTime
+
+__all__ = ["LinkAddress", "LinkTime", "MAVLinkVehicle"]

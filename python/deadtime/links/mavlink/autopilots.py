@@ -1,0 +1,218 @@
+"""What ArduPilot and PX4 do differently: modes, failsafes, parameters, take-off.
+
+ArduPilot Copter is flown in the tests; PX4 stands here as its documentation has it and is tested
+against frames and a stand-in only.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+from deadtime._base.errors import LinkError
+from deadtime.links.mavlink.codec import dialect
+from deadtime.links.mavlink.parameters import Parameters
+from deadtime.links.safety import Limits
+
+#: Longest time for which the vehicle follows an old set point, s.
+SILENCE = 0.5
+
+#: Time without heartbeats after which ArduPilot lands, s: the least that it accepts.
+HEARTBEATS_LOST = 2.0
+
+
+def _numbered(first: int, names: str) -> dict[int, str]:
+    return dict(enumerate(names.split(), first))
+
+
+#: Names of modes: ``custom_mode`` of ArduPilot Copter; main modes of PX4, and those of its AUTO.
+COPTER_MODES = _numbered(
+    0,
+    "STABILIZE ACRO ALT_HOLD AUTO GUIDED LOITER RTL CIRCLE POSITION LAND OF_LOITER DRIFT - SPORT "
+    "FLIP AUTOTUNE POSHOLD BRAKE THROW AVOID_ADSB GUIDED_NOGPS SMART_RTL FLOWHOLD FOLLOW ZIGZAG "
+    "SYSTEMID AUTOROTATE AUTO_RTL TURTLE",
+)
+PX4_MODES = _numbered(1, "MANUAL ALTCTL POSCTL AUTO ACRO OFFBOARD STABILIZED RATTITUDE")
+PX4_AUTO_MODES = _numbered(1, "READY TAKEOFF LOITER MISSION RTL LAND")
+
+
+class Autopilot(ABC):
+    """Conventions of one firmware.
+
+    Attributes
+    ----------
+    name : str
+    guided, landing : int
+        ``custom_mode`` in which set points are followed, and in which it lands.
+    arming : int
+        Mode in which it is armed and takes off. Where it is not `guided`, that is entered after the
+        take-off, and only while set points are sent.
+    integers_as_bits : bool
+        Whether the float of a parameter carries the bits of an integer, not the number.
+    estimator : str
+        Message with the flags of its position estimate.
+    """
+
+    name: ClassVar[str]
+    guided: ClassVar[int]
+    landing: ClassVar[int]
+    arming: ClassVar[int]
+    integers_as_bits: ClassVar[bool]
+    estimator: ClassVar[str]
+
+    @abstractmethod
+    def mode(self, custom: int) -> tuple[float, ...]:
+        """Parameters of MAV_CMD_DO_SET_MODE."""
+
+    @abstractmethod
+    def mode_name(self, custom: int) -> str:
+        """A mode in words."""
+
+    @abstractmethod
+    def take_off(self, height: float, position: Any) -> tuple[float, ...]:
+        """Parameters of MAV_CMD_NAV_TAKEOFF; `position` is the GLOBAL_POSITION_INT or None."""
+
+    @abstractmethod
+    async def set_limits(self, parameters: Parameters, limits: Limits, system: int) -> float:
+        """Set limits and failsafes; return the time for which it follows an old set point, s.
+
+        Raises
+        ------
+        LinkError
+            If it does not keep one of them.
+        """
+
+
+class ArduPilot(Autopilot):
+    """ArduPilot Copter: GUIDED. Its parameters are numbers, also the integers."""
+
+    name = "ArduPilot"
+    guided, landing, arming = 4, 9, 4
+    integers_as_bits = False
+    estimator = "EKF_STATUS_REPORT"
+
+    def mode(self, custom: int) -> tuple[float, ...]:
+        """As in `Autopilot`."""
+        return 1.0, float(custom)
+
+    def mode_name(self, custom: int) -> str:
+        """As in `Autopilot`."""
+        return COPTER_MODES.get(custom, f"mode {custom}")
+
+    def take_off(self, height: float, position: Any) -> tuple[float, ...]:
+        """Above home, where it was armed."""
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height
+
+    async def set_limits(self, parameters: Parameters, limits: Limits, system: int) -> float:
+        """Set points expire, lost heartbeats land it, the fence is above `max_height`.
+
+        The fence keeps a distance of FENCE_MARGIN to its top, and what an old set point climbs is
+        added. Fence and tilt are only made stricter.
+        """
+        station = await parameters.read("SYSID_MYGCS")
+        if station is None:
+            station = await parameters.read("MAV_GCS_SYSID")  # its name since 4.7
+        if station is None:
+            raise LinkError("the vehicle does not answer for its SYSID_MYGCS")
+        if station != system:
+            raise LinkError(
+                f"the vehicle watches the heartbeats of system {station:g} (SYSID_MYGCS), and "
+                f"this end is system {system}: connect as that, or change the parameter"
+            )
+        silence = await _at_most(parameters, SILENCE, "GUID_TIMEOUT")
+        await parameters.set("FS_GCS_TIMEOUT", HEARTBEATS_LOST)
+        await parameters.set("FS_GCS_ENABLE", 5.0)  # always land
+        margin = await parameters.read("FENCE_MARGIN") or 0.0
+        top = limits.max_height + limits.max_climb * silence + margin
+        kinds, fenced = await parameters.read("FENCE_TYPE"), await parameters.read("FENCE_ENABLE")
+        if kinds is None or fenced is None:
+            raise LinkError("the vehicle does not answer for its fence (FENCE_TYPE, FENCE_ENABLE)")
+        if fenced:
+            held = await parameters.read("FENCE_ALT_MAX")
+            top = min(top, held) if held is not None and int(kinds) & 1 else top
+        await parameters.set("FENCE_ALT_MAX", top)
+        await parameters.set("FENCE_TYPE", float(int(kinds) | 1 if fenced else 1))
+        await parameters.set("FENCE_ACTION", 2.0)  # land; the default climbs and returns
+        await parameters.set("FENCE_ENABLE", 1.0)
+        degrees = max(10.0, math.degrees(limits.max_angle))
+        if await parameters.read("ANGLE_MAX") is not None:
+            await _at_most(parameters, 100.0 * degrees, "ANGLE_MAX")
+        else:
+            await _at_most(parameters, degrees, "ATC_ANGLE_MAX")  # its name since 4.7
+        return silence
+
+
+class PX4(Autopilot):
+    """PX4: Offboard. Its parameters of integers carry their bits in the float."""
+
+    name = "PX4"
+    guided, landing, arming = 6 << 16, 4 << 16 | 6 << 24, 4 << 16 | 3 << 24
+    integers_as_bits = True
+    estimator = "ESTIMATOR_STATUS"
+
+    def mode(self, custom: int) -> tuple[float, ...]:
+        """As in `Autopilot`."""
+        return 1.0, float(custom >> 16 & 0xFF), float(custom >> 24)
+
+    def mode_name(self, custom: int) -> str:
+        """As in `Autopilot`."""
+        main, sub = custom >> 16 & 0xFF, custom >> 24
+        name = PX4_MODES.get(main, f"mode {main}")
+        return f"AUTO.{PX4_AUTO_MODES.get(sub, str(sub))}" if name == "AUTO" else name
+
+    def take_off(self, height: float, position: Any) -> tuple[float, ...]:
+        """Above the sea; where it stands, as it is turned."""
+        if position is None:
+            raise LinkError("the vehicle sends no GLOBAL_POSITION_INT, so its altitude is unknown")
+        here = math.nan
+        return 0.0, 0.0, 0.0, here, here, here, 1e-3 * position.alt + height
+
+    async def set_limits(self, parameters: Parameters, limits: Limits, system: int) -> float:
+        """Without set points it holds, without heartbeats it lands; the fence lands it too."""
+        silence = await _at_most(parameters, SILENCE, "COM_OF_LOSS_T")
+        await parameters.set("COM_OBL_RC_ACT", 5.0)  # hold
+        await parameters.set("COM_DL_LOSS_T", 5.0)  # s, the least that it accepts
+        await parameters.set("NAV_DLL_ACT", 3.0)  # land
+        await parameters.set("GF_MAX_VER_DIST", limits.max_height + limits.max_climb * silence)
+        await parameters.set("GF_ACTION", 5.0)  # land
+        degrees = max(20.0, math.degrees(limits.max_angle))
+        await _at_most(parameters, degrees, "MPC_TILTMAX_AIR")
+        return silence
+
+
+async def _at_most(parameters: Parameters, most: float, name: str) -> float:
+    """Lower a parameter to a value, if it is higher; return what holds."""
+    held = await parameters.read(name)
+    if held is None:
+        raise LinkError(f"the vehicle does not answer for its {name}")
+    if 0.0 < held <= most:
+        return held
+    await parameters.set(name, most)
+    return most
+
+
+def autopilot_of(heartbeat: Any) -> Autopilot:
+    """The conventions of the firmware that sends a heartbeat.
+
+    Raises
+    ------
+    LinkError
+        If it is another one, or the vehicle no multicopter.
+    """
+    d = dialect()
+    if heartbeat.type not in COPTERS:
+        raise LinkError(
+            f"the vehicle is of type {heartbeat.type}: only multicopters are flown (MAV_TYPE)"
+        )
+    if heartbeat.autopilot == d.MAV_AUTOPILOT_ARDUPILOTMEGA:
+        return ArduPilot()
+    if heartbeat.autopilot == d.MAV_AUTOPILOT_PX4:
+        return PX4()
+    raise LinkError(
+        f"the autopilot is number {heartbeat.autopilot}: only ArduPilot (3) and PX4 (12) are flown"
+    )
+
+
+#: MAV_TYPE of quadrotor, coaxial, hexarotor, octorotor, tricopter, and decarotor/dodecarotor.
+COPTERS = (2, 3, 13, 14, 15, 29, 35)

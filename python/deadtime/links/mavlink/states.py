@@ -1,0 +1,146 @@
+"""`VehicleState` from the messages of a vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any
+
+from deadtime.links.mavlink.codec import dialect
+from deadtime.links.vehicle import VehicleState
+
+#: MAV_LANDED_STATE.
+UNKNOWN, ON_GROUND, IN_AIR = 0, 1, 2
+
+#: Flags of a position estimate: horizontal and vertical position absolute; bit 7 is "constant".
+ESTIMATED, CONSTANT = 16 | 32, 128
+
+#: Time over which lost frames are looked at, s.
+RECENT = 1.0
+
+#: Flags of MAV_MODE_FLAG and values of MAV_STATE.
+ARMED, CRITICAL, EMERGENCY, TERMINATED = 128, 5, 6, 8
+
+
+class StateReader:
+    """Collects the state of one vehicle; each LOCAL_POSITION_NED completes one.
+
+    Heights are above the place where the vehicle last stood: ArduPilot moves the zero of its
+    positions when it is armed.
+
+    Attributes
+    ----------
+    newest : VehicleState or None
+    mode : int or None
+        ``custom_mode`` of the newest heartbeat.
+    armed : bool or None
+    landed_state : int
+        MAV_LANDED_STATE.
+    ready : bool
+        Whether it knows its position.
+    """
+
+    def __init__(self, estimator: str = "") -> None:
+        self.estimator = estimator
+        self.newest: VehicleState | None = None
+        self.mode: int | None = None
+        self.armed: bool | None = None
+        self.landed_state = 0
+        self.ready = False
+        self._ground = 0.0
+        self._status = 0
+        self._battery: float | None = None
+        self._attitude = (0.0, 0.0)
+        self._setpoint: float | None = None
+        self._frames = 0
+        self._sequence: int | None = None
+        self._gaps: deque[tuple[float, int]] = deque()
+
+    def take(self, message: Any, time: float) -> VehicleState | None:
+        """Take a message that arrived at a time, s; return the state that it completes."""
+        self._count(message.get_seq(), time)
+        kind = message.get_type()
+        if kind == "HEARTBEAT":
+            self.mode, self._status = int(message.custom_mode), int(message.system_status)
+            self.armed = bool(message.base_mode & ARMED)
+        elif kind == "EXTENDED_SYS_STATE":
+            self.landed_state = int(message.landed_state)
+        elif kind == "ATTITUDE":
+            self._attitude = float(message.roll), float(message.pitch)
+        elif kind == "SYS_STATUS":
+            left = int(message.battery_remaining)
+            self._battery = None if left < 0 else float(left)
+        elif kind == "POSITION_TARGET_LOCAL_NED":
+            self._setpoint = _finite(-message.vz)
+        elif kind == self.estimator:
+            flags = int(message.flags)
+            self.ready = flags & ESTIMATED == ESTIMATED and not flags & CONSTANT
+        elif kind == "LOCAL_POSITION_NED":
+            return self._complete(message, time)
+        return None
+
+    def _count(self, sequence: int, time: float) -> None:
+        """Count frames and gaps; an old frame that comes late is none."""
+        passed = 1 if self._sequence is None else (sequence - self._sequence) % 256
+        if passed == 0 or passed > 128:
+            return
+        self._sequence = sequence
+        self._frames += passed
+        if passed > 1:
+            self._gaps.append((time, passed - 1))
+        while self._gaps and self._gaps[0][0] < time - RECENT:
+            self._gaps.popleft()
+
+    def _complete(self, message: Any, time: float) -> VehicleState | None:
+        stamp = 1e-3 * message.time_boot_ms
+        before = self.newest
+        restarted = before is not None and stamp < (before.vehicle_time or 0.0) - 5.0
+        if self.armed is None or self.landed_state == UNKNOWN:
+            return None
+        if before is not None and stamp <= (before.vehicle_time or 0.0) and not restarted:
+            return None  # a copy, or overtaken by a newer one
+        if self.landed_state == ON_GROUND:
+            self._ground = float(message.z)
+        roll, pitch = self._attitude
+        self.newest = VehicleState(
+            time=time,
+            height=self._ground - float(message.z),
+            flying=bool(self.armed) and self.landed_state == IN_AIR,
+            landed=self.armed is False and self.landed_state == ON_GROUND,
+            sequence=self._frames,
+            vehicle_time=stamp,
+            climb=-float(message.vz),
+            climb_setpoint=self._setpoint,
+            roll=roll,
+            pitch=pitch,
+            battery=self._battery,
+            emergency=self._emergency,
+            fault="a failsafe of its own is active" if self._status == CRITICAL else None,
+            missing=max((lost for _, lost in self._gaps), default=0),
+        )
+        return self.newest
+
+    @property
+    def _emergency(self) -> bool:
+        off = self.armed is False and self.landed_state == IN_AIR
+        return off or self._status in (EMERGENCY, TERMINATED)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def wanted_messages(estimator: str) -> dict[str, tuple[int, float]]:
+    """The messages that are asked for: number, and rate in 1/s."""
+    d = dialect()
+    rates = {
+        "LOCAL_POSITION_NED": 50.0,
+        "POSITION_TARGET_LOCAL_NED": 50.0,
+        "ATTITUDE": 25.0,
+        "EXTENDED_SYS_STATE": 10.0,
+        "HEARTBEAT": 5.0,
+        "SYS_STATUS": 2.0,
+        "GLOBAL_POSITION_INT": 2.0,
+        estimator: 2.0,
+    }
+    return {name: (getattr(d, f"MAVLINK_MSG_ID_{name}"), rate) for name, rate in rates.items()}

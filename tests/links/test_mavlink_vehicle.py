@@ -1,0 +1,479 @@
+"""A MAVLink vehicle against a stand-in for ArduPilot and PX4, in virtual time."""
+
+import asyncio
+
+import pytest
+
+pytest.importorskip("pymavlink", reason="pymavlink is the codec")
+
+from deadtime import FlightAbortedError, LinkError
+from deadtime.links import Limits, now, run
+from deadtime.links.mavlink import MAVLinkVehicle
+from pymavlink.dialects.v20 import ardupilotmega as d
+from stand_in_autopilot import MODES, StandIn
+
+ADDRESS = "udp:127.0.0.1:14550"
+LIMITS = Limits(max_climb=1.0)
+FIRMWARES = ["ardupilot", "px4"]
+
+
+async def told(link, speed, seconds):
+    """Command one speed as a controller does."""
+    for _ in range(round(seconds / 0.065)):
+        link.command(speed)
+        await asyncio.sleep(0.065)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_whole_flight(firmware):
+    async def flight():
+        async with StandIn(firmware) as vehicle:
+            before = dict(vehicle.parameters)
+            async with MAVLinkVehicle(ADDRESS, LIMITS) as link:
+                assert link.autopilot == {"ardupilot": "ArduPilot", "px4": "PX4"}[firmware]
+                assert not vehicle.armed
+                changed = dict(vehicle.parameters)
+                assert changed != before
+                await link.take_off()
+                state = await link.state()
+                assert state.flying
+                assert state.height == pytest.approx(vehicle.height, abs=0.03)
+                assert state.height == pytest.approx(1.0, abs=0.15)
+                await told(link, 0.3, 2.0)
+                state = await link.state()
+                assert state.climb == pytest.approx(0.3, abs=0.01)
+                assert state.climb_setpoint == pytest.approx(0.3)
+                assert state.height == pytest.approx(vehicle.height, abs=0.03)
+                await link.land()
+                assert vehicle.height == 0.0
+                assert not vehicle.armed
+                await link.take_off()  # and again over the same link
+                await link.land()
+                assert (await link.state()).landed
+            assert vehicle.parameters == before
+            return changed
+
+    changed = run(flight())
+    if firmware == "ardupilot":
+        assert changed["GUID_TIMEOUT"] == 0.5
+        assert changed["FS_GCS_ENABLE"] == 5
+        # The margin, and what an old set point may climb, are above the largest height.
+        assert changed["FENCE_ALT_MAX"] == pytest.approx(3.0 + 2.0 + 0.5)
+        assert (changed["FENCE_TYPE"], changed["FENCE_ACTION"], changed["FENCE_ENABLE"]) == (
+            1,
+            2,
+            1,
+        )
+        assert changed["ANGLE_MAX"] == pytest.approx(1500.0, rel=1e-6)
+    else:
+        assert (changed["COM_OF_LOSS_T"], changed["COM_OBL_RC_ACT"]) == (0.5, 5)
+        assert (changed["NAV_DLL_ACT"], changed["GF_ACTION"]) == (3, 5)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_the_limits_of_a_vehicle_are_only_made_stricter(firmware):
+    strict = {
+        "ardupilot": {"GUID_TIMEOUT": 0.2, "ANGLE_MAX": 1100.0},
+        "px4": {"COM_OF_LOSS_T": 0.3},
+    }
+
+    async def connected():
+        async with StandIn(firmware) as vehicle:
+            vehicle.parameters.update(strict[firmware])
+            if firmware == "ardupilot":
+                vehicle.parameters |= {"FENCE_ENABLE": 1.0, "FENCE_ALT_MAX": 4.0}
+            async with MAVLinkVehicle(ADDRESS, LIMITS):
+                for name, value in strict[firmware].items():
+                    assert vehicle.parameters[name] == value
+                if firmware == "ardupilot":
+                    assert vehicle.parameters["FENCE_ALT_MAX"] == 4.0
+                    assert vehicle.parameters["FENCE_TYPE"] == 7.0
+
+    run(connected())
+
+
+def test_commands_are_bounded_and_expire():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            with pytest.raises(LinkError, match="not in the air"):
+                link.command(0.1)
+            await link.take_off()
+            assert link.command(7.0) == 1.0
+            assert link.command(-7.0) == -1.0
+            with pytest.raises(ValueError, match="finite"):
+                link.command(float("nan"))
+            assert link.command(0.4) == 0.4
+            given = vehicle.time
+            await asyncio.sleep(0.9)
+            late = [speed for time, speed in vehicle.set_points if time > given + 0.31]
+            assert late
+            assert set(late) == {0.0}
+            await asyncio.sleep(0.3)
+            with pytest.raises(FlightAbortedError, match="no command for"):
+                link.command(0.1)
+            await asyncio.sleep(0.3)
+            assert vehicle.mode == vehicle.landing
+            await asyncio.sleep(4.0)
+            assert not vehicle.armed
+
+    run(flight())
+
+
+def test_a_ground_station_that_falls_silent_is_survived_by_the_vehicle_alone():
+    async def flight():
+        async with StandIn() as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            link.command(1.0)
+            await asyncio.sleep(0.01)
+            vehicle.drop = lambda message: message.get_srcSystem() == 255
+            silent = vehicle.time
+            await asyncio.sleep(0.45)
+            assert vehicle.told == 1.0
+            await asyncio.sleep(0.1)
+            assert vehicle.told == 0.0
+            while vehicle.mode != vehicle.landing:
+                await asyncio.sleep(0.05)
+            assert vehicle.time - silent < 2.0 + 1.0
+            link._shut()
+
+    run(flight())
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_vehicle_that_is_armed_is_not_taken_over(firmware):
+    async def armed_before():
+        async with StandIn(firmware, armed=True) as vehicle:
+            with pytest.raises(LinkError, match="armed already"):
+                await MAVLinkVehicle(ADDRESS, LIMITS).connect()
+            assert not vehicle.commands
+            assert vehicle.armed
+
+    async def armed_later():
+        async with StandIn(firmware) as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            vehicle.armed = True
+            await asyncio.sleep(0.5)
+            with pytest.raises(LinkError, match="armed already"):
+                await link.take_off()
+            assert d.MAV_CMD_COMPONENT_ARM_DISARM not in [number for number, _ in vehicle.commands]
+
+    run(armed_before())
+    run(armed_later())
+
+
+def test_what_somebody_else_disarmed_is_not_armed_again():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            vehicle.armed = True
+            await asyncio.sleep(1.5)
+            vehicle.armed = False
+            await asyncio.sleep(0.5)
+            with pytest.raises(LinkError, match="disarmed, and not from here"):
+                await link.take_off()
+            assert not vehicle.armed
+
+    run(flight())
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("mode", ["landing", "other"])
+def test_another_ground_station_takes_over(firmware, mode):
+    """It is obeyed at once: no further set point, no landing command of ours, parameters back."""
+
+    async def flight():
+        async with StandIn(firmware) as vehicle:
+            before = dict(vehicle.parameters)
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            await told(link, 0.2, 1.0)
+            station = d.MAVLink(None, 254, 190)
+            hello = d.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station)
+            vehicle._transport.sendto(hello, vehicle.ground)
+            vehicle.change_mode(getattr(vehicle, mode))
+            changed = vehicle.time
+            del vehicle.commands[:]
+            with pytest.raises(FlightAbortedError, match="system 254, component 190") as caught:
+                await told(link, 0.2, 3.0)
+            assert "no set points are sent any more" in str(caught.value)
+            assert vehicle.time - changed < 0.4
+            last = vehicle.set_points[-1][0]
+            if mode == "landing":
+                await link.close()
+                assert vehicle.height == 0.0
+            else:
+                with pytest.raises(LinkError, match="was not commanded to land"):
+                    await link.close()
+                assert vehicle.mode == vehicle.other
+                assert vehicle.armed
+            assert vehicle.set_points[-1][0] == last
+            assert not vehicle.commands
+            assert vehicle.parameters == before
+
+    run(flight())
+
+
+def test_a_pilot_who_interrupts_the_landing_is_obeyed():
+    async def flight():
+        async with StandIn() as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            landing = asyncio.create_task(link.land())
+            await asyncio.sleep(0.8)
+            assert vehicle.mode == vehicle.landing
+            vehicle.change_mode(vehicle.other)
+            with pytest.raises(LinkError, match="went to LOITER"):
+                await landing
+            await asyncio.sleep(1.0)
+            assert vehicle.mode == vehicle.other
+            link._shut()
+            await asyncio.sleep(0.1)
+            assert vehicle.mode == vehicle.other
+
+    run(flight())
+
+
+def test_others_on_the_link_are_ignored_and_named():
+    """Another component of the vehicle, another vehicle, and a datagram from another address."""
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS, vehicle=1) as link:
+            other = d.MAVLink(None, 7, 1)
+            camera = d.MAVLink(None, 1, 100)
+            away = d.MAVLink_local_position_ned_message(10**9, 0, 0, -500, 0, 0, 0)
+            armed = d.MAVLink_heartbeat_message(2, 3, 128, 4, 4, 3)
+            for message in (away, armed):
+                vehicle._transport.sendto(message.pack(other), vehicle.ground)
+                vehicle._transport.sendto(message.pack(camera), vehicle.ground)
+            async with StandIn() as elsewhere:
+                elsewhere.send(away)
+                await asyncio.sleep(0.1)
+            state = await link.state()
+            assert state.height == 0.0
+            assert state.landed
+            assert link.foreign == [
+                "another vehicle, system 7, component 1 (2 frames)",
+                "another component, system 1, component 100 (2 frames)",
+            ]
+            assert link._link.senders.elsewhere >= 1
+
+    run(flight())
+
+
+def test_of_several_vehicles_one_has_to_be_named():
+    async def connected(**options):
+        async with StandIn() as vehicle:
+            other = d.MAVLink(None, 7, 1)
+            hello = d.MAVLink_heartbeat_message(2, 3, 0, 4, 3, 3).pack(other)
+            task = asyncio.create_task(MAVLinkVehicle(ADDRESS, LIMITS, **options).connect())
+            await asyncio.sleep(0.05)
+            vehicle._transport.sendto(hello, vehicle.ground)
+            await task
+
+    with pytest.raises(LinkError, match="several vehicles"):
+        run(connected())
+
+
+def test_a_vehicle_that_follows_another_station_is_refused():
+    async def connected():
+        async with StandIn() as vehicle:
+            vehicle.parameters["SYSID_MYGCS"] = 200.0
+            before = dict(vehicle.parameters)
+            with pytest.raises(LinkError, match="system 200"):
+                await MAVLinkVehicle(ADDRESS, LIMITS).connect()
+            assert vehicle.parameters == before
+
+    run(connected())
+
+
+def test_a_parameter_that_is_not_kept_is_refused_and_the_others_put_back():
+    async def connected():
+        async with StandIn() as vehicle:
+            before = dict(vehicle.parameters)
+            vehicle.drop = lambda m: m.get_type() == "PARAM_SET" and m.param_id == "FENCE_ACTION"
+            with pytest.raises(LinkError, match="does not keep FENCE_ACTION = 2"):
+                await MAVLinkVehicle(ADDRESS, LIMITS).connect()
+            assert vehicle.parameters == before
+
+    run(connected())
+
+
+def test_nobody_there():
+    with pytest.raises(LinkError, match="no vehicle sends heartbeats"):
+        run(MAVLinkVehicle(ADDRESS, LIMITS).connect())
+    with pytest.raises(LinkError, match="cannot be opened"):
+        run(MAVLinkVehicle("tcp:127.0.0.1:5760", LIMITS).connect())
+
+
+def test_the_reason_why_it_does_not_arm_is_told():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            task = asyncio.create_task(link.take_off())
+            await asyncio.sleep(1.0)
+            vehicle.ready = False  # it is ready by its report, and then refuses
+            with pytest.raises(LinkError, match='does not arm; the vehicle says "PreArm: no pos'):
+                await task
+            assert vehicle.height == 0.0
+
+    async def soon_ready():
+        async with StandIn() as vehicle:
+            vehicle._arm, arm = (
+                (lambda value: 4 if vehicle.time < 30.0 else arm(value)),
+                vehicle._arm,
+            )
+            async with MAVLinkVehicle(ADDRESS, LIMITS) as link:
+                await link.take_off()
+
+    run(soon_ready())
+
+
+def test_a_lost_link_ends_the_flight():
+    async def flight():
+        async with StandIn() as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            await told(link, 0.1, 0.5)
+            begin = now()
+            vehicle.drop = lambda message: True
+            with pytest.raises(LinkError, match="nothing received"):
+                await told(link, 0.1, 5.0)
+            assert now() - begin < 1.2
+            with pytest.raises(LinkError, match="while landing"):
+                await link.close()
+            # The failsafes remain in the vehicle, and have landed it.
+            assert vehicle.parameters["FS_GCS_ENABLE"] == 5.0
+            await asyncio.sleep(3.0)
+            assert not vehicle.armed
+
+    run(flight())
+
+
+def test_loss_of_every_fourth_message_is_overcome():
+    async def flight():
+        async with StandIn() as vehicle:
+            count = iter(range(10**9))
+            vehicle.drop = lambda message: next(count) % 4 == 3
+            before = dict(vehicle.parameters)
+            async with MAVLinkVehicle(ADDRESS, LIMITS) as link:
+                await link.take_off()
+                await told(link, 0.2, 3.0)
+                state = await link.state()
+                assert 1 <= state.missing <= 5
+                assert state.climb == pytest.approx(0.2, abs=0.01)
+            assert vehicle.parameters == before
+            assert not vehicle.armed
+
+    run(flight())
+
+
+def test_the_round_trip_of_the_link_is_measured():
+    """The stand-in answers at once, on a clock that is 20 s ahead."""
+
+    async def connected():
+        async with StandIn(), MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await asyncio.sleep(2.0)
+            return link.link_time, now()
+
+    found, _ = run(connected())
+    assert found.median == pytest.approx(0.0, abs=1e-9)
+    assert found.offset == pytest.approx(20.0, abs=1e-6)
+    assert found.answers > 15
+    assert found.lost == 0
+
+
+def test_a_signed_link_refuses_what_is_not_signed():
+    key = bytes(range(32))
+
+    async def flight(**options):
+        async with StandIn(**options), MAVLinkVehicle(ADDRESS, LIMITS, key=key) as link:
+            await link.take_off()
+
+    run(flight(key=key))
+    for options in ({}, {"key": bytes(32)}):
+        with pytest.raises(LinkError, match="no vehicle sends"):
+            run(flight(**options))
+
+
+def test_the_faults_of_a_vehicle_are_reported():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            vehicle.battery = 12
+            await asyncio.sleep(1.0)
+            with pytest.raises(LinkError, match="12 % of battery"):
+                await link.take_off()
+            vehicle.battery, vehicle.status = 80, 5
+            await asyncio.sleep(1.0)
+            with pytest.raises(LinkError, match="failsafe of its own is active"):
+                await link.take_off()
+            vehicle.status = None
+            await asyncio.sleep(1.0)
+            await link.take_off()
+            vehicle.status = 6
+            await asyncio.sleep(0.5)
+            assert (await link.state()).emergency
+            vehicle.status = None
+
+    run(flight())
+
+
+def test_a_listener_gets_every_state_and_its_error_is_raised():
+    async def flight():
+        async with StandIn(), MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            states = []
+            link.listen(states.append)
+            await asyncio.sleep(1.0)
+            link.listen(None)
+            assert len(states) == pytest.approx(50, abs=3)
+            times = [state.vehicle_time for state in states]
+            assert times == sorted(set(times))
+            link.listen(lambda state: 1 / 0)
+            await asyncio.sleep(0.1)
+            with pytest.raises(LinkError, match="listener"):
+                await link.state()
+
+    run(flight())
+
+
+def test_addresses_and_options_are_checked():
+    for address in ("udp:", "udp:127.0.0.1", "ftp:127.0.0.1:80", "tcp:host:70000"):
+        with pytest.raises(ValueError, match="give udp:HOST:PORT"):
+            MAVLinkVehicle(address)
+    with pytest.raises(ValueError, match="take_off_height"):
+        MAVLinkVehicle(ADDRESS, take_off_height=4.0)
+    with pytest.raises(ValueError, match="system=0"):
+        MAVLinkVehicle(ADDRESS, system=0)
+    with pytest.raises(ValueError, match="key of 3 bytes"):
+        MAVLinkVehicle(ADDRESS, key=b"key")
+
+
+def test_a_flight_ends_on_the_ground_also_when_the_program_is_interrupted():
+    async def flight():
+        async with StandIn() as vehicle:
+
+            async def interrupted():
+                async with MAVLinkVehicle(ADDRESS, LIMITS) as link:
+                    await link.take_off()
+                    await told(link, 0.1, 20.0)
+
+            task = asyncio.create_task(interrupted())
+            while vehicle.height < 0.95:
+                await asyncio.sleep(0.1)
+            await asyncio.sleep(1.0)
+            task.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await task
+            assert not vehicle.armed
+            assert vehicle.parameters["FS_GCS_ENABLE"] == 0.0
+
+    run(flight())
+
+
+def test_modes_have_the_names_of_their_firmware():
+    from deadtime.links.mavlink.autopilots import PX4, ArduPilot
+
+    assert ArduPilot().mode_name(MODES["ardupilot"][1]) == "LAND"
+    assert PX4().mode_name(MODES["px4"][1]) == "AUTO.LAND"
+    assert PX4().mode_name(MODES["px4"][0]) == "OFFBOARD"
