@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -13,8 +9,6 @@ import typer
 
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
-from deadtime._cli.landing import run_landing, terminated_like_interrupted
-from deadtime._cli.own_emulator import own_emulator
 from deadtime._cli.show import (
     ERRORS,
     as_json_text,
@@ -24,25 +18,22 @@ from deadtime._cli.show import (
     results_table,
     stages,
 )
-from deadtime.flights import FlightPlan, FlightStudy, FlownSteps, fly_experiment
-from deadtime.flights._fly import Connect
+from deadtime._cli.vehicles import flown_vehicle
+from deadtime.flights import FlightPlan, FlightStudy, fly_experiment
 from deadtime.flights._learn import COLUMNS
 from deadtime.flights._page import PARTS, write_flight_page
-from deadtime.links import Limits, Vehicle
-from deadtime.links import run as run_virtual
-from deadtime.links.ardrone2 import ARDrone2
-from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
+from deadtime.links import Limits
 from deadtime.links.ardrone2.emulator.motion import PlantName
+from deadtime.links.mavlink import LinkAddress
 
-#: Largest commanded climb in m/s: on an emulator, as in the paper, and on a drone, which can hurt.
+#: Largest commanded climb in m/s: on this computer, as in the paper, and elsewhere: it can hurt.
 EMULATED_CLIMB, REAL_CLIMB = 1.0, 0.5
 
-#: UDP ports of navdata and commands, TCP port of the control connection.
-Ports = tuple[int, int, int]
+#: Default gains of the first flights: for an AR.Drone, and for ArduPilot and PX4.
+GAINS, LINK_GAINS = "1.2,2.4", "0.8,1.4"
 
-#: Difference between the noise seeds of successive links. It is large, so that runs with different
-#: values of --seed share none.
-SEED_STEP = 1_000_003
+#: Assumed delay of ArduPilot and PX4, s, lags included, and their gain.
+LINK_PRIOR = (0.5, 1.0)
 
 #: Default folder for recordings.
 FOLDER = "flight"
@@ -52,24 +43,41 @@ def command(
     host: Annotated[
         str | None,
         typer.Option(
-            help="Address of a drone. Without: an emulator is started.", metavar="ADDRESS"
+            help="Address of an AR.Drone 2.0. Without --host or --link: an emulator is started.",
+            metavar="ADDRESS",
+        ),
+    ] = None,
+    link: Annotated[
+        str | None,
+        typer.Option(
+            help="Vehicle with ArduPilot or PX4: udp:HOST:PORT waits there for it, udpout:HOST:PORT"
+            " sends first, tcp:HOST:PORT connects.",
+            metavar="KIND:HOST:PORT",
         ),
     ] = None,
     consent: Annotated[
         bool,
         typer.Option(
-            "--i-have-a-safe-area", help="Needed with --host: a drone is about to take off there."
+            "--i-have-a-safe-area",
+            help="Needed with --host, and with a --link to another computer: a vehicle is about to "
+            "take off there.",
         ),
     ] = False,
     plant: Annotated[PlantName, typer.Option(help="What the emulator flies like.")] = "kit",
-    gains: Annotated[str, typer.Option(help="Proportional gains to learn from.")] = "1.2,2.4",
+    gains: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Proportional gains to learn from: {GAINS}, with --link {LINK_GAINS}.",
+            show_default=False,
+        ),
+    ] = None,
     step: Annotated[float, typer.Option(help="Size of the steps, m.")] = 0.25,
     base: Annotated[float, typer.Option(help="Height the steps go up from, m.")] = 1.0,
     max_climb: Annotated[
         float | None,
         typer.Option(
-            help=f"Largest vertical speed commanded, m/s: {EMULATED_CLIMB:g} (the paper's) on an "
-            f"emulator, {REAL_CLIMB:g} on a drone.",
+            help=f"Largest vertical speed commanded, m/s: {EMULATED_CLIMB:g} (the paper's) on this "
+            f"computer, {REAL_CLIMB:g} elsewhere.",
             show_default=False,
         ),
     ] = None,
@@ -93,29 +101,40 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Fly steps under P control, learn the delay, design PV for it, fly that; land."""
+    if host is not None and link is not None:
+        raise ValueError("--host is an AR.Drone, --link ArduPilot or PX4: take one")
+    elsewhere = host or (None if link is None or LinkAddress.of(link).loopback else link)
     if max_climb is None:
-        max_climb = EMULATED_CLIMB if host is None else REAL_CLIMB
+        max_climb = EMULATED_CLIMB if elsewhere is None else REAL_CLIMB
+    usual = FlightPlan()
+    if gains is None:
+        gains = GAINS if link is None else LINK_GAINS
+    prior = (usual.prior_delay, usual.prior_gain) if link is None else LINK_PRIOR
     plan = FlightPlan(
         gains=_numbers(gains),
         step=step,
         base=base,
         hold=hold,
-        checked_hold=min(hold, FlightPlan().checked_hold),
+        checked_hold=min(hold, usual.checked_hold),
         limits=Limits(max_climb=max_climb, max_height=max_height),
+        prior_delay=prior[0],
+        prior_gain=prior[1],
     )
     plan.check()
     check_pages()  # needed for the report; fail before anything flies
-    if host is not None:
-        _ask_for_consent(host, plan, consent, virtual_time)
+    if virtual_time and (host is not None or link is not None):
+        raise ValueError("--virtual-time is for the emulator, others are in real time: take one")
+    if elsewhere is not None:
+        _ask_for_consent(elsewhere, plan, consent)
     elif not as_json:
-        _print_plan(plan, f"an emulator ({plant})")
+        _print_plan(plan, f"an emulator ({plant})" if link is None else f"the vehicle at {link}")
     where = _free_folder() if folder is None else folder
     if any(where.glob("flight-*.csv")):
         raise ValueError(f"{where} holds recordings already: name another --folder")
     ports = (navdata_port, command_port, control_port)
     try:
         with (
-            _vehicle(host, plant, seed, virtual_time, plan, ports) as vehicle,
+            flown_vehicle(host, link, plant, seed, virtual_time, plan, ports) as vehicle,
             stages(plan.flights + 2, quiet=as_json) as begin,
         ):
             study = fly_experiment(vehicle.connect, plan, where, begin, vehicle.run, _print_note)
@@ -160,67 +179,13 @@ def _print_plan(plan: FlightPlan, vehicle: str) -> None:
         print_text(f"  {line}", wrapped=False, on=ERRORS)
 
 
-def _ask_for_consent(host: str, plan: FlightPlan, consent: bool, virtual_time: bool) -> None:
-    if virtual_time:
-        raise ValueError("--virtual-time is for the emulator, --host is in real time: take one")
+def _ask_for_consent(host: str, plan: FlightPlan, consent: bool) -> None:
     _print_plan(plan, f"a drone at {host}")
     if not consent:
         raise ValueError(
             f"nothing was sent to {host}: a drone there would take off {plan.flights} times and "
             "fly as said above. If nobody and nothing can be hurt by it, add --i-have-a-safe-area"
         )
-
-
-@dataclass(frozen=True)
-class _Vehicle:
-    """A vehicle: how to connect to it, its name, and what runs it in real or virtual time."""
-
-    connect: Connect
-    name: str
-    run: Callable[..., list[FlownSteps]]
-
-
-@contextmanager
-def _vehicle(
-    host: str | None,
-    plant: PlantName,
-    seed: int,
-    virtual_time: bool,
-    plan: FlightPlan,
-    ports: Ports,
-) -> Iterator[_Vehicle]:
-    name = f"an emulated AR.Drone 2.0 ({plant})"
-    if virtual_time:
-        yield _Vehicle(emulated_drone(plant, seed, plan.limits), name, run_virtual)
-    elif host is not None:
-        with terminated_like_interrupted():
-            yield _Vehicle(lambda: _client(host, plan.limits, ports), host, run_landing)
-    else:
-        with terminated_like_interrupted(), own_emulator(plant, seed) as own:
-            here = EmulatorOptions().host
-            yield _Vehicle(lambda: _client(here, plan.limits, own), name, run_landing)
-
-
-def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
-    navdata, command, control = ports
-    return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
-
-
-def emulated_drone(plant: PlantName, seed: int, limits: Limits) -> Connect:
-    """Connect to an emulator in the same event loop; each link has a different noise seed."""
-    seeds = itertools.count(seed, SEED_STEP)
-
-    @asynccontextmanager
-    async def connect() -> AsyncIterator[Vehicle]:
-        options = EmulatorOptions(
-            plant=plant, seed=next(seeds), navdata_port=0, command_port=0, control_port=0
-        )
-        async with Emulator(options) as emulator:
-            ports = (emulator.navdata_port, emulator.command_port, emulator.control_port)
-            async with _client(emulator.host, limits, ports) as drone:
-                yield drone
-
-    return connect
 
 
 def _print_kept_recordings(folder: Path) -> None:

@@ -1,0 +1,84 @@
+"""The vehicles that ``deadtime fly`` flies, in real or virtual time."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+from deadtime._cli.landing import run_landing, terminated_like_interrupted
+from deadtime._cli.own_emulator import own_emulator
+from deadtime.flights import FlightPlan, FlownSteps
+from deadtime.flights._fly import Connect
+from deadtime.links import Limits, Vehicle
+from deadtime.links import run as run_virtual
+from deadtime.links.ardrone2 import ARDrone2
+from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
+from deadtime.links.ardrone2.emulator.motion import PlantName
+from deadtime.links.mavlink import MAVLinkVehicle
+
+#: UDP ports of navdata and commands, TCP port of the control connection.
+Ports = tuple[int, int, int]
+
+#: Difference between the noise seeds of successive links. It is large, so that runs with different
+#: values of --seed share none.
+SEED_STEP = 1_000_003
+
+
+@dataclass(frozen=True)
+class FlownVehicle:
+    """A vehicle: how to connect to it, its name, and what runs it in real or virtual time."""
+
+    connect: Connect
+    name: str
+    run: Callable[..., list[FlownSteps]]
+
+
+@contextmanager
+def flown_vehicle(
+    host: str | None,
+    link: str | None,
+    plant: PlantName,
+    seed: int,
+    virtual_time: bool,
+    plan: FlightPlan,
+    ports: Ports,
+) -> Iterator[FlownVehicle]:
+    name = f"an emulated AR.Drone 2.0 ({plant})"
+    if virtual_time:
+        yield FlownVehicle(emulated_drone(plant, seed, plan.limits), name, run_virtual)
+    elif link is not None:
+        with terminated_like_interrupted():
+            vehicle = partial(MAVLinkVehicle, link, plan.limits, take_off_height=plan.base)
+            yield FlownVehicle(vehicle, f"the vehicle at {link}", run_landing)
+    elif host is not None:
+        with terminated_like_interrupted():
+            yield FlownVehicle(lambda: _client(host, plan.limits, ports), host, run_landing)
+    else:
+        with terminated_like_interrupted(), own_emulator(plant, seed) as own:
+            here = EmulatorOptions().host
+            yield FlownVehicle(lambda: _client(here, plan.limits, own), name, run_landing)
+
+
+def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
+    navdata, command, control = ports
+    return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
+
+
+def emulated_drone(plant: PlantName, seed: int, limits: Limits) -> Connect:
+    """Connect to an emulator in the same event loop; each link has a different noise seed."""
+    seeds = itertools.count(seed, SEED_STEP)
+
+    @asynccontextmanager
+    async def connect() -> AsyncIterator[Vehicle]:
+        options = EmulatorOptions(
+            plant=plant, seed=next(seeds), navdata_port=0, command_port=0, control_port=0
+        )
+        async with Emulator(options) as emulator:
+            ports = (emulator.navdata_port, emulator.command_port, emulator.control_port)
+            async with _client(emulator.host, limits, ports) as drone:
+                yield drone
+
+    return connect
