@@ -22,23 +22,25 @@ added to the commands, and repeat. Requires pymavlink.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
-import os
-import select
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from deadtime.links import Limits, VehicleState, now
+from deadtime.links.mavlink import MAVLinkVehicle
+from deadtime.links.mavlink.codec import dialect
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -64,11 +66,8 @@ WINDS = {"calm": (0.0, 0.0), "wind": (5.0, 1.0)}
 #: have the time at which it was due.
 LATE = 0.002
 
-#: Positions each second, and the time over which the least difference of clocks is sought, s.
-RATE, STRETCH = 50.0, 2.0
-
-#: Wall time in s after which a session is ended: to be ready, to take off, to answer a request.
-READY, CLIMB, ANSWER = 180.0, 60.0, 10.0
+#: Time over which the least difference of clocks is sought, s.
+STRETCH = 2.0
 
 #: Wall time in s after which the firmware ends, whatever has become of this process.
 LONGEST = 3600.0
@@ -112,140 +111,58 @@ class Position(NamedTuple):
     north_speed: float
     climb: float
 
+    @classmethod
+    def of(cls, state: VehicleState) -> Position:
+        """From a message."""
+        reported = (state.vehicle_time, state.north, state.height, state.north_speed, state.climb)
+        assert None not in reported
+        return cls(state.time, *reported)  # type: ignore[arg-type]
 
-class Vehicle:
-    """The connection to the firmware."""
 
-    def __init__(self) -> None:
-        os.environ["MAVLINK20"] = "1"
-        from pymavlink import mavutil
+def limits() -> Limits:
+    """Those of the flights: as wide as the vehicle has them itself, but for the height."""
+    return Limits(
+        max_climb=LIMIT,
+        max_speed=LIMIT,
+        max_height=2.0 * HEIGHT,
+        max_angle=math.radians(30.0),
+        landing_after=5.0,
+    )
 
-        self.link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{PORT}", source_system=255)
-        self.messages = mavutil.mavlink
-        self.position: Position | None = None
 
-    def read(self, until: float) -> Any:
-        """The next message before a time of the clock, or None."""
+def send_velocity(vehicle: MAVLinkVehicle, axis: str, value: float) -> None:
+    """Command a velocity in m/s, up or to the north."""
+    north, up = (value, 0.0) if axis == "north" else (0.0, value)
+    vehicle.command_velocity(north=north, up=up)
+
+
+def mark(vehicle: MAVLinkVehicle, command: float, reference: float, number: int) -> None:
+    """Let the vehicle write a command to its log as one that it does not know."""
+    d, link = dialect(), vehicle._link
+    values = (command, reference, float(number), 0.0, 0.0, 0.0, 0.0)
+    link.send(d.MAVLink_command_long_message(*link.target, d.MAV_CMD_USER_1, 0, *values))
+
+
+async def set_wind(vehicle: MAVLinkVehicle, wind: str) -> None:
+    """Set the simulated atmosphere."""
+    for name, value in zip(("SIM_WIND_SPD", "SIM_WIND_TURB"), WINDS[wind], strict=True):
+        await vehicle.set_parameter(name, value)
+
+
+@asynccontextmanager
+async def hovering(vehicle: MAVLinkVehicle) -> AsyncIterator[None]:
+    """Command it to hover meanwhile: without commands it would land."""
+
+    async def hover() -> None:
         while True:
-            message = self.link.recv_msg()
-            if message is not None:
-                if message.get_type() == "LOCAL_POSITION_NED":
-                    self.position = Position(
-                        time.monotonic(),
-                        message.time_boot_ms / 1e3,
-                        message.x,
-                        -message.z,
-                        message.vx,
-                        -message.vz,
-                    )
-                return message
-            left = until - time.monotonic()
-            if left <= 0.0:
-                return None
-            select.select([self.link.port], [], [], left)
+            vehicle.hover()
+            await asyncio.sleep(0.1)
 
-    def wait(self, holds: Callable[[Any], bool], seconds: float, what: str) -> Any:
-        """The first message of which something holds."""
-        end = time.monotonic() + seconds
-        while (message := self.read(end)) is not None:
-            if holds(message):
-                return message
-        raise TimeoutError(f"the firmware did not {what} within {seconds:g} s")
-
-    def command(self, number: int, *values: float) -> None:
-        """Send a command until it is accepted."""
-        end = time.monotonic() + ANSWER
-        while time.monotonic() < end:
-            self.link.mav.command_long_send(1, 1, number, 0, *values, *[0.0] * (7 - len(values)))
-            try:
-                reply = self.wait(
-                    lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, 2.0, "answer"
-                )
-            except TimeoutError:
-                continue
-            if reply.result == self.messages.MAV_RESULT_ACCEPTED:
-                return
-        raise TimeoutError(f"the firmware did not accept command {number} within {ANSWER:g} s")
-
-    def parameter(self, name: str) -> float:
-        """The value of a parameter."""
-        for _ in range(5):
-            self.link.mav.param_request_read_send(1, 1, name.encode(), -1)
-            try:
-                return float(
-                    self.wait(
-                        lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == name,
-                        1.0,
-                        "answer",
-                    ).param_value
-                )
-            except TimeoutError:
-                continue
-        raise TimeoutError(f"the firmware did not say its {name}")
-
-    def set_parameter(self, name: str, value: float) -> None:
-        """Set a parameter, until the vehicle says so."""
-        for _ in range(5):
-            self.link.mav.param_set_send(1, 1, name.encode(), value, 9)
-            try:
-                self.wait(
-                    lambda m: (
-                        m.get_type() == "PARAM_VALUE"
-                        and m.param_id == name
-                        and abs(m.param_value - value) < 1e-4
-                    ),
-                    1.0,
-                    "answer",
-                )
-                return
-            except TimeoutError:
-                continue
-        raise TimeoutError(f"the firmware did not take {name}={value:g}")
-
-    def send_velocity(self, axis: str, value: float) -> None:
-        """Command a velocity in m/s, up or to the north."""
-        north, up = (value, 0.0) if axis == "north" else (0.0, value)
-        self.link.mav.set_position_target_local_ned_send(
-            0, 1, 1, 1, 0b0000110111000111, 0, 0, 0, north, 0, -up, 0, 0, 0, 0, 0
-        )
-
-    def mark(self, command: float, reference: float, number: int) -> None:
-        """Let the vehicle write a command to its log as one that it does not know."""
-        unknown = self.messages.MAV_CMD_USER_1
-        self.link.mav.command_long_send(1, 1, unknown, 0, command, reference, number, 0, 0, 0, 0)
-
-    def take_off(self) -> None:
-        """Wait until it can fly, arm, and climb."""
-        self.wait(lambda m: m.get_type() == "HEARTBEAT", READY, "say anything")
-        m = self.messages
-        for message, rate in (
-            (m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, RATE),
-            (m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2.0),
-        ):
-            self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message, 1e6 / rate)
-        self.wait(
-            lambda m: m.get_type() == "EKF_STATUS_REPORT" and m.flags & 16, READY, "find itself"
-        )
-        end = time.monotonic() + READY
-        while True:
-            try:
-                self.command(m.MAV_CMD_DO_SET_MODE, 1.0, 4.0)
-                self.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-                self.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, HEIGHT)
-                break
-            except TimeoutError:
-                if time.monotonic() > end:
-                    raise
-        self.wait(
-            lambda _: self.position is not None and self.position.height > HEIGHT - 0.3,
-            CLIMB,
-            "reach its height",
-        )
-
-    def set_wind(self, wind: str) -> None:
-        """Set the simulated atmosphere."""
-        for name, value in zip(("SIM_WIND_SPD", "SIM_WIND_TURB"), WINDS[wind], strict=True):
-            self.set_parameter(name, value)
+    task = asyncio.create_task(hover())
+    try:
+        yield
+    finally:
+        task.cancel()
 
 
 @dataclass
@@ -259,48 +176,47 @@ class Log:
     positions: list[Position]
 
 
-def fly(vehicle: Vehicle, flight: Flight, number: int) -> Log:
+async def fly(vehicle: MAVLinkVehicle, flight: Flight, number: int) -> Log:
     """Fly the steps of one flight, the given one of its session."""
-    position = vehicle.position
-    assert position is not None
-    base = round(position.north) if flight.axis == "north" else HEIGHT
     log = Log([], [], [])
+    position = Position.of(await vehicle.state())
+    base = round(position.north) if flight.axis == "north" else HEIGHT
+    vehicle.listen(lambda state: log.positions.append(Position.of(state)))
     queue: deque[tuple[float, float]] = deque()
-    start = time.monotonic() + 0.05
+    start = now() + 0.05
     samples = math.ceil((APPROACH + REST + STEPS * HOLD) / SAMPLE)
+
+    async def send_until(due: float) -> None:
+        """Send what has waited for long enough, until the next sample is due."""
+        while queue and queue[0][0] < due:
+            until, command = queue.popleft()
+            await asyncio.sleep(until - now())
+            send_velocity(vehicle, flight.axis, command)
+            log.sent.append((until, now()))
+        await asyncio.sleep(due - now())
+
     for sample in range(samples):
         due = start + sample * SAMPLE
-        while True:
-            until = min(due, queue[0][0]) if queue else due
-            if (now := time.monotonic()) >= until:
-                if until == due:
-                    break
-                vehicle.send_velocity(flight.axis, queue.popleft()[1])
-                log.sent.append((until, time.monotonic()))
-            elif vehicle.read(until) is not None and vehicle.position is not position:
-                position = vehicle.position
-                log.positions.append(position)
+        await send_until(due)
         since = sample * SAMPLE - APPROACH - REST
         reference = base + STEP * (since >= 0.0 and int(since // HOLD) % 2 == 0)
+        position = Position.of(await vehicle.state())
         measured = position.north if flight.axis == "north" else position.height
         wanted = GAINS[flight.axis] * (reference - measured)
         command = min(max(wanted, -LIMIT), LIMIT)
-        now = time.monotonic()
-        if now - position.received > 1.0:
+        time = now()
+        if time - position.received > 1.0:
             raise TimeoutError("the firmware has reported no position for 1 s")
-        vehicle.mark(command, reference, number)
+        mark(vehicle, command, reference, number)
         if flight.added:
-            queue.append((now + flight.added, command))
+            queue.append((time + flight.added, command))
         else:
-            vehicle.send_velocity(flight.axis, command)
-            log.sent.append((now, time.monotonic()))
-        log.rows.append((now, due, reference, measured, command))
-    end = time.monotonic() + 0.2
-    while vehicle.read(end) is not None:
-        if vehicle.position is not position:
-            position = vehicle.position
-            log.positions.append(position)
-    vehicle.send_velocity(flight.axis, 0.0)
+            send_velocity(vehicle, flight.axis, command)
+            log.sent.append((time, now()))
+        log.rows.append((time, due, reference, measured, command))
+    await asyncio.sleep(0.2)
+    vehicle.listen(None)
+    vehicle.hover()
     return log
 
 
@@ -369,7 +285,27 @@ def write(
     (folder / f"{flight.name}.json").write_text(json.dumps(facts, indent=1) + "\n")
 
 
-def session(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
+async def session(folder: Path, flights: Sequence[Flight]) -> None:
+    """Fly all flights in one, from take-off to landing."""
+    address = f"udp:127.0.0.1:{PORT}"
+    async with MAVLinkVehicle(address, limits(), take_off_height=HEIGHT) as vehicle:
+        kept = int(await vehicle.parameter("LOG_BITMASK"))
+        await vehicle.set_parameter("LOG_BITMASK", float(kept | LOGGED))
+        names = [name for pair in SHAPING.values() for name in pair]
+        parameters = {name: await vehicle.parameter(name) for name in names}
+        await vehicle.take_off()
+        wind = None
+        for number, flight in enumerate(flights):
+            if flight.wind != wind:
+                async with hovering(vehicle):
+                    await set_wind(vehicle, wind := flight.wind)
+            log = await fly(vehicle, flight, number)
+            place = {"log": f"{flights[0].name}.bin", "number": number}
+            write(folder, flight, log, parameters, place)
+            print(flight.name, flush=True)
+
+
+def run(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
     """Fly in one session of the firmware, and end it in any case."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as own, (folder / "firmware.log").open("a") as said:
@@ -385,19 +321,7 @@ def session(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
             stderr=said,
         )
         try:
-            vehicle = Vehicle()
-            vehicle.set_parameter("LOG_BITMASK", int(vehicle.parameter("LOG_BITMASK")) | LOGGED)
-            vehicle.take_off()
-            names = [name for pair in SHAPING.values() for name in pair]
-            parameters = {name: vehicle.parameter(name) for name in names}
-            wind = None
-            for number, flight in enumerate(flights):
-                if flight.wind != wind:
-                    vehicle.set_wind(wind := flight.wind)
-                log = fly(vehicle, flight, number)
-                place = {"log": f"{flights[0].name}.bin", "number": number}
-                write(folder, flight, log, parameters, place)
-                print(flight.name, flush=True)
+            asyncio.run(session(folder, flights))
         finally:
             firmware.send_signal(signal.SIGTERM)
             try:
@@ -410,4 +334,4 @@ def session(arducopter: Path, folder: Path, flights: Sequence[Flight]) -> None:
 
 
 if __name__ == "__main__":
-    session(Path(sys.argv[1]), Path(sys.argv[2]), [Flight.of(name) for name in sys.argv[3:]])
+    run(Path(sys.argv[1]), Path(sys.argv[2]), [Flight.of(name) for name in sys.argv[3:]])

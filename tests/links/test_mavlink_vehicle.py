@@ -119,6 +119,52 @@ def test_commands_are_bounded_and_expire():
     run(flight())
 
 
+def test_all_axes_are_commanded_within_their_limits():
+    limits = Limits(max_climb=1.0, max_speed=1.0, max_yaw_rate=0.3)
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, limits) as link:
+            await link.take_off()
+            sent = link.command_velocity(north=3.0, east=-4.0, up=0.2, turn=7.0)
+            assert sent == pytest.approx((0.6, -0.8, 0.2, 0.3))
+            with pytest.raises(ValueError, match="turn"):
+                link.command_velocity(turn=float("inf"))
+            before = await link.state()
+            for _ in range(20):
+                link.command_velocity(north=0.6, east=-0.8, turn=0.3)
+                await asyncio.sleep(0.05)
+            state = await link.state()
+            assert state.north - before.north == pytest.approx(0.6, abs=0.05)
+            assert state.east - before.east == pytest.approx(-0.8, abs=0.05)
+            assert (state.north_speed, state.east_speed) == pytest.approx((0.6, -0.8))
+            assert state.yaw_rate == pytest.approx(0.3)
+            assert state.yaw == pytest.approx(0.3, abs=0.05)
+            assert vehicle.turn == pytest.approx(0.3)
+            link.hover()
+            await asyncio.sleep(0.2)
+            assert vehicle.along == (0.0, 0.0)
+
+    run(flight())
+
+
+def test_parameters_are_read_set_and_put_back():
+    async def flight():
+        async with StandIn() as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            with pytest.raises(LinkError, match="not connected"):
+                await link.parameter("ANGLE_MAX")
+            vehicle.parameters["WIND"] = 2.5
+            async with link:
+                assert await link.parameter("WIND") == 2.5
+                await link.set_parameter("WIND", 4.0)
+                assert vehicle.parameters["WIND"] == 4.0
+                with pytest.raises(LinkError, match="NONE"):
+                    await link.parameter("NONE")
+            assert vehicle.parameters["WIND"] == 2.5
+
+    run(flight())
+
+
 def test_a_ground_station_that_falls_silent_is_survived_by_the_vehicle_alone():
     async def flight():
         async with StandIn() as vehicle:

@@ -56,6 +56,8 @@ class StandIn:
         self.parameters = dict(ARDUPILOT if firmware == "ardupilot" else PX4)
         self.height, self.climb, self.told = 0.0, 0.0, 0.0
         self.target = None
+        self.along, self.place = (0.0, 0.0), [0.0, 0.0]
+        self.turn = self.yaw = 0.0
         self.ready = True
         self.drop = lambda message: False
         self.commands, self.set_points = [], []
@@ -124,6 +126,8 @@ class StandIn:
                 self.target = None
         elif self.mode == self.guided:
             wanted = self.told
+        self.place = [x + STEP * v for x, v in zip(self.place, self.along, strict=True)]
+        self.yaw += STEP * self.turn
         self.climb += STEP / LAG * (wanted - self.climb)
         self.height += STEP * self.climb
         if self.height <= 0.0:
@@ -137,7 +141,7 @@ class StandIn:
         unheard = 0.0 if self._station is None else self.time - self._station
         ap = self.firmware == "ardupilot"
         if silent > self.parameters["GUID_TIMEOUT" if ap else "COM_OF_LOSS_T"]:
-            self.told = 0.0
+            self.told, self.along, self.turn = 0.0, (0.0, 0.0), 0.0
             if not ap and self.mode == self.guided:
                 self.mode = 4 << 16 | 3 << 24  # hold
         if ap and self.parameters["FS_GCS_ENABLE"] and unheard > self.parameters["FS_GCS_TIMEOUT"]:
@@ -148,6 +152,7 @@ class StandIn:
     def change_mode(self, mode):
         """As a pilot, another ground station or a failsafe does."""
         self.mode, self.told, self.target = mode, 0.0, None
+        self.along, self.turn = (0.0, 0.0), 0.0
 
     def _report(self, number):
         ms = round(1e3 * self.time)
@@ -159,7 +164,9 @@ class StandIn:
             status = self.status or (4 if self.armed else 3)
             self.send(d.MAVLink_heartbeat_message(2, pilot, flags, self.mode, status, 3))
         elif number == 32:
-            self.send(d.MAVLink_local_position_ned_message(ms, 0.0, 0.0, z, 0.0, 0.0, -self.climb))
+            self.send(
+                d.MAVLink_local_position_ned_message(ms, *self.place, z, *self.along, -self.climb)
+            )
         elif number == 85:
             self.send(
                 d.MAVLink_position_target_local_ned_message(
@@ -167,7 +174,7 @@ class StandIn:
                 )
             )
         elif number == 30:
-            self.send(d.MAVLink_attitude_message(ms, *nothing[:6]))
+            self.send(d.MAVLink_attitude_message(ms, 0.0, 0.0, self.yaw, 0.0, 0.0, self.turn))
         elif number == 245:
             landing = self.mode == self.landing
             state = 1 if self.landed else 4 if landing else 3 if self.target is not None else 2
@@ -203,10 +210,14 @@ class StandIn:
     def _take_set_position_target_local_ned(self, message):
         self._streamed = self.time
         self.set_points.append((self.time, -message.vz))
-        assert message.type_mask == 0xDC7
+        assert message.type_mask in (0xDC7, 0x5C7)
         assert message.coordinate_frame == 1
-        if self.mode == self.guided and self.target is None:
+        if self.mode == self.guided:
+            self.target = None  # a set point ends the take-off
             self.told = -message.vz
+            self.along = (message.vx, message.vy)
+            if message.type_mask == 0x5C7:
+                self.turn = message.yaw_rate
 
     def _integer(self, name):
         return self.firmware == "px4" and isinstance(self.parameters[name], int)

@@ -144,7 +144,14 @@ def command(
         _print_kept_recordings(where)
         raise
     page = where / "report.html"
-    result = {"flown_on": vehicle.name, **study.to_dict(), "report": page, "folder": where}
+    trip = vehicle.round_trip()
+    result = {
+        "flown_on": vehicle.name,
+        **study.to_dict(),
+        "round_trip": trip,
+        "report": page,
+        "folder": where,
+    }
     text = as_json_text("flight", result)
     (where / "result.json").write_text(text + "\n", encoding="utf-8")
     write_flight_page(study, page, vehicle.name)
@@ -152,6 +159,8 @@ def command(
         print_json("flight", result)
     else:
         _print_study(study, page)
+        if trip is not None:
+            print_text(f"The round trip of the link, by TIMESYNC, was {1e3 * trip:.1f} ms.")
 
 
 def _print_note(sentence: str) -> None:

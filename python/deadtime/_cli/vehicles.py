@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
+from statistics import median
 
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
@@ -17,7 +17,7 @@ from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
 from deadtime.links.ardrone2.emulator.motion import PlantName
-from deadtime.links.mavlink import MAVLinkVehicle
+from deadtime.links.mavlink import LinkTime, MAVLinkVehicle
 
 #: UDP ports of navdata and commands, TCP port of the control connection.
 Ports = tuple[int, int, int]
@@ -29,11 +29,16 @@ SEED_STEP = 1_000_003
 
 @dataclass(frozen=True)
 class FlownVehicle:
-    """A vehicle: how to connect to it, its name, and what runs it in real or virtual time."""
+    """A vehicle: how to connect to it, its name, what runs it, and what its link has measured."""
 
     connect: Connect
     name: str
     run: Callable[..., list[FlownSteps]]
+    link_times: list[LinkTime] = field(default_factory=list)
+
+    def round_trip(self) -> float | None:
+        """Median round trip of the link while it was open, s, where the vehicle tells."""
+        return median(one.median for one in self.link_times) if self.link_times else None
 
 
 @contextmanager
@@ -51,8 +56,9 @@ def flown_vehicle(
         yield FlownVehicle(emulated_drone(plant, seed, plan.limits), name, run_virtual)
     elif link is not None:
         with terminated_like_interrupted():
-            vehicle = partial(MAVLinkVehicle, link, plan.limits, take_off_height=plan.base)
-            yield FlownVehicle(vehicle, f"the vehicle at {link}", run_landing)
+            times: list[LinkTime] = []
+            connect = over_mavlink(link, plan, times)
+            yield FlownVehicle(connect, f"the vehicle at {link}", run_landing, times)
     elif host is not None:
         with terminated_like_interrupted():
             yield FlownVehicle(lambda: _client(host, plan.limits, ports), host, run_landing)
@@ -60,6 +66,19 @@ def flown_vehicle(
         with terminated_like_interrupted(), own_emulator(plant, seed) as own:
             here = EmulatorOptions().host
             yield FlownVehicle(lambda: _client(here, plan.limits, own), name, run_landing)
+
+
+def over_mavlink(link: str, plan: FlightPlan, times: list[LinkTime]) -> Connect:
+    """Connect to a vehicle; what TIMESYNC says at the end of each connection goes to `times`."""
+
+    @asynccontextmanager
+    async def connect() -> AsyncIterator[Vehicle]:
+        async with MAVLinkVehicle(link, plan.limits, take_off_height=plan.base) as vehicle:
+            yield vehicle
+            if vehicle.link_time is not None:
+                times.append(vehicle.link_time)
+
+    return connect
 
 
 def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:

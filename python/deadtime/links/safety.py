@@ -61,6 +61,10 @@ class Limits:
     ----------
     max_climb : float
         Largest commanded vertical speed, m/s.
+    max_speed : float
+        Largest commanded horizontal speed, m/s.
+    max_yaw_rate : float
+        Largest commanded turn, rad/s.
     min_height, max_height : float
         Beyond these a flight is aborted, m. The upper one is set in the vehicle too, where it has
         such a setting.
@@ -86,6 +90,8 @@ class Limits:
     """
 
     max_climb: float = 0.5
+    max_speed: float = 0.5
+    max_yaw_rate: float = 0.5
     min_height: float = 0.2
     max_height: float = 3.0
     max_angle: float = math.radians(15.0)

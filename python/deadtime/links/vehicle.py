@@ -32,6 +32,14 @@ class VehicleState:
         have arrived.
     roll, pitch : float
         rad.
+    north, east : float, optional
+        Position in the vehicle's own frame, m.
+    north_speed, east_speed : float, optional
+        m/s.
+    yaw : float, optional
+        Heading, rad, clockwise from north.
+    yaw_rate : float, optional
+        rad/s, clockwise positive.
     battery : float, optional
         Charge left, percent.
     emergency : bool
@@ -56,6 +64,12 @@ class VehicleState:
     emergency: bool = False
     fault: str | None = None
     missing: int = 0
+    north: float | None = None
+    east: float | None = None
+    north_speed: float | None = None
+    east_speed: float | None = None
+    yaw: float | None = None
+    yaw_rate: float | None = None
 
 
 class Vehicle(Protocol):

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Self
 
 from deadtime._base.errors import FlightAbortedError, LinkError
-from deadtime._base.validation import finite, positive
+from deadtime._base.validation import positive
 from deadtime.links.clock import now
 from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.authority import Authority
@@ -18,7 +18,7 @@ from deadtime.links.mavlink.codec import dialect
 from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
-from deadtime.links.mavlink.set_points import CYCLE, SetPoints
+from deadtime.links.mavlink.set_points import CYCLE, HOVER, Motion, SetPoints
 from deadtime.links.mavlink.states import ON_GROUND, StateReader
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_for_messages
 from deadtime.links.mavlink.time_sync import LinkTime
@@ -213,6 +213,35 @@ commanding it
                 self._listener = None
                 raise
 
+    async def parameter(self, name: str) -> float:
+        """The value of a parameter of the vehicle.
+
+        Raises
+        ------
+        LinkError
+            If it is not connected, or does not answer.
+        """
+        value = await self._held.read(name)
+        if value is None:
+            raise LinkError(f"{self.address}: the vehicle does not answer for its {name}")
+        return value
+
+    async def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter, and read it back; the old value is put back when the link is closed.
+
+        Raises
+        ------
+        LinkError
+            If it is not connected, or does not keep the value.
+        """
+        await self._held.set(name, value)
+
+    @property
+    def _held(self) -> Parameters:
+        if self._parameters is None:
+            raise LinkError(f"{self.address} is not connected")
+        return self._parameters
+
     # Flying
 
     async def take_off(self) -> None:
@@ -301,15 +330,40 @@ commanding it
             commands, without messages of the vehicle, or because its mode was changed by itself or
             by another ground station.
         """
-        requested = finite("climb", climb)
+        return self.command_velocity(up=climb).up
+
+    def command_velocity(
+        self, north: float = 0.0, east: float = 0.0, up: float = 0.0, turn: float | None = None
+    ) -> Motion:
+        """Command a velocity, as `command` does a vertical one.
+
+        Parameters
+        ----------
+        north, east, up : float
+            m/s. The horizontal speed is limited to ``limits.max_speed``, in its direction.
+        turn : float, optional
+            Rate of turn, rad/s, clockwise positive, clipped to ``limits.max_yaw_rate``; the heading
+            is held without it.
+
+        Returns
+        -------
+        Motion
+            What was sent.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        LinkError
+            As `command`.
+        """
+        motion = Motion(north, east, up, turn).within(self.limits)
         if self._set_points.expired is None and not self._set_points.guarded:
             raise LinkError(f"{self.address} is not in the air: take off before commanding it")
         self._check_flight()
-        most = self.limits.max_climb
-        sent = max(-most, min(most, requested))
-        self._set_points.command(sent, now())
+        self._set_points.command(motion, now())
         self._send_set_point()
-        return sent
+        return motion
 
     def hover(self) -> None:
         """Command no motion; like a command this is valid for a short time, then it lands.
@@ -320,7 +374,7 @@ commanding it
             If the flight has ended without `land`, as of `command`.
         """
         self._check_flight()
-        self._set_points.command(0.0, now())
+        self._set_points.command(HOVER, now())
         if self._set_points.guarded:
             self._send_set_point()
 

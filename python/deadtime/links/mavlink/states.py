@@ -50,7 +50,7 @@ class StateReader:
         self._ground = 0.0
         self._status = 0
         self._battery: float | None = None
-        self._attitude = (0.0, 0.0)
+        self._attitude: Any = None
         self._setpoint: float | None = None
         self._frames = 0
         self._sequence: int | None = None
@@ -66,7 +66,7 @@ class StateReader:
         elif kind == "EXTENDED_SYS_STATE":
             self.landed_state = int(message.landed_state)
         elif kind == "ATTITUDE":
-            self._attitude = float(message.roll), float(message.pitch)
+            self._attitude = message
         elif kind == "SYS_STATUS":
             left = int(message.battery_remaining)
             self._battery = None if left < 0 else float(left)
@@ -101,7 +101,7 @@ class StateReader:
             return None  # a copy, or overtaken by a newer one
         if self.landed_state == ON_GROUND:
             self._ground = float(message.z)
-        roll, pitch = self._attitude
+        turned = self._attitude
         self.newest = VehicleState(
             time=time,
             height=self._ground - float(message.z),
@@ -111,8 +111,14 @@ class StateReader:
             vehicle_time=stamp,
             climb=-float(message.vz),
             climb_setpoint=self._setpoint,
-            roll=roll,
-            pitch=pitch,
+            roll=0.0 if turned is None else float(turned.roll),
+            pitch=0.0 if turned is None else float(turned.pitch),
+            yaw=None if turned is None else float(turned.yaw),
+            yaw_rate=None if turned is None else float(turned.yawspeed),
+            north=float(message.x),
+            east=float(message.y),
+            north_speed=float(message.vx),
+            east_speed=float(message.vy),
             battery=self._battery,
             emergency=self._emergency,
             fault="a failsafe of its own is active" if self._status == CRITICAL else None,

@@ -11,7 +11,7 @@ from deadtime.links.mavlink.authority import Authority
 from deadtime.links.mavlink.autopilots import Autopilot
 from deadtime.links.mavlink.codec import dialect
 from deadtime.links.mavlink.connection import Connection
-from deadtime.links.mavlink.set_points import SetPoints
+from deadtime.links.mavlink.set_points import HOVER, SetPoints
 from deadtime.links.mavlink.states import StateReader, wanted_messages
 
 #: Longest wait for a position estimate after power-up, for the consent of the vehicle to arm, and
@@ -117,9 +117,9 @@ class TakeOff:
         set_points.begin(now())
         if pilot.arming != pilot.guided:
             await asyncio.sleep(SHOWN)  # PX4 wants set points before it follows them
-            set_points.command(0.0, now())
+            set_points.command(HOVER, now())
             await self._set_mode(pilot.guided)
-            set_points.command(0.0, now())
+            set_points.command(HOVER, now())
         self._authority.fly(pilot.guided)
 
     async def _set_mode(self, custom: int) -> None:
