@@ -260,6 +260,48 @@ def test_another_ground_station_takes_over(firmware, mode):
     run(flight())
 
 
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_pilot_who_interrupts_the_take_off_is_obeyed(firmware):
+    async def flight():
+        async with StandIn(firmware) as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            rising = asyncio.create_task(link.take_off())
+            while vehicle.height < 0.3:
+                await asyncio.sleep(0.05)
+            vehicle.change_mode(vehicle.other)
+            del vehicle.commands[:]
+            with pytest.raises(FlightAbortedError, match="not commanded from here"):
+                await rising
+            with pytest.raises(LinkError, match="not commanded to land"):
+                await link.close()
+            assert vehicle.mode == vehicle.other
+            assert not vehicle.commands
+
+    run(flight())
+
+
+def test_a_program_that_ends_without_closing_lands_the_vehicle():
+    async def program():
+        link = MAVLinkVehicle(ADDRESS, LIMITS)
+        await link.connect()
+        await link.take_off()
+        link.command(0.1)
+
+    async def flight():
+        async with StandIn() as vehicle:
+            before = set(asyncio.all_tasks())
+            await program()
+            for task in set(asyncio.all_tasks()) - before:  # as `asyncio.run` does at its end
+                task.cancel()
+            await asyncio.sleep(0.3)
+            assert vehicle.mode == vehicle.landing
+            await asyncio.sleep(5.0)
+            assert not vehicle.armed
+
+    run(flight())
+
+
 def test_a_pilot_who_interrupts_the_landing_is_obeyed():
     async def flight():
         async with StandIn() as vehicle:

@@ -44,7 +44,7 @@ class Authority:
         self.armed_at = math.inf
         self.lost: str | None = None
         self.disarmed: str | None = None
-        self._mode: int | None = None
+        self._modes: tuple[int, ...] = ()
         self._landing: int | None = None
         self._was_armed = False
 
@@ -66,9 +66,9 @@ class Authority:
                 "it flies it"
             )
 
-    def fly(self, mode: int) -> None:
-        """It is flown in this mode from now on."""
-        self._mode, self._landing = mode, None
+    def fly(self, *modes: int) -> None:
+        """It is flown in one of these modes from now on."""
+        self._modes, self._landing = modes, None
 
     def land(self, mode: int) -> None:
         """It was commanded to land in this mode."""
@@ -76,7 +76,7 @@ class Authority:
 
     def ended(self) -> None:
         """The flight has ended on the ground."""
-        self.armed_at, self._mode, self._landing = math.inf, None, None
+        self.armed_at, self._modes, self._landing = math.inf, (), None
 
     def heard(self, reader: StateReader, pilot: Autopilot, link: Connection, time: float) -> None:
         """Compare a heartbeat with what was commanded."""
@@ -88,11 +88,11 @@ class Authority:
             )
             self.lost = self.lost or self.disarmed
         self._was_armed = bool(reader.armed)
-        if self._mode is None or self.lost is not None or not reader.armed:
+        if not self._modes or self.lost is not None or not reader.armed:
             return
         if self._landing is not None and reader.mode == self._landing:
-            self._mode = self._landing  # it obeys: from now on it is the mode that it has to be in
-        elif reader.mode != self._mode:
+            self._modes = (self._landing,)  # it obeys, and has to stay in this mode
+        elif reader.mode not in self._modes:
             self.take_over(reader, pilot, link)
 
     def take_over(self, reader: StateReader, pilot: Autopilot, link: Connection) -> None:

@@ -46,8 +46,10 @@ class Autopilot(ABC):
     guided, landing : int
         ``custom_mode`` in which set points are followed, and in which it lands.
     arming : int
-        Mode in which it is armed and takes off. Where it is not `guided`, that is entered after the
-        take-off, and only while set points are sent.
+        Mode in which it is armed. Where it is not `guided`, that is entered after the take-off, and
+        only while set points are sent.
+    rising : tuple of int
+        Modes that it may have while it takes off.
     integers_as_bits : bool
         Whether the float of a parameter carries the bits of an integer, not the number.
     estimator : str
@@ -58,6 +60,7 @@ class Autopilot(ABC):
     guided: ClassVar[int]
     landing: ClassVar[int]
     arming: ClassVar[int]
+    rising: ClassVar[tuple[int, ...]]
     integers_as_bits: ClassVar[bool]
     estimator: ClassVar[str]
 
@@ -89,6 +92,7 @@ class ArduPilot(Autopilot):
 
     name = "ArduPilot"
     guided, landing, arming = 4, 9, 4
+    rising = (4,)
     integers_as_bits = False
     estimator = "EKF_STATUS_REPORT"
 
@@ -148,6 +152,7 @@ class PX4(Autopilot):
 
     name = "PX4"
     guided, landing, arming = 6 << 16, 4 << 16 | 6 << 24, 4 << 16 | 3 << 24
+    rising = (4 << 16 | 2 << 24, 4 << 16 | 3 << 24)  # AUTO.TAKEOFF, then AUTO.LOITER
     integers_as_bits = True
     estimator = "ESTIMATOR_STATUS"
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from deadtime._base.errors import LinkError
 from deadtime.links.mavlink.codec import dialect
-from deadtime.links.mavlink.connection import Connection
+from deadtime.links.mavlink.connection import ANSWER, Connection
 
 #: Difference of a value that counts as the same: parameters are single precision.
 SAME = 1e-6
@@ -100,15 +100,14 @@ class Parameters:
 
     async def put_back(self) -> str | None:
         """Put the changed parameters back; a sentence about those for which this failed."""
-        failed = []
-        for name, value in list(self.before.items()):
+        for name, value in reversed(list(self.before.items())):  # the fence is off first
             try:
                 await self._write(name, value)
                 del self.before[name]
             except LinkError:
-                failed.append(f"{name} = {value:g}")
-                break  # the others would fail as well, each after seconds
-        if not failed:
+                if self._link.silent > ANSWER:
+                    break  # the others would fail as well, each after seconds
+        if not self.before:
             return None
         left = ", ".join(f"{name} = {value:g}" for name, value in self.before.items())
         return f"{self._link.address}: could not be put back in the vehicle: {left}"

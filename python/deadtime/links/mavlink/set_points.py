@@ -1,6 +1,6 @@
 """Velocity set points, which expire: no old one is ever repeated.
 
-A set point is repeated after `REPEAT`, where no new one comes, until it is `Limits.command_age` old;
+Where no new one comes, a set point is repeated every `REPEAT` until it is `Limits.command_age` old;
 then hovering is commanded, and after `Limits.landing_after` the flight is given up. The vehicle has
 a time-out of its own beside this, for the case that this program ends or stands still.
 """

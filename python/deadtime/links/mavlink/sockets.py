@@ -28,7 +28,6 @@ class LinkSocket:
         self._datagrams: asyncio.DatagramTransport | None = None
         self._stream: asyncio.Transport | None = None
         self.peer: Any = None
-        self.ended = False
 
     async def open(self, address: LinkAddress) -> None:
         """Open it.
@@ -43,7 +42,7 @@ class LinkSocket:
             if address.kind == "tcp":
                 async with asyncio.timeout(CONNECTING):
                     self._stream, _ = await loop.create_connection(
-                        lambda: _Stream(self._receive, self._end), *place
+                        lambda: _Stream(self._receive), *place
                     )
             elif address.kind == "udpout":
                 self._datagrams, _ = await loop.create_datagram_endpoint(
@@ -72,9 +71,6 @@ class LinkSocket:
             elif self.peer is not None:
                 self._datagrams.sendto(data, self.peer)
 
-    def _end(self) -> None:
-        self.ended = True
-
     def close(self) -> None:
         """Close it."""
         for transport in (self._datagrams, self._stream):
@@ -94,11 +90,10 @@ class _Datagrams(asyncio.DatagramProtocol):
 
 
 class _Stream(asyncio.Protocol):
-    def __init__(self, receive: Receive, end: Callable[[], None]) -> None:
-        self._receive, self._end = receive, end
+    """A stream; where it ends, the following silence is detected."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
 
     def data_received(self, data: bytes) -> None:
         self._receive(data, None, False)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._end()

@@ -106,8 +106,7 @@ class TakeOff:
         pilot, link, d = self._pilot, self._link, dialect()
         self._begin = now()
         await self._set_mode(pilot.arming)
-        if pilot.arming == pilot.guided:
-            self._authority.fly(pilot.guided)
+        self._authority.fly(*pilot.rising)
         await self._arm()
         position = link.latest.get("GLOBAL_POSITION_INT", (0.0, None))[1]
         result = await link.command(d.MAV_CMD_NAV_TAKEOFF, *pilot.take_off(height, position))
@@ -118,6 +117,8 @@ class TakeOff:
         if pilot.arming != pilot.guided:
             await asyncio.sleep(SHOWN)  # PX4 wants set points before it follows them
             set_points.command(HOVER, now())
+            self._check()
+            self._authority.fly(*pilot.rising, pilot.guided)
             await self._set_mode(pilot.guided)
             set_points.command(HOVER, now())
         self._authority.fly(pilot.guided)
