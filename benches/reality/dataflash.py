@@ -67,6 +67,8 @@ def waited(path: Path, number: int, axis: str) -> float:
     told = topics["GUIP"]
     after = (told.time >= sent[0]) & (told.time <= sent[-1])
     times, values = told.time[after], 0.01 * told.columns[TOLD[axis]][after]
+    first = int(np.argmax(np.abs(values - commands[0]) <= ROUNDED))  # it was told to hover before
+    times, values = times[first:], values[first:]
     if times.size > sent.size or np.max(np.abs(values - commands[: times.size])) > ROUNDED:
         raise ValueError(f"flight {number} of {path}: the vehicle was told other commands")
     return float(np.mean(times - sent[: times.size]))
