@@ -119,6 +119,24 @@ def test_commands_are_bounded_and_expire():
     run(flight())
 
 
+def test_a_flight_over_tcp_and_what_follows_the_end_of_the_stream():
+    async def flight():
+        async with StandIn(tcp=("127.0.0.1", 5760)) as vehicle:
+            link = MAVLinkVehicle("tcp:127.0.0.1:5760", LIMITS)
+            await link.connect()
+            await link.take_off()
+            await told(link, 0.2, 1.0)
+            assert (await link.state()).climb == pytest.approx(0.2, abs=0.01)
+            vehicle.stream.close()
+            with pytest.raises(LinkError, match="nothing received"):
+                await told(link, 0.2, 3.0)
+            with pytest.raises(LinkError, match="while landing"):
+                await link.close()
+            assert not vehicle.armed
+
+    run(flight())
+
+
 def test_all_axes_are_commanded_within_their_limits():
     limits = Limits(max_climb=1.0, max_speed=1.0, max_yaw_rate=0.3)
 

@@ -48,9 +48,17 @@ class StandIn:
     """
 
     def __init__(
-        self, firmware="ardupilot", system=1, ground=GROUND, key=None, armed=False, noise=0.0
+        self,
+        firmware="ardupilot",
+        system=1,
+        ground=GROUND,
+        key=None,
+        armed=False,
+        noise=0.0,
+        tcp=None,
     ):
-        self.firmware, self.ground = firmware, ground
+        self.firmware, self.ground, self.tcp = firmware, ground, tcp
+        self.server, self.stream = None, None
         self.guided, self.landing, self.other = MODES[firmware]
         self.mode, self.armed = self.other, armed
         self.parameters = dict(ARDUPILOT if firmware == "ardupilot" else PX4)
@@ -76,15 +84,18 @@ class StandIn:
     async def __aenter__(self):
         self._loop = asyncio.get_running_loop()
         self._begin = self._loop.time() - 20.0
-        self._transport, _ = await self._loop.create_datagram_endpoint(
-            lambda: _Receiver(self), local_addr=("127.0.0.1", 0)
-        )
+        if self.tcp is None:
+            self._transport, _ = await self._loop.create_datagram_endpoint(
+                lambda: _Receiver(self), local_addr=("127.0.0.1", 0)
+            )
+        else:
+            self.server = await self._loop.create_server(lambda: _Stream(self), *self.tcp)
         self._task = self._loop.create_task(self._live())
         return self
 
     async def __aexit__(self, *_):
         self._task.cancel()
-        self._transport.close()
+        (self.server or self._transport).close()
 
     @property
     def time(self):
@@ -96,7 +107,12 @@ class StandIn:
 
     def send(self, message):
         if not self.drop(message):
-            self._transport.sendto(message.pack(self._mav), self.ground)
+            data = message.pack(self._mav)
+            if self.server is None:
+                self._transport.sendto(data, self.ground)
+            elif self.stream is not None:
+                self.stream.write(data[:9])  # streams have no borders of frames
+                self.stream.write(data[9:])
         self._mav.seq = (self._mav.seq + 1) % 256
 
     def say(self, text):
@@ -280,4 +296,15 @@ class _Receiver(asyncio.DatagramProtocol):
         self._vehicle = vehicle
 
     def datagram_received(self, data, addr):
+        self._vehicle.receive(data)
+
+
+class _Stream(asyncio.Protocol):
+    def __init__(self, vehicle):
+        self._vehicle = vehicle
+
+    def connection_made(self, transport):
+        self._vehicle.stream = transport
+
+    def data_received(self, data):
         self._vehicle.receive(data)
