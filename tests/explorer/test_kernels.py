@@ -9,6 +9,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
+from command_line import found
 from deadtime.loops._explored import described
 from web_kernels import WebKernels, axis, request
 
@@ -79,6 +80,24 @@ def test_a_loop_has_the_same_abscissa_margins_and_responses(
     answer = web.call("step", [*numbers(loop), 0, 1.0, 0, len(time), *time])
     response = loop.step_response(time)
     np.testing.assert_allclose(answer[:61], response.outputs, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_the_command_line_prints_the_same_abscissa(web: WebKernels, seed: int) -> None:
+    rng = np.random.default_rng([1, seed])
+    kp, delay, gain = (float(rng.uniform(*ends)) for ends in [(0.2, 2.0), (0.05, 0.5), (0.3, 2.0)])
+    kv, lag = float(rng.choice([0.0, 0.1])), float(rng.choice([0.0, rng.uniform(0.05, 0.5)]))
+    sample_time = float(rng.uniform(0.01, 0.1)) if rng.random() < 0.5 else None
+    controller = dtm.PV(kp, kv, dtm.DerivativeFilter(15.0)) if kv else dtm.P(kp)
+    plant = dtm.Integrator(gain, lag=lag)
+    loop = dtm.ControlLoop(plant, controller, delay=delay, sample_time=sample_time)
+    given = {"--kp": kp, "--kv": kv, "--delay": delay, "--gain": gain, "--lag": lag}
+    given |= {"--filter": 15.0} if kv else {}
+    given |= {"--sample-time": sample_time} if sample_time else {}
+    printed = found("roots", *(word for pair in given.items() for word in pair))
+    abscissa = loop.spectral_abscissa()
+    assert printed["spectral_abscissa"] == abscissa
+    assert web.call("rightmost", [*numbers(loop), 4])[0] == pytest.approx(abscissa, rel=1e-9)
 
 
 def test_a_loop_without_rounding_has_the_same_bits(web: WebKernels) -> None:
