@@ -157,3 +157,23 @@ def test_a_zero_that_starts_at_none_is_found():
     low, high = from_none.ci(0.99, "delay+lag")
     assert low < 0.167 < high
     assert from_none.delay_plus_lag == pytest.approx(from_some.delay_plus_lag, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", [10, 15, 18, 20, 39])
+def test_a_lag_that_rows_do_not_resolve_has_no_endless_error(seed):
+    row, random = 0.065, np.random.default_rng(seed)
+    loop = dtm.ControlLoop(
+        dtm.Integrator(0.85, lag=0.002), dtm.P(1.2), delay=0.25, sample_time=row, limit=1.0
+    )
+    time = row * np.arange(120)
+    noise = random.normal(0.0, 0.005, 120)
+    target = np.where(time < 1.0 - 1e-9, 0.0, 1.0)
+    run = loop.simulate(time, target - noise, reference_time=time, initial_output=0.0)
+    recording = dtm.Recording(time, target, run.outputs + noise, run.inputs)
+    known = loop.replace(plant=dtm.FactoredPlant([0.1, 0.02], integrator=True), delay=0.0)
+    fit = dtm.estimate_delay(recording, known, free=FREE)
+    assert all(fit.stderr[name] < row for name in ("delay", "lag_1", "lag_2", "delay+lag"))
+    low, high = fit.ci()
+    assert low <= 0.25 <= high < low + 3.0 * row
+    low, high = fit.ci(0.95, "delay+lag")
+    assert low <= 0.252 <= high < low + 0.02

@@ -12,7 +12,7 @@ evaluations takes long: intervals are t standard errors wide, from its curvature
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
@@ -50,6 +50,10 @@ UNSEEN = tuple(2.0**k for k in range(-6, 5))
 
 #: Most restarts from better minima, at which the search for an interval ends.
 RESTARTS = 8
+
+#: Error in rows from which a lag shorter than a row counts as not resolved, and the error in rows
+#: that it then has: half a row is its interval.
+UNRESOLVED, SPLIT = 4.0, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,8 +224,57 @@ def best_profile(
     return profile
 
 
-def common_covariance(fit: NoiseFit) -> Array:
-    """Covariance of the numbers that all recordings share: gain, delay, lags, zero."""
+def common_covariance(fit: NoiseFit, held: Sequence[int] | None = None) -> Array:
+    """Covariance of the numbers that all recordings share: gain, delay, lags, zero.
+
+    Lags that the rows do not resolve are `held`, by their places in the order of the kernel, or
+    those of this fit.
+    """
+    return _held(_covariance(fit), unresolved_lags(fit) if held is None else held, fit)
+
+
+def unresolved_lags(fit: NoiseFit) -> tuple[int, ...]:
+    """Places of the lags that the rows do not resolve, the shortest first.
+
+    Far below the time between rows a lag has the effect of a delay, and beside one of about the
+    same size that of this one: the linear model takes them for unknown to any size.
+    """
+    cov, kernel = _covariance(fit), [name for _, name in fit.model.order]
+    longest = max(float(np.ptp(rows.time)) for rows in fit.runs)
+    size = {
+        place: fit.numbers.lags[int(name.removeprefix("lag "))]
+        for place, name in enumerate(kernel)
+        if name.startswith("lag")
+    }
+    times = [place for place, name in enumerate(kernel) if name != "gain"]
+    held: tuple[int, ...] = ()
+    for place in sorted(size, key=lambda place: size[place]):
+        squares = np.diag(_held(cov, held, fit))
+        short = size[place] < _row(fit) and squares[place] > (UNRESOLVED * _row(fit)) ** 2
+        if not short and np.all((squares[times] > 0.0) & (squares[times] < longest**2)):
+            break
+        held = (*held, place)
+    return held
+
+
+def _held(cov: Array, held: Sequence[int], fit: NoiseFit) -> Array:
+    """The covariance where what such a lag is longer the delay is shorter."""
+    kernel = [name for _, name in fit.model.order]
+    for place in held:
+        cov = cov - np.outer(cov[:, place], cov[place]) / cov[place, place]
+        cov[place, :] = cov[:, place] = 0.0
+    for place in held:
+        shifted = np.array([(i == place) - 1.0 * (one == "delay") for i, one in enumerate(kernel)])
+        cov = cov + (SPLIT * _row(fit)) ** 2 * np.outer(shifted, shifted)
+    return cov
+
+
+def _row(fit: NoiseFit) -> float:
+    """Time between rows, s."""
+    return float(np.median(np.diff(fit.runs[0].time)))
+
+
+def _covariance(fit: NoiseFit) -> Array:
     blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
     if len(blocks) == 1:
         return blocks[0]
@@ -254,7 +307,7 @@ def unseen_air(
         return none
     middle = fit.numbers.objective
     _, slow = airs_of(fit.model, fit.runs)
-    total, sums = 0.0, dict.fromkeys(weights, 0.0)
+    total, sums, held = 0.0, dict.fromkeys(weights, 0.0), unresolved_lags(fit)
     for step in UNSEEN:
         noise = [
             changed(one, air=step * air.air, air_time=air.air_time)
@@ -263,7 +316,7 @@ def unseen_air(
         moved = fit.moved(with_noise(fit.numbers, noise))
         rise = sum(part.objective for part in moved.parts) - middle
         weight = math.sqrt(step) * math.exp(-0.5 * max(rise, -1.0))
-        cov = common_covariance(moved)
+        cov = common_covariance(moved, held)
         total += weight
         for name, w in weights.items():
             sums[name] += weight * float(w @ cov @ w)
@@ -281,6 +334,7 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
     ]
     if not places:
         return dict.fromkeys(weights, float(rows))
+    held = unresolved_lags(fit)
 
     def at(steps: Mapping[int, float]) -> tuple[float, dict[str, float]]:
         noise = [{name: getattr(one, name) for name in PARTS} for one in base]
@@ -289,7 +343,7 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
             noise[run][part] *= math.exp(step)
         numbers = with_noise(fit.numbers, [RowNoise(**one) for one in noise])
         moved = fit.moved(numbers)
-        cov = common_covariance(moved)
+        cov = common_covariance(moved, held)
         value = sum(part.objective for part in moved.parts)
         return value, {
             name: math.log(max(float(w @ cov @ w), 1e-300)) for name, w in weights.items()
