@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import runpy
+import subprocess
 from pathlib import Path
+from typing import Any
 
 import deadtime as dtm
 import numpy as np
@@ -198,11 +200,39 @@ def test_a_broken_request_is_refused_with_the_reason(
     assert web.call("rightmost", [*numbers(loop), 1])[0] == loop.spectral_abscissa()
 
 
-def test_the_module_in_the_tree_was_made_from_the_sources_in_the_tree() -> None:
+@pytest.fixture
+def made() -> dict[str, Any]:
+    """What `rust/web/make.py` defines."""
     script = ROOT / "rust/web/make.py"
     if not script.exists():
         pytest.skip("the sources of the kernels are not beside these tests")
-    made = runpy.run_path(str(script))
+    return runpy.run_path(str(script))
+
+
+@pytest.mark.survey
+def test_a_module_built_again_gives_the_same_bits(web: WebKernels, made: dict[str, Any]) -> None:
+    where = ["rustc", "--print", "target-libdir", "--target", "wasm32-unknown-unknown"]
+    try:
+        found = subprocess.run(where, check=True, capture_output=True, text=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        found = ""
+    if not found or not Path(found).is_dir():
+        pytest.skip("rustup target add wasm32-unknown-unknown: the kernels cannot be built here")
+    built = WebKernels(made["build"]())
+    time = np.linspace(0.0, 6.0, 61)
+    for loop in LOOPS:
+        for name, further in [
+            ("rightmost", [4]),
+            ("margins", []),
+            ("step", [0, 1.0, 0, len(time), *time]),
+        ]:
+            question = [*numbers(loop), *further]
+            np.testing.assert_array_equal(built.call(name, question), web.call(name, question))
+
+
+def test_the_module_in_the_tree_was_made_from_the_sources_in_the_tree(
+    made: dict[str, Any],
+) -> None:
     about = json.loads(made["ORIGIN"].read_text(encoding="utf-8"))
     assert about["sources"] == made["sources_hash"](), "run: python rust/web/make.py"
     assert about["compressed"] == made["MODULE"].stat().st_size <= made["MOST"]

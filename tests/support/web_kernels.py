@@ -48,12 +48,12 @@ def axis(name: str, points: np.ndarray) -> list[float]:
 
 
 class WebKernels:
-    """The module, instantiated once."""
+    """The module of the package, or another one, instantiated once."""
 
-    def __init__(self) -> None:
+    def __init__(self, code: bytes | None = None) -> None:
         wasmtime = pytest.importorskip("wasmtime", reason="the runtime wasmtime is not installed")
         store = wasmtime.Store()
-        module = wasmtime.Module(store.engine, gzip.decompress(kernels()))
+        module = wasmtime.Module(store.engine, code or gzip.decompress(kernels()))
         assert not module.imports, "the kernels of a page import nothing"
         self._store = store
         self._exports = wasmtime.Instance(store, module, []).exports(store)
