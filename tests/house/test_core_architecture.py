@@ -16,12 +16,13 @@ FOUNDATION = {"error", "memory", "simd", "status", "task"}
 CORE_ARROWS = {
     "lambertw": set(),
     "elementary": set(),
+    "eigenvalues": set(),
     "quasipoly": {"elementary"},
-    "roots": {"elementary", "lambertw", "quasipoly"},
+    "roots": {"eigenvalues", "elementary", "lambertw", "quasipoly"},
     # Loops with a hold are stepped in `dde`.
     "stability": {"elementary", "lambertw", "quasipoly", "roots", "dde"},
     "frequency": {"elementary", "quasipoly", "roots", "stability"},
-    "dde": {"elementary", "quasipoly"},
+    "dde": {"eigenvalues", "elementary", "quasipoly"},
     "estimation": {"dde"},
 }
 
