@@ -583,3 +583,28 @@ def test_modes_have_the_names_of_their_firmware():
     assert ArduPilot().mode_name(MODES["ardupilot"][1]) == "LAND"
     assert PX4().mode_name(MODES["px4"][1]) == "AUTO.LAND"
     assert PX4().mode_name(MODES["px4"][0]) == "OFFBOARD"
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_only_a_simulator_is_flown_where_one_is_asked_for(firmware):
+    async def connected():
+        async with StandIn(firmware) as vehicle:
+            vehicle.parameters.pop("SIM_SPEEDUP", None)
+            before = dict(vehicle.parameters)
+            with pytest.raises(LinkError, match=r"is a simulator.*--i-have-a-safe-area"):
+                async with MAVLinkVehicle(ADDRESS, LIMITS, simulated=True):
+                    pass
+            assert vehicle.parameters == before
+            assert not any(
+                command == d.MAV_CMD_COMPONENT_ARM_DISARM for command, _ in vehicle.commands
+            )
+
+    run(connected())
+
+
+def test_a_simulator_is_one_by_its_parameter():
+    async def connected():
+        async with StandIn(), MAVLinkVehicle(ADDRESS, LIMITS, simulated=True) as link:
+            return await link.parameter("SIM_SPEEDUP")
+
+    assert run(connected()) == 1.0

@@ -17,6 +17,7 @@ ARDUPILOT = {
     "GUID_TIMEOUT": 3.0,
     "FS_GCS_TIMEOUT": 5.0,
     "FS_GCS_ENABLE": 0.0,
+    "SIM_SPEEDUP": 1.0,
     "FENCE_MARGIN": 2.0,
     "FENCE_TYPE": 7.0,
     "FENCE_ENABLE": 0.0,

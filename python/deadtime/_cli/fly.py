@@ -59,8 +59,8 @@ def command(
         bool,
         typer.Option(
             "--i-have-a-safe-area",
-            help="Needed with --host, and with a --link to another computer: a vehicle is about to "
-            "take off there.",
+            help="Needed with --host, and with a --link to another computer or to what is no "
+            "simulator: a vehicle is about to take off there.",
         ),
     ] = False,
     plant: Annotated[PlantName, typer.Option(help="What the emulator flies like.")] = "kit",
@@ -134,7 +134,7 @@ def command(
     ports = (navdata_port, command_port, control_port)
     try:
         with (
-            flown_vehicle(host, link, plant, seed, virtual_time, plan, ports) as vehicle,
+            flown_vehicle(host, link, plant, seed, virtual_time, plan, ports, consent) as vehicle,
             stages(plan.flights + 2, quiet=as_json) as begin,
         ):
             study = fly_experiment(vehicle.connect, plan, where, begin, vehicle.run, _print_note)

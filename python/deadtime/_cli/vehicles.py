@@ -50,6 +50,7 @@ def flown_vehicle(
     virtual_time: bool,
     plan: FlightPlan,
     ports: Ports,
+    consent: bool = False,
 ) -> Iterator[FlownVehicle]:
     name = f"an emulated AR.Drone 2.0 ({plant})"
     if virtual_time:
@@ -57,7 +58,7 @@ def flown_vehicle(
     elif link is not None:
         with terminated_like_interrupted():
             times: list[LinkTime] = []
-            connect = over_mavlink(link, plan, times)
+            connect = over_mavlink(link, plan, times, simulated=not consent)
             yield FlownVehicle(connect, f"the vehicle at {link}", run_landing, times)
     elif host is not None:
         with terminated_like_interrupted():
@@ -68,12 +69,19 @@ def flown_vehicle(
             yield FlownVehicle(lambda: _client(here, plan.limits, own), name, run_landing)
 
 
-def over_mavlink(link: str, plan: FlightPlan, times: list[LinkTime]) -> Connect:
-    """Connect to a vehicle; what TIMESYNC says at the end of each connection goes to `times`."""
+def over_mavlink(
+    link: str, plan: FlightPlan, times: list[LinkTime], simulated: bool = False
+) -> Connect:
+    """Connect to a vehicle, or to a `simulated` one only.
+
+    What TIMESYNC says at the end of each connection goes to `times`.
+    """
 
     @asynccontextmanager
     async def connect() -> AsyncIterator[Vehicle]:
-        async with MAVLinkVehicle(link, plan.limits, take_off_height=plan.base) as vehicle:
+        async with MAVLinkVehicle(
+            link, plan.limits, take_off_height=plan.base, simulated=simulated
+        ) as vehicle:
             yield vehicle
             if vehicle.link_time is not None:
                 times.append(vehicle.link_time)

@@ -54,6 +54,8 @@ class Autopilot(ABC):
         Whether the float of a parameter carries the bits of an integer, not the number.
     estimator : str
         Message with the flags of its position estimate.
+    simulated : str or None
+        A parameter that its simulator has and vehicles have not.
     """
 
     name: ClassVar[str]
@@ -63,6 +65,7 @@ class Autopilot(ABC):
     rising: ClassVar[tuple[int, ...]]
     integers_as_bits: ClassVar[bool]
     estimator: ClassVar[str]
+    simulated: ClassVar[str | None] = None
 
     @abstractmethod
     def mode(self, custom: int) -> tuple[float, ...]:
@@ -95,6 +98,7 @@ class ArduPilot(Autopilot):
     rising = (4,)
     integers_as_bits = False
     estimator = "EKF_STATUS_REPORT"
+    simulated = "SIM_SPEEDUP"
 
     def mode(self, custom: int) -> tuple[float, ...]:
         """As in `Autopilot`."""

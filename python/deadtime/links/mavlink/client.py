@@ -65,6 +65,8 @@ class MAVLinkVehicle:
         System id of the vehicle; needed where several are on the link.
     key : bytes, optional
         Signing key, 32 bytes: unsigned frames are refused then.
+    simulated : bool
+        Refuse a vehicle that does not say that it is a simulator, before anything is set in it.
 
     Raises
     ------
@@ -92,6 +94,7 @@ commanding it
         component: int = 190,
         vehicle: int | None = None,
         key: bytes | None = None,
+        simulated: bool = False,
     ) -> None:
         self.address = LinkAddress.of(address)
         self.limits = Limits() if limits is None else limits
@@ -105,7 +108,7 @@ commanding it
             if number is not None and not 1 <= number <= 255:
                 raise ValueError(f"{name}={number}: give a number from 1 to 255")
         self._ids = system, component
-        self._vehicle, self._key = vehicle, key
+        self._vehicle, self._key, self._simulated = vehicle, key, simulated
         self._listener: Callable[[VehicleState], None] | None = None
         self._parameters: Parameters | None = None
         self._autopilot: Autopilot | None = None
@@ -156,7 +159,8 @@ commanding it
         Raises
         ------
         LinkError
-            If it does not answer, is armed already, or does not keep a setting.
+            If it does not answer, is armed already, is no simulator where `simulated` asks for
+            one, or does not keep a setting.
         """
         if self._link.is_open:
             raise LinkError(f"{self.address} is connected already")
@@ -189,9 +193,19 @@ commanding it
                 )
         self._authority.refuse_armed(self._reader)
         self._parameters = Parameters(link, pilot.integers_as_bits)
+        if self._simulated and not await self._is_simulator(pilot):
+            raise LinkError(
+                f"what answers at {self.address} does not say that it is a simulator: a router "
+                "there may lead to a vehicle. If nobody and nothing can be hurt by its flight, "
+                "take simulated=False, or --i-have-a-safe-area on the command line"
+            )
         await pilot.set_limits(self._parameters, self.limits, self._ids[0])
         await ask_for_messages(link, pilot)
         self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
+
+    async def _is_simulator(self, pilot: Autopilot) -> bool:
+        name = pilot.simulated
+        return name is not None and await self._held.read(name) is not None
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
         """Register `listener` for every state; None removes it.
