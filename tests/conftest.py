@@ -18,6 +18,11 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Flights of a firmware first: each takes minutes of real time, and hardly any work."""
+    items.sort(key=lambda item: item.get_closest_marker("xdist_group") is None)
+
+
 @pytest.fixture
 def listens_to_ctrl_c():
     """SIGINT raises KeyboardInterrupt, also in a run that was started in the background.

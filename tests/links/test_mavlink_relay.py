@@ -13,7 +13,8 @@ pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
 from arducopter import alone, skip_without_firmware
 
-pytestmark = pytest.mark.survey
+# All on one worker: they share what was flown.
+pytestmark = [pytest.mark.survey, pytest.mark.xdist_group("firmware behind a relay")]
 
 SUPPORT = Path(__file__).parents[1] / "support"
 
