@@ -20,7 +20,7 @@ def pytest_xdist_auto_num_workers() -> int:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Flights of a firmware first: each takes minutes of real time, and hardly any work."""
-    items.sort(key=lambda item: item.get_closest_marker("xdist_group") is None)
+    items.sort(key=lambda item: item.get_closest_marker("flight") is None)
 
 
 @pytest.fixture

@@ -45,7 +45,7 @@ def test_waits_are_drawn_between_flights_without():
 
 
 @pytest.mark.survey
-@pytest.mark.xdist_group("waits of the firmware")
+@pytest.mark.flight
 def test_what_commands_wait_comes_out_of_a_flight(tmp_path):
     # Drawn anew in each run; a failure shows it.
     wait = round(random.SystemRandom().uniform(0.05, LONGEST), 3)

@@ -16,7 +16,7 @@ SUPPORT = Path(__file__).parents[1] / "support"
 
 
 @pytest.mark.survey
-@pytest.mark.xdist_group("experiment with the firmware")
+@pytest.mark.flight
 def test_the_delay_of_the_vehicle_is_found_and_its_designed_gains_fly(tmp_path):
     skip_without_firmware()
     folder = tmp_path / "flight"

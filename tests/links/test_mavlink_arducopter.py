@@ -12,8 +12,7 @@ pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
 from arducopter import alone, skip_without_firmware
 
-# All on one worker: they share what was flown.
-pytestmark = [pytest.mark.survey, pytest.mark.xdist_group("session of the firmware")]
+pytestmark = [pytest.mark.survey, pytest.mark.flight]
 
 SESSION = Path(__file__).parents[1] / "support" / "arducopter_session.py"
 

@@ -13,8 +13,7 @@ pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
 from arducopter import alone, skip_without_firmware
 
-# All on one worker: they share what was flown.
-pytestmark = [pytest.mark.survey, pytest.mark.xdist_group("firmware behind a relay")]
+pytestmark = [pytest.mark.survey, pytest.mark.flight]
 
 SUPPORT = Path(__file__).parents[1] / "support"
 
