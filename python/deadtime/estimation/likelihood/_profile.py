@@ -101,8 +101,10 @@ class LikelihoodProfile:
     @cached_property
     def bounds(self) -> dict[str, float]:
         """Standard errors for the fitted noise."""
-        squares = {name: float(w @ self.common @ w) for name, w in self._weights.items()}
-        if not all(square > 0.0 for square in squares.values()):
+        cov = self.common
+        known = bool(np.all(np.isfinite(cov)))
+        squares = {name: float(w @ cov @ w) for name, w in self._weights.items() if known}
+        if not known or not all(square > 0.0 for square in squares.values()):
             raise NotIdentifiableError(
                 f"{', '.join(self.fit.model.names)} cannot be told apart by this recording: give "
                 "the plant fewer lags, or let deadtime.estimation.choose_plant choose"
@@ -261,7 +263,8 @@ def _held(cov: Array, held: Sequence[int], fit: NoiseFit) -> Array:
     """The covariance where what such a lag is longer the delay is shorter."""
     kernel = [name for _, name in fit.model.order]
     for place in held:
-        cov = cov - np.outer(cov[:, place], cov[place]) / cov[place, place]
+        if 0.0 < cov[place, place] < math.inf:
+            cov = cov - np.outer(cov[:, place], cov[place]) / cov[place, place]
         cov[place, :] = cov[:, place] = 0.0
     for place in held:
         shifted = np.array([(i == place) - 1.0 * (one == "delay") for i, one in enumerate(kernel)])
@@ -276,10 +279,12 @@ def _row(fit: NoiseFit) -> float:
 
 def _covariance(fit: NoiseFit) -> Array:
     blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
-    if len(blocks) == 1:
+    # A recording whose derivatives are singular tells nothing here, which is the safe side.
+    told = [block for block in blocks if np.all(np.isfinite(block))]
+    if len(blocks) == 1 or not told:
         return blocks[0]
     # A number that one recording does not move at all, as a second lag of zero, has no variance.
-    information = sum(np.linalg.pinv(block, hermitian=True) for block in blocks)
+    information = sum(np.linalg.pinv(block, hermitian=True) for block in told)
     return np.asarray(np.linalg.pinv(information, hermitian=True))
 
 
