@@ -51,7 +51,7 @@ class StateReader:
         self._status = 0
         self._battery: float | None = None
         self._attitude: Any = None
-        self._setpoint: float | None = None
+        self._setpoint: dict[str, float | None] = {}
         self._frames = 0
         self._sequence: int | None = None
         self._gaps: deque[tuple[float, int]] = deque()
@@ -71,7 +71,11 @@ class StateReader:
             left = int(message.battery_remaining)
             self._battery = None if left < 0 else float(left)
         elif kind == "POSITION_TARGET_LOCAL_NED":
-            self._setpoint = _finite(-message.vz)
+            self._setpoint = {
+                "climb_setpoint": _finite(-message.vz),
+                "north_setpoint": _finite(message.vx),
+                "east_setpoint": _finite(message.vy),
+            }
         elif kind == self.estimator:
             flags = int(message.flags)
             self.ready = flags & ESTIMATED == ESTIMATED and not flags & CONSTANT
@@ -110,7 +114,6 @@ class StateReader:
             sequence=self._frames,
             vehicle_time=stamp,
             climb=-float(message.vz),
-            climb_setpoint=self._setpoint,
             roll=0.0 if turned is None else float(turned.roll),
             pitch=0.0 if turned is None else float(turned.pitch),
             yaw=None if turned is None else float(turned.yaw),
@@ -119,6 +122,7 @@ class StateReader:
             east=float(message.y),
             north_speed=float(message.vx),
             east_speed=float(message.vy),
+            **self._setpoint,
             battery=self._battery,
             emergency=self._emergency,
             fault="a failsafe of its own is active" if self._status == CRITICAL else None,
