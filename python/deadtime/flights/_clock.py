@@ -3,8 +3,9 @@
 A row of a recording holds the newest message at a sample of the controller, which is as old as the
 time since that message, the wait on the link and a busy machine have it. The vehicle's own clock
 stamps each message. The least of the differences between arrival and stamp, over every `STRETCH`
-seconds, lie on a line where both clocks run evenly; its slope is their difference in rate. By it
-the stamps are converted to times of this computer, up to a constant.
+seconds, lie on a line where both clocks run evenly; its slope is their difference in rate. On a
+link with much jitter their medians lie closer to one. By that line the stamps are converted to
+times of this computer, up to a constant.
 
 That constant does not matter: the delay of the loop contains the age of the row on which a command
 is computed, so the mean age of the rows is added to all times. An estimate on these times is of the
@@ -23,6 +24,9 @@ Array = NDArray[np.float64]
 #: Time over which the least difference of the clocks is sought, s.
 STRETCH = 2.0
 
+#: The quantiles that are tried.
+LEAST, MEDIAN = 0.0, 0.5
+
 #: Fewest stretches for a line.
 FEWEST = 3
 
@@ -38,9 +42,9 @@ class VehicleClock:
     Attributes
     ----------
     rate, offset : float
-        time = rate * stamp + offset, s; the fastest message arrives at the time of its stamp.
+        time = rate * stamp + offset, s; a fast message arrives at the time of its stamp.
     misfit : float
-        Largest distance of the least differences from the line, s.
+        Largest distance of the differences from the line, s.
     """
 
     rate: float
@@ -57,11 +61,17 @@ class VehicleClock:
         whole = places < places[-1]
         if np.unique(places[whole]).size < FEWEST:
             return None
-        least = [
-            int(rows[np.argmin(difference[rows])])
-            for rows in (np.flatnonzero(places == one) for one in np.unique(places[whole]))
-        ]
-        x, y = stamp[least] - stamp[0], difference[least]
+        stretches = [np.flatnonzero(places == one) for one in np.unique(places[whole])]
+        lines = [cls._through(stamp, difference, stretches, share) for share in (LEAST, MEDIAN)]
+        return min(lines, key=lambda line: line.misfit)
+
+    @classmethod
+    def _through(
+        cls, stamp: Array, difference: Array, stretches: list[NDArray[np.intp]], share: float
+    ) -> VehicleClock:
+        """The line through one quantile of the differences in each stretch."""
+        x = np.array([np.mean(stamp[rows]) for rows in stretches]) - stamp[0]
+        y = np.array([np.quantile(difference[rows], share) for rows in stretches])
         slope, offset = np.polyfit(x, y, 1)
         misfit = float(np.max(np.abs(y - slope * x - offset)))
         return cls(1.0 + float(slope), float(offset - slope * stamp[0]), misfit)

@@ -71,14 +71,15 @@ class Learned:
                 "with less other work."
             )
         if not self.fit.adequate:
-            _, _, why = self.fit.message.partition("not adequate: ")
+            _, _, reasons = self.fit.message.partition("not adequate: ")
+            why = reasons.rpartition(" (try")[0]
             found.append(
                 "The fit is not adequate (adequate=False): its residuals are more than noise of "
-                f"the sensor, for example wind, or of a vehicle that is none of "
-                f"{len(self.tried)} plants{': ' + why.rpartition(' (try')[0] if why else ''}. Its "
-                "intervals are an indication and may be too narrow; the gains were designed for "
-                "them, so their margin is not assured. Fly such gains only with space around the "
-                "vehicle, and repeat the experiment without wind."
+                "the sensor, for example wind, or the vehicle is no such plant"
+                f"{f' ({why})' if why else ''}. Its intervals are an indication and may be too "
+                "narrow; the gains were designed for them, so their margin is not assured. Fly "
+                "such gains only with space around the vehicle, and repeat the experiment without "
+                "wind."
             )
         return found
 

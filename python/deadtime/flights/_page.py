@@ -95,7 +95,7 @@ def _checked(study: FlightStudy) -> Figure:
 def _fitted(study: FlightStudy) -> str:
     learned = study.learned
     fit = learned.fit
-    small = "mm" if study.axis.unit == "m" else "mrad"
+    small = study.axis.thousandth
     words = (
         f"The residuals of the fit of all flights together are {1e3 * fit.rms:.1f} {small} (gain "
         f"{stated(fit.gain or 0.0, fit.stderr['gain'])}); "
@@ -106,7 +106,7 @@ def _fitted(study: FlightStudy) -> str:
         )
     )
     if len(learned.tried) > 1:
-        words += f" Plants that were tried: {'; '.join(one.line() for one in learned.tried)}."
+        words += f" Plants that were tried: {'; '.join(one.line(small) for one in learned.tried)}."
     ages = [one.age for one in learned.flights]
     if all(age is not None for age in ages):
         mean = sum(age for age in ages if age is not None) / len(ages)

@@ -2,9 +2,10 @@
 
 The plants are tried in order until one explains the flights: an integrator with a lag; that behind
 the limits of acceleration and jerk within which the vehicle follows its commands, by its own
-parameters where it tells them, else with a limit of acceleration that is fitted; and, behind known
-limits, two lags and a zero, for a controller of the velocity that overshoots. If none does, that of the fewest
-numbers with the smallest residuals is taken, and its estimate is not adequate.
+parameters where it tells them, else with a limit of acceleration that is fitted; and, to the sides
+and behind known limits, two lags and a zero, because the controller of a horizontal velocity
+overshoots. If none explains them, the closest of those with the fewest numbers is taken, and its
+estimate is not adequate.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any, TypeAlias
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation import DelayEstimate, estimate_delay
 from deadtime.flights._runs import FlownSteps
+from deadtime.links.axes import Axis
 from deadtime.loops import (
     ControlLoop,
     FactoredPlant,
@@ -52,15 +54,15 @@ class TriedPlant:
     fit: DelayEstimate | None
     refused: str = ""
 
-    def line(self) -> str:
-        """How the fit came out."""
+    def line(self, unit: str) -> str:
+        """How the fit came out, in thousandths of the unit of the output."""
         if self.fit is None:
             return f"{self.words}: {self.refused}"
         verdict = "adequate" if self.fit.adequate else "not adequate"
-        return f"{self.words}: {verdict}, residuals {1e3 * self.fit.rms:.1f}e-3 rms"
+        return f"{self.words}: {verdict}, residuals of {1e3 * self.fit.rms:.1f} {unit}"
 
 
-def candidates(shaping: Shaping | None) -> Iterator[tuple[str, Plant, tuple[str, ...]]]:
+def candidates(axis: Axis, shaping: Shaping | None) -> Iterator[tuple[str, Plant, tuple[str, ...]]]:
     """The plants in words, and what is fitted of each."""
     yield "an integrator with a lag", Integrator(1.0, lag=LAG), USUAL
     if shaping is None:
@@ -74,6 +76,8 @@ def candidates(shaping: Shaping | None) -> Iterator[tuple[str, Plant, tuple[str,
         RateLimited(Integrator(1.0, lag=LAG), rate, jerk),
         USUAL,
     )
+    if axis.command not in ("north", "east"):
+        return
     overshoots = FactoredPlant(LAGS, zero=ZERO, integrator=True)
     yield (
         "an integrator, two lags and a zero behind these limits",
@@ -107,7 +111,7 @@ def fit_by_evidence(
         If no plant has an estimate; the message is that of the first.
     """
     tried: list[TriedPlant] = []
-    for words, plant, free in candidates(shaping):
+    for words, plant, free in candidates(flights[0].axis, shaping):
         if tried:
             progress(f"trying {words}")
         loops = [

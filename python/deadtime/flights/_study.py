@@ -133,12 +133,12 @@ class FlightStudy:
     def to_dict(self) -> dict[str, Any]:
         """All results but the recordings, as plain values for JSON."""
         learned = self.learned
-        split = learned.split
+        split, small = learned.split, self.axis.thousandth
         return {
             "verdict": self.verdict(),
             "adequate": learned.adequate,
             "irregular": list(learned.irregular),
-            "plants": [one.line() for one in learned.tried],
+            "plants": [one.line(small) for one in learned.tried],
             "fit": learned.fit.to_dict(),
             "overshoot_method": [
                 one if isinstance(one, str) else one.delay for one in learned.overshoot

@@ -63,6 +63,11 @@ class Axis:
         """Unit of a command."""
         return f"{self.unit}/s"
 
+    @property
+    def thousandth(self) -> str:
+        """A thousandth of the unit of the output."""
+        return f"m{self.unit}"
+
     def motion(self, rate: float) -> Motion:
         """The motion with this rate, and rest on the other axes.
 

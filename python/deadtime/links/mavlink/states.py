@@ -18,6 +18,9 @@ ESTIMATED, CONSTANT = 16 | 32, 128
 #: Time over which lost frames are looked at, s.
 RECENT = 1.0
 
+#: Longest time over which a heading is continued by its rate, s.
+OLDEST = 0.1
+
 #: Flags of MAV_MODE_FLAG and values of MAV_STATE.
 ARMED, CRITICAL, EMERGENCY, TERMINATED = 128, 5, 6, 8
 
@@ -116,7 +119,7 @@ class StateReader:
             climb=-float(message.vz),
             roll=0.0 if turned is None else float(turned.roll),
             pitch=0.0 if turned is None else float(turned.pitch),
-            yaw=None if turned is None else float(turned.yaw),
+            yaw=None if turned is None else _heading(turned, stamp),
             yaw_rate=None if turned is None else float(turned.yawspeed),
             north=float(message.x),
             east=float(message.y),
@@ -136,6 +139,13 @@ class StateReader:
         return off or self._status in (EMERGENCY, TERMINATED)
 
 
+def _heading(attitude: Any, stamp: float) -> float:
+    """The heading at a time of the vehicle, s, by its rate: the attitude is up to a period old."""
+    passed = stamp - 1e-3 * attitude.time_boot_ms
+    turned = float(attitude.yaw) + float(attitude.yawspeed) * min(max(passed, 0.0), OLDEST)
+    return math.remainder(turned, 2.0 * math.pi)
+
+
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
@@ -146,7 +156,7 @@ def wanted_messages(estimator: str) -> dict[str, tuple[int, float]]:
     rates = {
         "LOCAL_POSITION_NED": 50.0,
         "POSITION_TARGET_LOCAL_NED": 50.0,
-        "ATTITUDE": 25.0,
+        "ATTITUDE": 50.0,
         "EXTENDED_SYS_STATE": 10.0,
         "HEARTBEAT": 5.0,
         "SYS_STATUS": 2.0,
