@@ -1,8 +1,8 @@
-"""Flights of the firmware over links with the package's relay in between, and over one without.
+"""Flights of the firmware over three links, two of them with the package's relay in between.
 
-The vehicle has a port for each; the relay adds `ONE_WAY` in each direction, or for the argument
-``rough`` that with jitter and losses. Prints one line of JSON: for each link the estimate from the
-flight, the echo of the set point, and the round trip by TIMESYNC.
+The vehicle has a port for each. The relay of the second adds `ONE_WAY` in each direction, that of
+the third the same with jitter and losses. Prints one line of JSON: for each link the estimate from
+the flight, the echo of the set point, and the round trip by TIMESYNC.
 """
 
 import asyncio
@@ -28,7 +28,9 @@ ONE_WAY = 0.13
 #: Standard deviation of the delays of the rough link in each direction, s, and its losses.
 JITTER, LOSS = 0.02, 0.05
 
-NEAR, FAR, RELAY = 14550, 14560, 14570
+#: Ports of the ground station, and of the relays.
+NEAR, FAR, ROUGH = 14550, 14560, 14570
+FAR_RELAY, ROUGH_RELAY = 14561, 14571
 
 PLAN = FlightPlan(
     gains=(0.7,),
@@ -56,11 +58,19 @@ async def flown(port, folder):
     return flight, trips[0], shaping["z"]
 
 
-async def flights(folder, path):
-    """Over the near link, then over the far one."""
-    options = RelayOptions(("127.0.0.1", FAR), path, path, listen=("127.0.0.1", RELAY))
-    async with Relay(options):
-        return [await flown(port, folder) for port in (NEAR, FAR)]
+def relay(port, listening, delay, loss=0.0):
+    """A relay in front of the ground station at a port."""
+    path = Network(delay=delay, loss=loss)
+    return Relay(RelayOptions(("127.0.0.1", port), path, path, listen=("127.0.0.1", listening)))
+
+
+async def flights(folder):
+    """Over the near link, then over the others."""
+    async with (
+        relay(FAR, FAR_RELAY, ONE_WAY),
+        relay(ROUGH, ROUGH_RELAY, Normal(ONE_WAY, JITTER), LOSS),
+    ):
+        return [await flown(port, folder) for port in (NEAR, FAR, ROUGH)]
 
 
 def told(flight, link_time, shaping):
@@ -91,10 +101,7 @@ def told(flight, link_time, shaping):
 
 
 if __name__ == "__main__":
-    folder, kind = Path(sys.argv[1]), sys.argv[2:]
-    path = Network(delay=ONE_WAY)
-    if kind == ["rough"]:
-        path = Network(delay=Normal(ONE_WAY, JITTER), loss=LOSS)
-    with firmware(f"udpclient:127.0.0.1:{NEAR}", f"udpclient:127.0.0.1:{RELAY}"):
-        flights_and_times = asyncio.run(flights(folder, path))
+    ports = [f"udpclient:127.0.0.1:{port}" for port in (NEAR, FAR_RELAY, ROUGH_RELAY)]
+    with firmware(*ports):
+        flights_and_times = asyncio.run(flights(Path(sys.argv[1])))
     print(json.dumps([told(*one) for one in flights_and_times]))

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation import DelayEstimate, estimate_delay
 from deadtime.flights._plan import FlightPlan
-from deadtime.flights._plants import Shaping, TriedPlant, fit_by_evidence, for_small_commands
+from deadtime.flights._plants import (
+    Shaping,
+    TriedPlant,
+    fit_by_evidence,
+    for_small_commands,
+    lag_of_limits,
+)
 from deadtime.flights._runs import FlownSteps, read_columns, read_telemetry
 from deadtime.flights._split import DelaySplit, split_delay
 from deadtime.loops import PV, ControlLoop, Integrator, P
@@ -60,6 +66,15 @@ class Learned:
     def adequate(self) -> bool:
         """Whether the fit explains the flights, and their times can be relied on."""
         return self.fit.adequate and not self.irregular
+
+    @property
+    def whole_delay(self) -> float:
+        """Delay and lags of the loop for small commands, s: with the lag of the vehicle's limits.
+
+        Where the fitted plant limits acceleration and jerk, `fit` has the delay and the lag beside
+        these limits, and small commands are followed with the further lag acceleration/jerk.
+        """
+        return self.fit.delay_plus_lag + lag_of_limits(self.fit)
 
     def warnings(self) -> list[str]:
         """Warnings about the gains if the fit does not explain the flights."""

@@ -145,6 +145,14 @@ def fit_by_evidence(
     return closest, tuple(tried)
 
 
+def lag_of_limits(fit: DelayEstimate) -> float:
+    """Time constant with which small commands are followed within the limits of the plant, s."""
+    plant = fit.loop.plant
+    if not isinstance(plant, RateLimited) or plant.rate_of_rate is None:
+        return 0.0
+    return plant.rate / plant.rate_of_rate
+
+
 def for_small_commands(fit: DelayEstimate) -> DelayEstimate:
     """The estimate with a linear plant, for a design: without its limits, but with their lag.
 
@@ -155,7 +163,7 @@ def for_small_commands(fit: DelayEstimate) -> DelayEstimate:
     if not isinstance(limited, RateLimited):
         return fit
     inner = limited.plant
-    shaped = 0.0 if limited.rate_of_rate is None else limited.rate / limited.rate_of_rate
+    shaped = lag_of_limits(fit)
     numbers = {name: value for name, value in inner.parameters.items() if name != "gain"}
 
     def polynomials(**values: Any) -> tuple[list[Any], list[Any]]:

@@ -11,6 +11,7 @@ from deadtime._base.digits import between, stated
 from deadtime.estimation import DelayEstimate
 from deadtime.flights._learn import Learned
 from deadtime.flights._plan import FlightPlan
+from deadtime.flights._plants import lag_of_limits
 from deadtime.flights._runs import FlownSteps
 from deadtime.links.axes import Axis
 from deadtime.loops import RateLimited
@@ -75,11 +76,13 @@ class FlightStudy:
         beside = ""
         if isinstance(fit.loop.plant, RateLimited):
             beside = " beside the limits within which the vehicle follows a command"
+            if slow := lag_of_limits(fit):
+                beside += f", which are a further lag of {slow:g} s for small ones"
         sentences = [
             f"The delay of the loop on {self.axis.name}, lag included, is "
-            f"{stated(fit.delay_plus_lag, whole, 's')}{beside}, "
-            f"{between(*ends, whole, 's')} with 95 % confidence: {' and '.join(parts)}, at a gain "
-            f"of {stated(fit.gain or 0.0, fit.stderr['gain'])}."
+            f"{stated(fit.delay_plus_lag, whole, 's')}, {between(*ends, whole, 's')} with 95 % "
+            f"confidence{beside}: {' and '.join(parts)}, at a gain of "
+            f"{stated(fit.gain or 0.0, fit.stderr['gain'])}."
         ]
         split = self.learned.split
         if split is not None:
@@ -140,6 +143,7 @@ class FlightStudy:
             "irregular": list(learned.irregular),
             "plants": [one.line(small) for one in learned.tried],
             "fit": learned.fit.to_dict(),
+            "whole_delay": learned.whole_delay,
             "overshoot_method": [
                 one if isinstance(one, str) else one.delay for one in learned.overshoot
             ],
