@@ -84,12 +84,15 @@ def told(flight, link_time, shaping):
         free=("delay", "gain", "lag"),
         window=(0.5 * flight.settle, None),
     )
-    echo = split_delay([read_telemetry(flight)]).transport
+    try:
+        echo = split_delay([read_telemetry(flight)]).transport.delay
+    except dtm.NotIdentifiableError:  # echoes that come as irregularly as messages
+        echo = None
     return {
         "total": fit.delay_plus_lag,
         "interval": fit.ci(0.95, "delay+lag"),
         "gain": fit.gain,
-        "echo": echo.delay,
+        "echo": echo,
         "median": link_time.median,
         "least": link_time.least,
         "mean": link_time.mean,
