@@ -30,7 +30,7 @@ def test_a_heading_is_read_without_jumps_from_where_it_was():
         reader.output(state(yaw=math.remainder(3.0 + 0.1 * k, 2 * math.pi))) for k in range(99)
     ]
     assert turned == pytest.approx([0.1 * k for k in range(99)])
-    with pytest.raises(dtm.LinkError, match="does not report its yaw"):
+    with pytest.raises(dtm.LinkError, match="does not report its heading"):
         reader.output(state())
 
 

@@ -38,7 +38,7 @@ PLAN = FlightPlan(
     base=3.0,
     settle=8.0,
     hold=8.0,
-    limits=Limits(max_climb=1.0, max_height=6.0, max_error=1.5, max_state_age=0.5),
+    limits=Limits(max_climb=1.0, max_height=6.0, max_error=1.5, max_state_age=0.5, max_missing=100),
 )
 
 

@@ -185,6 +185,8 @@ async def fly_all(
 ) -> Flown:
     """Take off, make all flights one after the other, and land; `number` is that of the first."""
     made = []
+    # Before the take-off: what is needed for it may have to be loaded first.
+    controls = [_control(one) for one in flights]
     shaping: dict[str, Shaping | None] = {}
     axes = tuple(dict.fromkeys(one.plan.axis for one in flights))
     # The journals are closed last, so that a slow disk does not keep the vehicle in the air.
@@ -195,14 +197,20 @@ async def fly_all(
                 shaping = {axis: await vehicle.shaping(axis) for axis in axes}
             await vehicle.take_off()
             origin = await vehicle.state()
-            for place, one in enumerate(flights, number):
+            for place, (one, control) in enumerate(zip(flights, controls, strict=True), number):
                 name = f"{one.plan.axis} {named(one.controller)}"
                 progress(f"flight {place} of {total or len(flights)}: {name}")
                 kind = type(one.controller).__name__
                 path = folder / f"flight-{place}-{one.plan.axis}-{kind}.csv"
-                made.append((one, path, await _fly_one(vehicle, one, path, journals, origin)))
+                messages = await _fly_one(vehicle, one, control, path, journals, origin)
+                made.append((one, path, messages))
             await vehicle.land()
     return [_read(one, path, messages) for one, path, messages in made], shaping
+
+
+def _control(one: PlannedFlight) -> AxisControl:
+    smoothing = getattr(one.controller, "filter", None) or PAPER_FILTER
+    return AxisControl(one.controller, one.plan.sample_time, smoothing)
 
 
 def _check_axes(vehicle: Vehicle, axes: Sequence[str]) -> None:
@@ -233,14 +241,13 @@ def _read(one: PlannedFlight, path: Path, messages: Path | None) -> FlownSteps:
 async def _fly_one(
     vehicle: Vehicle,
     one: PlannedFlight,
+    control: AxisControl,
     path: Path,
     journals: ExitStack,
     origin: VehicleState,
 ) -> Path | None:
     """Make one flight with a vehicle in the air; return the file of its messages, if any."""
-    plan, controller, axis = one.plan, one.controller, one.plan.flown_axis
-    smoothing = getattr(controller, "filter", None) or PAPER_FILTER
-    control = AxisControl(controller, plan.sample_time, smoothing)
+    plan, axis = one.plan, one.plan.flown_axis
     begin = now()
     journal = journals.enter_context(Journal(path, row_columns(axis)))
     messages = None

@@ -44,11 +44,22 @@ def render(studies: Sequence[FlightStudy], vehicle: str) -> str:
         "flights/page.html",
         title=f"Steps flown by {vehicle}",
         described=_described(studies, vehicle),
-        verdict=" ".join(study.verdict() for study in studies),
+        verdict=_verdict(studies),
         axes=[_axis(study, len(studies) > 1) for study in studies],
         heads=COLUMNS,
         parts_heads=PARTS,
     )
+
+
+def _verdict(studies: Sequence[FlightStudy]) -> str:
+    """The outcomes; of several axes the warnings are in their sections."""
+    if len(studies) == 1:
+        return studies[0].verdict()
+    sentences = [study.outcome() for study in studies]
+    doubtful = [study.axis.name for study in studies if not study.learned.adequate]
+    if doubtful:
+        sentences.append(f"Not adequate: the estimates of {', '.join(doubtful)}; see below.")
+    return " ".join(sentences)
 
 
 def _axis(study: FlightStudy, several: bool) -> dict[str, Any]:
@@ -56,8 +67,8 @@ def _axis(study: FlightStudy, several: bool) -> dict[str, Any]:
     designed, axis = study.learned.designed, study.axis
     return {
         "name": axis.name,
-        "of": f" of {axis.name}, the {axis.output}" if several else "",
-        "output": axis.output,
+        "of": f" of {axis.name}, the {axis.words}" if several else "",
+        "warnings": study.learned.warnings() if several else [],
         "rows": study.rows(),
         "parts": study.parts(),
         "fitted": _fitted(study),
@@ -76,7 +87,7 @@ def _described(studies: Sequence[FlightStudy], vehicle: str) -> str:
         gains = ", ".join(f"{one.controller.gains['Kp']:g}" for one in study.learned.flights)
         largest = plan.limits.largest(axis)
         flown.append(
-            f"steps of the {axis.output} by {plan.step:g} {axis.unit} under P control with Kp = "
+            f"steps of the {axis.words} by {plan.step:g} {axis.unit} under P control with Kp = "
             f"{gains}, commands limited to {largest:g} {axis.rate_unit}"
         )
     count = sum(len(study.flights) for study in studies)

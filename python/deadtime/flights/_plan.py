@@ -129,7 +129,7 @@ class FlightPlan:
         axis = self.flown_axis
         if positive("step", self.step) < LEAST_STEP:
             raise ValueError(
-                f"step={self.step:g} {axis.unit} is within the noise of the {axis.output}: fly "
+                f"step={self.step:g} {axis.unit} is within the noise of the {axis.words}: fly "
                 f"{LEAST_STEP:g} {axis.unit} or more"
             )
         for Kp in self.gains:
@@ -140,7 +140,7 @@ class FlightPlan:
         """The plan in words, without its limits."""
         axis = self.flown_axis
         gains = ", ".join(f"{Kp:g}" for Kp in self.gains)
-        where = f"from {self.base:g} {axis.unit} " if axis.absolute else f"of the {axis.output} "
+        where = f"from {self.base:g} {axis.unit} " if axis.absolute else f"of the {axis.words} "
         return (
             f"{self.flights} flights: steps of {self.step:g} {axis.unit} {where}under P "
             f"control with Kp = {gains}, then under gains designed from these"

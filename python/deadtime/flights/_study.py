@@ -66,6 +66,10 @@ class FlightStudy:
         return (*self.learned.flights, *self.checked)
 
     def verdict(self) -> str:
+        """The outcome in a few sentences, with the warnings."""
+        return " ".join([self.outcome(), *self.learned.warnings()])
+
+    def outcome(self) -> str:
         """The outcome in a few sentences."""
         fit = self.learned.fit
         ends = fit.ci(0.95, "delay+lag")
@@ -96,7 +100,6 @@ class FlightStudy:
         sentences.append(
             f"A step {_did(before)} under {before.name}, and {_did(after)} under {after.name}."
         )
-        sentences += self.learned.warnings()
         return " ".join(sentences)
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -123,7 +126,7 @@ class FlightStudy:
         """The parts of the delay: a name, a value and a 95 % interval for each row."""
         fit, split = self.learned.fit, self.learned.split
         lines: list[tuple[str, ...]] = [
-            _part(fit, name, f"{words}, from command and {self.axis.output}")
+            _part(fit, name, f"{words}, from command and {self.axis.words}")
             for name, words in (("delay", "delay"), ("lag", "lag"), ("delay+lag", "together"))
             if name in fit.stderr
         ]

@@ -26,6 +26,8 @@ class Axis:
         follows; the last is empty where no vehicle reports it.
     command : str
         Name in `Motion` of the commanded rate.
+    words : str
+        The output in words.
     unit : str
         Of the output, ``m`` or ``rad``.
     absolute : bool
@@ -47,6 +49,7 @@ class Axis:
     rate: str
     setpoint: str
     command: str
+    words: str
     unit: str = "m"
     absolute: bool = False
     wraps: bool = False
@@ -126,7 +129,7 @@ class AxisReader:
     def _reported(self, state: VehicleState) -> float:
         value = getattr(state, self.axis.output)
         if value is None:
-            raise LinkError(f"the vehicle does not report its {self.axis.output}")
+            raise LinkError(f"the vehicle does not report its {self.axis.words}")
         return float(value)
 
 
@@ -134,9 +137,9 @@ class AxisReader:
 AXES: Mapping[str, Axis] = {
     one.name: one
     for one in (
-        Axis("z", "height", "climb", "climb_setpoint", "up", absolute=True),
-        Axis("x", "north", "north_speed", "north_setpoint", "north"),
-        Axis("y", "east", "east_speed", "east_setpoint", "east"),
-        Axis("yaw", "yaw", "yaw_rate", "", "turn", unit="rad", wraps=True),
+        Axis("z", "height", "climb", "climb_setpoint", "up", "height", absolute=True),
+        Axis("x", "north", "north_speed", "north_setpoint", "north", "position to the north"),
+        Axis("y", "east", "east_speed", "east_setpoint", "east", "position to the east"),
+        Axis("yaw", "yaw", "yaw_rate", "", "turn", "heading", unit="rad", wraps=True),
     )
 }

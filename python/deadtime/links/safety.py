@@ -302,7 +302,7 @@ class Watch:
         most = limits.error_of(axis)
         if reference is not None and not abs(value - reference) <= most:
             return (
-                f"the {axis.output} is {value:.2f} {axis.unit} and the reference {reference:.2f} "
+                f"the {axis.words} is {value:.2f} {axis.unit} and the reference {reference:.2f} "
                 f"{axis.unit}, more than {most:g} {axis.unit} apart"
             )
         if not self._distance(state) <= limits.max_distance:
@@ -312,7 +312,7 @@ class Watch:
             )
         if now - self._moved > limits.max_still:
             return (
-                f"the {axis.output} has read {value:.3f} {axis.unit} for {now - self._moved:.1f} s "
+                f"the {axis.words} has read {value:.3f} {axis.unit} for {now - self._moved:.1f} s "
                 "although it is not at the reference"
             )
         return self._broken_since(state)
