@@ -31,8 +31,8 @@ LEAST, MEDIAN = 0.0, 0.5
 FEWEST = 3
 
 #: Clocks that are this far from a line, s, cannot be converted: the vehicle or this machine stood
-#: still, or one of them ran slowly.
-MISFIT = 0.005
+#: still, or one of them ran slowly. To this come so many standard errors of a median.
+MISFIT, ERRORS = 0.005, 3.0
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,19 @@ class VehicleClock:
         time = rate * stamp + offset, s; a fast message arrives at the time of its stamp.
     misfit : float
         Largest distance of the differences from the line, s.
+    allowed : float
+        The misfit of clocks that run evenly, at most, s: more where messages wait irregularly.
     """
 
     rate: float
     offset: float
     misfit: float
+    allowed: float = MISFIT
+
+    @property
+    def even(self) -> bool:
+        """Whether both clocks ran evenly."""
+        return self.misfit <= self.allowed
 
     @classmethod
     def of(cls, arrival: Array, stamp: Array) -> VehicleClock | None:
@@ -63,7 +71,7 @@ class VehicleClock:
             return None
         stretches = [np.flatnonzero(places == one) for one in np.unique(places[whole])]
         lines = [cls._through(stamp, difference, stretches, share) for share in (LEAST, MEDIAN)]
-        return min(lines, key=lambda line: line.misfit)
+        return min(lines, key=lambda line: line.misfit / line.allowed)
 
     @classmethod
     def _through(
@@ -74,7 +82,12 @@ class VehicleClock:
         y = np.array([np.quantile(difference[rows], share) for rows in stretches])
         slope, offset = np.polyfit(x, y, 1)
         misfit = float(np.max(np.abs(y - slope * x - offset)))
-        return cls(1.0 + float(slope), float(offset - slope * stamp[0]), misfit)
+        allowed = MISFIT
+        if share == MEDIAN:
+            # The standard error of the median of normal numbers.
+            deviations = [np.std(difference[rows]) / np.sqrt(rows.size) for rows in stretches]
+            allowed += ERRORS * np.sqrt(0.5 * np.pi) * float(np.median(deviations))
+        return cls(1.0 + float(slope), float(offset - slope * stamp[0]), misfit, float(allowed))
 
     def time(self, stamp: Array) -> Array:
         """The times of stamps, s."""

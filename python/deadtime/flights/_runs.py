@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.flights._clock import MISFIT, VehicleClock
+from deadtime.flights._clock import VehicleClock
 from deadtime.links.axes import AXES, Axis
 from deadtime.loops import PV, P
 from deadtime.recordings import Recording, Step
@@ -166,7 +166,7 @@ class FlownSteps:
     def irregular(self) -> str:
         """Why the times of the flight are not to be relied on, or nothing."""
         clock, timing = self.clock, self.timing
-        if clock is not None and clock.misfit > MISFIT:
+        if clock is not None and not clock.even:
             return (
                 f"the vehicle's clock was {1e3 * clock.misfit:.0f} ms off a steady rate against "
                 "that of this computer: one of them stood still or ran slowly"
