@@ -20,7 +20,7 @@ SUPPORT = Path(__file__).parents[1] / "support"
 #: What the relay adds to the round trip, s.
 ADDED = 0.26
 
-#: Losses of the rough link, standard deviation of its delays, s, time between commands, s, and steps.
+#: Losses of the rough link, deviation of its delays, s, time between commands, s, and steps.
 LOSS, JITTER, SAMPLE, STEPS = 0.05, 0.02, 0.065, 2
 
 
