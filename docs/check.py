@@ -19,7 +19,7 @@ from urllib.parse import unquote, urldefrag
 import deadtime as dtm
 
 #: Names without an entry of their own: values and types that a sentence of their page explains.
-VALUES = {"roots.s", "loops.PAIR", "experiments.Noise"}
+VALUES = {"roots.s", "loops.PAIR", "experiments.Noise", "links.AXES"}
 
 
 #: An address of the network, not one of a namespace of XML.

@@ -50,7 +50,7 @@ def test_what_was_set_in_the_vehicle_is_put_back(session):
 
 
 def test_a_station_that_is_killed_leaves_a_vehicle_that_hovers_then_lands(session):
-    """Set points count for GUID_TIMEOUT; heartbeats, sent once a second, for FS_GCS_TIMEOUT."""
+    """Set points count for GUID_TIMEOUT; heartbeats, sent twice a second, for FS_GCS_TIMEOUT."""
     killed = session["killed"]
     assert killed["timeout"] == 0.5
     assert killed["told"] == pytest.approx(0.4)

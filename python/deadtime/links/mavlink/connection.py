@@ -14,8 +14,8 @@ from deadtime.links.mavlink.senders import Senders
 from deadtime.links.mavlink.sockets import LinkSocket
 from deadtime.links.mavlink.time_sync import EVERY, TimeSync
 
-#: Time between two heartbeats, s.
-HEARTBEAT = 1.0
+#: Time between two heartbeats, s: a vehicle that lands without them for 2 s may miss three.
+HEARTBEAT = 0.5
 
 #: Time for an answer before a request is repeated, s, and number of requests.
 ANSWER, TRIES = 0.7, 6
