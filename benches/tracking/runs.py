@@ -117,9 +117,7 @@ def fly(
             state[:, 1] += vehicle.gain * np.sum(size * height, axis=1)
             held = held + np.sum(size, axis=1)
         output[:, k] = state[:, 1] + vehicle.white * random.standard_normal(count)
-        command[:, k] = np.clip(
-            vehicle.Kp * (reference[:, k] - output[:, k]), -LIMIT, LIMIT
-        )
+        command[:, k] = np.clip(vehicle.Kp * (reference[:, k] - output[:, k]), -LIMIT, LIMIT)
         jumps[:, k] = command[:, k] - last
         last = command[:, k]
         if progress is not None and k % 4096 == 0:
