@@ -1,9 +1,9 @@
 """The posterior Cramér-Rao bound of a delay that walks, and the bound of a window.
 
 P. Tichavský, C. H. Muravchik and A. Nehorai, "Posterior Cramér-Rao bounds for discrete-time
-nonlinear filtering", IEEE Transactions on Signal Processing 46 (1998): with Gaussian noise the bound
-is the covariance that the extended Kalman filter would have if it knew where to linearise, at the
-true states. The states are speed, height, gust, gain and delay; the derivatives of the row are
+nonlinear filtering", IEEE Transactions on Signal Processing 46 (1998): with Gaussian noise the
+bound is the covariance that the extended Kalman filter would have if it knew where to linearise, at
+the true states. The states are speed, height, gust, gain and delay; the derivatives of the row are
 taken numerically at the truth of each run, given its commands.
 """
 

@@ -23,8 +23,8 @@ def command(
     source: Annotated[
         str,
         typer.Argument(
-            help="A table as of `estimate`; with --follow a CSV that grows; or udp:HOST:PORT, where "
-            "a MAVLink link is listened to. Nothing is ever sent.",
+            help="A table as of `estimate`; with --follow a CSV that grows; or udp:HOST:PORT, "
+            "where a MAVLink link is listened to. Nothing is ever sent.",
             show_default=False,
         ),
     ],

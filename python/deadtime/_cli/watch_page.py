@@ -32,7 +32,7 @@ class WatchPage:
         outer = self
 
         class Handler(BaseHTTPRequestHandler):
-            def do_GET(self) -> None:  # noqa: N802
+            def do_GET(self) -> None:
                 name = self.headers.get("Host", "").rpartition(":")[0]
                 if name not in OWN_NAMES:
                     self.send_error(403)

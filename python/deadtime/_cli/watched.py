@@ -54,8 +54,13 @@ class Columns(NamedTuple):
 
 def recorded(file: Path, columns: Columns) -> Iterator[Row]:
     """The rows of a table that is complete."""
-    names = {"time": columns.time, "output": columns.output, "command": columns.command}
-    recording = read_recording(file, reference=columns.command, **names)
+    recording = read_recording(
+        file,
+        time=columns.time,
+        reference=columns.command,
+        output=columns.output,
+        command=columns.command,
+    )
     assert recording.command is not None
     values = (recording.time, recording.output, recording.command)
     for row in zip(*(one.tolist() for one in values), strict=True):

@@ -9,8 +9,8 @@ while the loop runs. Each method is a class that holds its options.
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `methods` holds one file a
 # method, `data` what they read from a recording, `models` what they fit, `fit` least squares,
-# profiles and residuals, `planning` the bounds of planned experiments, `running` the estimates while
-# a loop runs.
+# profiles and residuals, `planning` the bounds of planned experiments, `running` what is
+# estimated while a loop runs.
 
 from deadtime.estimation._choose import PlantChoice, choose_plant
 from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -167,10 +166,9 @@ class OnlineEstimator:
         }
         self._bank: OnlineBank | None = None
         self._noise: FlightNoise | None = None
-        self._rows: list[tuple[float, float, float]] = []
+        self._rows: list[tuple[float, float | None]] = []
         self._commands: list[tuple[float, float]] = []
         self._next_fit = LEARN
-        self._held = math.nan
         # The settings are checked now, not with the first row.
         checked = self._settings(FlightNoise(white=1.0))
         OnlineBank(checked)
@@ -247,10 +245,10 @@ class OnlineEstimator:
         ValueError
             If a number is not finite or the time does not increase.
         """
-        lost = output is None or math.isnan(output)
+        seen = None if output is None or math.isnan(output) else output
         if self._bank is None:
-            return self._learn(finite("time", time), math.nan if lost else float(output), command)
-        numbers = self._bank.row(time, None if lost else output)
+            return self._learn(finite("time", time), seen, command)
+        numbers = self._bank.row(time, seen)
         if command is not None:
             self._bank.command(time, command)
         return self._estimate(numbers)
@@ -312,13 +310,13 @@ class OnlineEstimator:
         self._bank = OnlineBank(self._settings(noise))
         self._noise = noise
 
-    def _learn(self, time: float, output: float, command: float | None) -> OnlineEstimate:
+    def _learn(self, time: float, output: float | None, command: float | None) -> OnlineEstimate:
         """Keep a row until the noise is known; then go over all that were kept."""
         if self._rows and time <= self._rows[-1][0]:
             raise ValueError(
                 f"the time {time} s follows {self._rows[-1][0]} s: give increasing times"
             )
-        self._rows.append((time, output, math.nan))
+        self._rows.append((time, None if output is None else finite("output", output)))
         if command is not None:
             self.command(time, command)
         sets = lag_sets(self._model, self._lags)
@@ -340,8 +338,7 @@ class OnlineEstimator:
 
     def _fit(self) -> DelayEstimate:
         """The batch estimate of the rows so far."""
-        rows = np.array(self._rows)
-        rows = rows[~np.isnan(rows[:, 1])]
+        rows = np.array([row for row in self._rows if row[1] is not None], dtype=float)
         sent = np.array(self._commands).reshape(-1, 2)
         if not sent.size or np.ptp(sent[:, 1]) == 0.0:
             raise NotIdentifiableError("the command has not changed")
@@ -358,16 +355,16 @@ class OnlineEstimator:
         self._freedom = min(MOST_FITTED, float(fit.residuals.size))
         if not fit.adequate:
             self._doubts = (f"the first {LAST:.0f} s did not fit ({fit.message})",)
-        self._begin(replace(noise))
+        self._begin(noise)
         assert self._bank is not None
         commands = iter([*self._commands, (math.inf, 0.0)])
         coming = next(commands)
         numbers: list[float] = []
-        for time, output, _ in self._rows:
+        for time, output in self._rows:
             while coming[0] < time:
                 self._bank.command(*coming)
                 coming = next(commands)
-            numbers = self._bank.row(time, None if math.isnan(output) else output)
+            numbers = self._bank.row(time, output)
         while math.isfinite(coming[0]):
             self._bank.command(*coming)
             coming = next(commands)
