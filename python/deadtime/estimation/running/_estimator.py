@@ -35,7 +35,7 @@ Row = tuple[float, float | None, float | None]
 
 #: First rows from which the noise is learned: from so many seconds, again after as many, and for
 #: the last time after so many.
-LEARN, LAST = 10.0, 60.0
+LEARN, LAST = 10.0, 30.0
 
 #: Fewest rows that the noise is learned from.
 FEWEST = 40
@@ -169,6 +169,7 @@ class OnlineEstimator:
         self._rows: list[tuple[float, float | None]] = []
         self._commands: list[tuple[float, float]] = []
         self._next_fit = LEARN
+        self._reason = "the noise is being learned"
         # The settings are checked now, not with the first row.
         checked = self._settings(FlightNoise(white=1.0))
         OnlineBank(checked)
@@ -323,18 +324,17 @@ class OnlineEstimator:
         totals = [sum(one) - self._model.zero + self._model.own_lag for one in sets]
         lags = (min(totals), max(totals))
         span = time - self._rows[0][0]
-        reason = "the noise is being learned"
         if span >= self._next_fit and len(self._rows) >= FEWEST:
             self._next_fit += LEARN
             try:
                 fit = self._fit()
             except (NotIdentifiableError, RecordingError) as error:
-                reason = str(error)
+                self._reason = str(error)
             else:
-                if fit.adequate or span > LAST:
+                if fit.adequate or span >= LAST:
                     return self._replay(fit)
-                reason = fit.message
-        return not_yet(time, self.delays, lags, self._gain, reason)
+                self._reason = fit.message
+        return not_yet(time, self.delays, lags, self._gain, self._reason)
 
     def _fit(self) -> DelayEstimate:
         """The batch estimate of the rows so far."""

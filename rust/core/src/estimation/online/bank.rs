@@ -4,13 +4,15 @@
 use super::super::disturbance::Joint;
 use super::super::kept::Kept;
 use super::super::propagation::{Propagation, Square};
+use super::answer::Answer;
 use super::cell::{Cell, Column, Look};
 use super::history::{History, Jump};
 use super::judge::{AGES, Judge, Scale};
 use super::posterior::known;
 use super::response::StepResponse;
+use super::row_by_row::Online;
+use super::settings::{Lags, Settings};
 use super::walk::Walk;
-use super::{Answer, Online, Settings};
 use crate::Error;
 
 /// Deviations of what a level or a state that is not known may be, in those of the white noise.
@@ -27,7 +29,10 @@ const MOST_OUTLIERS: u32 = 2;
 
 /// Time between changes that is expected before the first row, s. The hazard of the second bank is
 /// one a second, so that its weights over this time are the odds for a change.
-const RARE: f64 = 600.0;
+const RARE: f64 = 3600.0;
+
+/// Over this time the weights of the second bank fade, s: what began before it is no change now.
+const WINDOW: f64 = 30.0;
 
 /// Weight below which a cell has no say whether a row is an outlier.
 const NO_SAY: f64 = 1e-6;
@@ -267,6 +272,11 @@ impl<const N: usize> Bank<N> {
         let walked = self.settings.drift.powi(2) * length * gate;
         self.main.mix(walked, white);
         if self.settings.alarm.is_finite() {
+            let fade = (-length / WINDOW).exp();
+            self.changed
+                .weights
+                .iter_mut()
+                .for_each(|weight| *weight *= fade);
             self.inject(length * gate, white);
             self.changed.mix(walked, white);
         }
@@ -518,7 +528,7 @@ impl<const N: usize> Bank<N> {
 const MOST_MEMORY: f64 = 30.0;
 
 impl<const N: usize> Layer<N> {
-    fn new(settings: &Settings, one: &super::Lags) -> Result<Self, Error> {
+    fn new(settings: &Settings, one: &Lags) -> Result<Self, Error> {
         let space = settings.plant.space(&one.lags, one.zero);
         let joint = Joint::new(&space, &settings.disturbances)?;
         let (own, plant) = (joint.c.len(), space.b.len());
