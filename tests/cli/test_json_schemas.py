@@ -36,6 +36,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     np.savetxt(
         place / "step.csv", table, delimiter=",", header="time,reference,output", comments=""
     )
+    command = np.where(np.sin(time) > 0.0, 0.5, -0.5)
+    moved = np.cumsum(np.roll(command, 5)) * 0.065 + noise
+    table = np.column_stack([time, moved, command])
+    np.savetxt(place / "moved.csv", table, delimiter=",", header="time,output,command", comments="")
     (place / "flight.bin").write_bytes(copter().data)
     return place
 
@@ -51,6 +55,7 @@ STEP = ("estimate", "step.csv", "--kp", 2.4)
         ("design", ("design", "--delay", 0.3, "--controller", "P")),
         ("simulate", ("simulate", "--kp", 1, "--delay", 0.3)),
         ("explore", ("explore", "--out", "page.html")),
+        ("watch", ("watch", "moved.csv", "--noise", 0.005)),
         ("report", ("report", "step.csv", "--kp", 2.4, "--out", "report.html")),
         ("demo", ("demo", "--folder", "demo")),
         ("estimate", (*STEP, "--method", "auto")),

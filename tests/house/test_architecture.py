@@ -48,6 +48,7 @@ LIKELIHOOD = {
     "estimation.likelihood._start",
     "estimation.methods._flight_conclusion",
     "estimation.planning._whitening",
+    "estimation.running._estimator",
 }
 #: The files after the numerics that may import the native module: its wire formats.
 WIRE = {

@@ -81,6 +81,7 @@ ORDER = {
         "variables",
         "fit",
         "profile",
+        "online",
     ],
 }
 

@@ -23,6 +23,11 @@ def planned():
     return dtm.identifiability(LOOP, Experiment.step(1.0, 5.0), noise=0.01)
 
 
+def tracked():
+    time = 0.065 * np.arange(12)
+    return dtm.estimation.online(dtm.Recording(time, time, time, time), LOOP, noise=0.01)
+
+
 def designed():
     return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
 
@@ -51,6 +56,7 @@ DRAWN = {
     "Certificate.plot": lambda: (dtm.s + dtm.delay(1.0)).certify((-1, 1), (0, 9)).plot(),
     "ControlLoop.bode": CONTINUOUS.bode,
     "DelayEstimate.plot": lambda: estimated().plot(),
+    "DelayTrack.plot": lambda: tracked().plot(),
     "Design.plot": lambda: designed().plot(),
     "FilterChoice.plot": lambda: filtered().plot(),
     "Identifiability.plot": lambda: planned().plot(),

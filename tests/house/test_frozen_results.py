@@ -37,6 +37,11 @@ def estimated():
     return dtm.estimate_delay(*record_step(rest=1.0, noise=0.01), free=("delay",))
 
 
+def tracked():
+    time = 0.065 * np.arange(12)
+    return dtm.estimation.online(dtm.Recording(time, time, time, time), LOOP, noise=0.01)
+
+
 def planned(**more):
     return dtm.identifiability(LOOP, dtm.Experiment.step(1.0, 5.0), noise=0.01, **more)
 
@@ -63,6 +68,8 @@ MADE = {
     "DelayEstimate": lambda: dtm.estimate_delay(
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ),
+    "DelayTrack": tracked,
+    "OnlineEstimate": lambda: tracked().last,
     "DelayResult": solved,
     "DelaySolution": lambda: solved().sol,
     "DelaySystem": lambda: SYSTEM,
@@ -157,11 +164,12 @@ def public_types():
 
 
 def test_the_list_of_types_is_complete():
-    # Base classes that are never instantiated, tuples of arrays, and what has a test of its own.
+    # Base classes that are never instantiated, tuples of arrays, what has a test of its own, and what
+    # goes on with each row.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW", "NoiseModel", "DisturbanceModel",
         "Comparison", "MethodDifference", "ConfidenceRegion", "RecordingCheck", "Finding", "Hole",
-        "SentCommands",
+        "SentCommands", "OnlineEstimator",
     }  # fmt: skip
 
 

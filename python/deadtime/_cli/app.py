@@ -36,6 +36,7 @@ COMMANDS = {
     "reproduce": "Reproduce the paper on delays in quadrotor control: each printed number beside "
     "ours.",
     "fly": "Fly steps under P control, learn the delay, design PV for it, fly that; land.",
+    "watch": "Follow the delay of a loop row by row, with its interval, while the loop runs.",
     "internet-loop": "Control an integrator over UDP, estimate the loop's delay, and measure it.",
     "simulate": "Simulate the step response of a loop, exactly.",
     "report": "Write one page about a recording: delay, map of gains, a controller to try.",

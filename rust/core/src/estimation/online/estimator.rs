@@ -1,0 +1,24 @@
+//! An estimator whatever the number of its states.
+
+use super::bank::Bank;
+use super::row_by_row::Online;
+use super::settings::Settings;
+use crate::Error;
+
+/// An estimator with these settings.
+///
+/// # Errors
+///
+/// If a setting is out of its range, or a cell would have more than nine states.
+pub fn online(settings: Settings) -> Result<Box<dyn Online>, Error> {
+    settings.check()?;
+    macro_rules! bank {
+        ($($states:literal)*) => {
+            match settings.states() {
+                $($states => Ok(Box::new(Bank::<$states>::new(settings)?)),)*
+                n => refuse!("{n} states of plant, noise, gain and level: the bank takes up to 9"),
+            }
+        };
+    }
+    bank!(2 3 4 5 6 7 8 9)
+}
