@@ -5,8 +5,8 @@ and down, in gusts and with noise of the sensor (`reality.generator`). Each flig
 with the same draws: with the robust gains, and with those that a schedule takes from the interval
 of the delay. The vehicle is simulated at the exact arrivals of its commands.
 
-``python benches/adaptation.py`` flies 200 flights of 200 s and prints their integrals of the
-absolute error; ``--quick`` 20 flights. ``--oracle`` gives the schedule the true delay of some
+``python benches/adaptation.py`` flies 200 flights of 200 s and prints their
+mean absolute errors; ``--quick`` 20 flights. ``--oracle`` gives the schedule the true delay of some
 seconds ago in place of the online estimate.
 """
 
@@ -22,6 +22,8 @@ from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
+from deadtime.estimation import OnlineEstimator
+from deadtime.experiments import FlightNoise
 from deadtime.tuning import GainSchedule, adaptive_gains
 from numpy.typing import NDArray
 
@@ -36,8 +38,11 @@ SAMPLE, LIMIT = 0.065, 1.0
 #: The vehicle, and how far its gain may be from what the schedule was told.
 GAIN, LAG, SPREAD = 0.885, 0.1, 0.04
 
+#: The kind of controller; its filter is that of the client.
+CONTROLLER = dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0, discretisation="tustin"))
+
 #: Delays, s; the times at the first, of a ramp, at the other, of the ramp back, and at the end.
-DELAYS, PARTS = (0.1, 0.5), (50.0, 25.0, 50.0, 25.0, 50.0)
+DELAYS, PARTS = (0.1, 0.5), (60.0, 60.0, 60.0, 60.0, 60.0)
 
 #: Time between two steps of the reference, their sizes, and the height that they begin from.
 HOLD, STEPS, BASE = 8.0, (0.25, 0.75), 1.0
@@ -50,6 +55,9 @@ GUSTS = Condition("adaptation", gust=(0.05, 1.0), white=0.005)
 
 #: What ends a flight: an error above 1.5 steps and a margin, or such heights, m.
 GROWTH, MARGIN, HEIGHTS = 1.5, 0.1, (0.2, 3.0)
+
+#: Of the online estimator: delays, how much the delay wanders, s/√s, and the level of intervals.
+RANGE, DRIFT, LEVEL = (0.0, 0.65), 0.01, 0.999
 
 #: Commands that may be on their way or in force.
 IN_FLIGHT = 16
@@ -77,25 +85,26 @@ class Draws:
 
 @dataclass(frozen=True)
 class Flown:
-    """Mean absolute errors, m, whether a flight went outside a limit, and the sets in use."""
+    """Mean absolute errors, m, whether a flight went outside a limit, and, at each sample of each
+    flight, the set in use and whether its interval held the delay, so that the proof applied.
+    """
 
     error: Array
     outside: NDArray[np.bool_]
     sets: NDArray[np.int64]
+    covered: NDArray[np.bool_]
 
 
-def drawn(count: int, first: int = 0) -> Draws:
+def drawn(count: int, parts: tuple[float, ...] = PARTS) -> Draws:
     """The draws of so many flights, each from its own number."""
-    columns = [_drawn_one(np.random.default_rng([22, first + i])) for i in range(count)]
-    gain, delay, arrival, reference, step, air, noise = map(
-        np.array, zip(*columns, strict=True)
-    )
+    columns = [_drawn_one(np.random.default_rng([22, i]), parts) for i in range(count)]
+    gain, delay, arrival, reference, step, air, noise = map(np.array, zip(*columns, strict=True))
     return Draws(gain, delay.T, arrival.T, reference.T, step, air.T, noise.T)
 
 
-def _drawn_one(random: np.random.Generator) -> tuple[float | Array, ...]:
-    times = SAMPLE * np.arange(round(sum(PARTS) / SAMPLE))
-    turns = np.cumsum((0.0, *PARTS)) + random.uniform(-5.0, 5.0)
+def _drawn_one(random: np.random.Generator, parts: tuple[float, ...]) -> tuple[float | Array, ...]:
+    times = SAMPLE * np.arange(round(sum(parts) / SAMPLE))
+    turns = np.cumsum((0.0, *parts)) + random.uniform(-5.0, 5.0)
     low, high = DELAYS
     delay = np.interp(times, turns, (low, low, high, high, low, low))
     late = delay + np.abs(JITTER * random.standard_normal(times.size))
@@ -116,7 +125,7 @@ def _drawn_one(random: np.random.Generator) -> tuple[float | Array, ...]:
 
 def response(passed: Array) -> tuple[Array, Array]:
     """Position and velocity after a time of unit speed demanded, for a gain of one."""
-    rising = -np.expm1(-passed / LAG)
+    rising = -np.expm1(-passed / LAG) if LAG else np.ones_like(passed)
     return passed - LAG * rising, rising
 
 
@@ -165,13 +174,14 @@ def flown(draws: Draws, schedule: GainSchedule, interval: Interval | None) -> Fl
         positions, velocities = (
             a - b for a, b in zip(response(SAMPLE - begin), response(SAMPLE - end), strict=True)
         )
-        rising = -math.expm1(-SAMPLE / LAG)
+        rising = -math.expm1(-SAMPLE / LAG) if LAG else 1.0
         moved = moved + LAG * rising * speed
         speed = (1.0 - rising) * speed
         recent = draws.gain * commands[first : k + 1]
         moved = moved + (positions * recent).sum(axis=0)
         speed = speed + (velocities * recent).sum(axis=0)
-    return Flown(error, outside, sets)
+    longest = np.array([one.delays[1] for one in schedule.sets])
+    return Flown(error, outside, sets, draws.delay <= longest[sets])
 
 
 def oracle(draws: Draws, late: float = 3.0, deviation: float = 0.006) -> Interval:
@@ -191,16 +201,44 @@ def oracle(draws: Draws, late: float = 3.0, deviation: float = 0.006) -> Interva
     return interval
 
 
-def made_schedule() -> GainSchedule:
-    """The schedule of the flights, which is not told the gain of any."""
-    loop = dtm.ControlLoop(
-        dtm.Integrator(GAIN, lag=LAG),
-        dtm.PV(1.0, 0.1, dtm.DerivativeFilter(38.0, discretisation="tustin")),
-        sample_time=SAMPLE,
-        limit=LIMIT,
-    )
+def online(draws: Draws) -> Interval:
+    """The interval of an online estimator for each flight, which is told the model of the noise."""
+    noise = FlightNoise(white=GUSTS.white, air=GUSTS.gust[0], air_time=GUSTS.gust[1])
+    loop = dtm.ControlLoop(dtm.Integrator(GAIN, lag=LAG), dtm.P(1.0), sample_time=SAMPLE)
+    estimators = [
+        OnlineEstimator(
+            loop,
+            delays=RANGE,
+            noise=noise,
+            gain=(GAIN, SPREAD * GAIN),
+            drift=DRIFT,
+            level=LEVEL,
+        )
+        for _ in range(draws.delay.shape[1])
+    ]
+
+    def interval(k: int, output: Array, commands: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        now = float(draws.times[k])
+        found = []
+        for i, estimator in enumerate(estimators):
+            if k > 0:
+                estimator.command(float(draws.times[k - 1]), float(commands[k - 1, i]))
+            found.append(estimator.update(now, float(output[i])))
+        low, high = np.array([one.ci for one in found]).T
+        known = np.array([one.known and one.adequate for one in found])
+        return low, high, known
+
+    return interval
+
+
+def made_schedule(
+    controller: dtm.P | dtm.PV = CONTROLLER, delays: tuple[float, float] = (0.0, 0.58)
+) -> GainSchedule:
+    """A schedule for the flights, which is not told the gain of any."""
+    plant = dtm.Integrator(GAIN, lag=LAG)
+    loop = dtm.ControlLoop(plant, controller, sample_time=SAMPLE, limit=LIMIT)
     gain = (GAIN * (1.0 - SPREAD), GAIN * (1.0 + SPREAD))
-    return adaptive_gains(loop, (0.0, 0.58), gain=gain, sets=8)
+    return adaptive_gains(loop, delays, gain=gain, sets=8)
 
 
 def main() -> None:
@@ -215,12 +253,19 @@ def main() -> None:
     print(f"found and checked in {time.perf_counter() - begin:.0f} s")
     draws = drawn(20 if options.quick else 200)
     fixed = flown(draws, schedule, None)
-    adaptive = flown(draws, schedule, oracle(draws))
+    source = oracle if options.oracle else online
+    adaptive = flown(draws, schedule, source(draws))
     ratio = adaptive.error / fixed.error
     print(f"{len(ratio)} flights of {sum(PARTS):g} s")
-    print(f"mean absolute error, median: {1e3 * np.median(fixed.error):.1f} mm with robust gains, "
-          f"{1e3 * np.median(adaptive.error):.1f} mm with gains that follow")
+    print(
+        f"mean absolute error, median: {1e3 * np.median(fixed.error):.1f} mm with robust gains, "
+        f"{1e3 * np.median(adaptive.error):.1f} mm with gains that follow"
+    )
     print(f"ratio: median {np.median(ratio):.3f}, least {ratio.min():.3f}, most {ratio.max():.3f}")
+    print(
+        f"time in which the interval of the set held the delay: "
+        f"{100.0 * adaptive.covered.mean():.2f} %"
+    )
     print(f"outside limits: {fixed.outside.sum()} and {adaptive.outside.sum()}")
     shares = [float(np.mean(adaptive.sets == i)) for i in range(len(schedule.sets))]
     print("time in each set: " + ", ".join(f"{100.0 * share:.0f} %" for share in shares))

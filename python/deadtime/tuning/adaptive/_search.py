@@ -44,7 +44,7 @@ def proved(claims: Claims) -> Claims | None:
     for margin in _MARGINS:
         form = _form(loop, margin)
         if form is None:
-            continue
+            return None  # a larger margin is asked for no more easily
         found = _with_form(claims, loop, form)
         try:
             check(found)
@@ -79,7 +79,7 @@ def _form(loop: SwitchedLoop, margin: float) -> Array | None:
         worst = [int(i) for i in np.argsort(-excess)[:_ADDED] if excess[i] > -0.5 * margin]
         added = [i for i in worst if i not in chosen]
         if not added:
-            return form if excess.max() < 0.0 else None
+            return form
         chosen += added
     return None
 
@@ -132,7 +132,7 @@ def _solved(loop: SwitchedLoop, cases: Sequence[Case], margin: float) -> Array |
         [solver.PSDTriangleConeT(size)] * len(blocks),
         settings,
     ).solve()
-    if str(found.status) not in ("Solved", "AlmostSolved", "InsufficientProgress"):
+    if "Infeasible" in str(found.status):
         return None
     return np.asarray(np.tensordot(found.x, units, axes=1))
 
