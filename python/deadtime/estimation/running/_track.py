@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,9 +163,7 @@ class DelayTrack(ReadOnlyArrays):
 
     def to_dict(self) -> dict[str, Any]:
         """The arrays as lists, the times of changes, and the last estimate, for JSON."""
-        names = (
-            "time delay low high lag delay_plus_lag gain known informed changed adequate".split()
-        )
+        names = [field.name for field in fields(self) if field.name != "last"]
         found: dict[str, Any] = {name: getattr(self, name).tolist() for name in names}
         return found | {"changes": self.changes.tolist(), "last": self.last.to_dict()}
 

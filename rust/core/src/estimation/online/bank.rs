@@ -25,6 +25,10 @@ const SPELL: f64 = 5.0;
 const OUTLIER: f64 = 6.0;
 const MOST_OUTLIERS: u32 = 2;
 
+/// Time between changes that is expected before the first row, s. The hazard of the second bank is
+/// one a second, so that its weights over this time are the odds for a change.
+const RARE: f64 = 600.0;
+
 /// Weight below which a cell has no say whether a row is an outlier.
 const NO_SAY: f64 = 1e-6;
 
@@ -393,7 +397,7 @@ impl<const N: usize> Bank<N> {
         if sum < self.settings.alarm {
             return false;
         }
-        self.change(sum);
+        self.change(sum, variance);
         true
     }
 
@@ -419,40 +423,50 @@ impl<const N: usize> Bank<N> {
         self.judge.hear(mean / deviation, length, &changes);
     }
 
-    /// Go over to what the second bank has found.
-    fn change(&mut self, sum: f64) {
+    /// Go over to what the second bank has found, as far as changes are more probable than not.
+    fn change(&mut self, sum: f64, white: f64) {
         let (count, own) = (self.settings.delays.len(), self.changed.places.len());
+        let delays = &self.settings.delays;
+        let mut added = vec![0.0; self.main.cells.len()];
+        let mut nearest = vec![0; self.main.cells.len()];
         for set in 0..self.layers.len() {
-            for delay in 0..count {
+            for (delay, late) in delays.iter().enumerate() {
                 let places = &self.changed.places;
                 let after = places.partition_point(|place| *place < delay).min(own - 1);
-                let before = if places[after] > delay {
-                    after.saturating_sub(1)
-                } else {
-                    after
+                let before = match places[after] > delay {
+                    true => after.saturating_sub(1),
+                    false => after,
                 };
-                let at = |i: usize| self.settings.delays[places[i]];
-                let span = at(after) - at(before);
-                let share = if span > 0.0 {
-                    ((self.settings.delays[delay] - at(before)) / span).clamp(0.0, 1.0)
+                let (low, high) = (delays[places[before]], delays[places[after]]);
+                let share = if high > low {
+                    ((late - low) / (high - low)).clamp(0.0, 1.0)
                 } else {
                     0.0
                 };
-                let (low, high) = (
-                    self.changed.weights[set * own + before],
-                    self.changed.weights[set * own + after],
-                );
-                let nearest = set * own + if share < 0.5 { before } else { after };
+                let weight = |place: usize| self.changed.weights[set * own + place];
                 let place = set * count + delay;
-                self.main.weights[place] = ((1.0 - share) * low + share * high) / sum;
-                self.main.cells[place] = self.changed.cells[nearest].clone();
+                added[place] = (1.0 - share) * weight(before) + share * weight(after);
+                nearest[place] = set * own + if share < 0.5 { before } else { after };
             }
         }
-        let total: f64 = self.main.weights.iter().sum();
-        self.main
-            .weights
-            .iter_mut()
-            .for_each(|weight| *weight /= total);
+        let odds = sum / (RARE * added.iter().sum::<f64>());
+        let mut total = 0.0;
+        for (place, (added, nearest)) in added.iter().zip(nearest).enumerate() {
+            let (weight, added) = (self.main.weights[place], added * odds);
+            let whole = weight + added;
+            if added > 1e-9 * whole {
+                let parts = [
+                    (weight / whole, &self.main.cells[place]),
+                    (added / whole, &self.changed.cells[nearest]),
+                ];
+                self.main.cells[place] = Cell::blend(&parts, white);
+            }
+            self.main.weights[place] = whole;
+            total += whole;
+        }
+        for weight in &mut self.main.weights {
+            *weight /= total;
+        }
         self.changed.weights.fill(0.0);
         self.judge.forget();
     }
