@@ -2,13 +2,15 @@
 
 `estimate_delay` chooses and runs a method, `compare_methods` runs several, and `choose_plant`
 tries several plants. `identifiability` says before an experiment what it will tell, and
-`shared_number` combines estimates of one number. Each method is a class that holds its options.
+`shared_number` combines estimates of one number, and `OnlineEstimator` follows the delay row by row
+while the loop runs. Each method is a class that holds its options.
 """
 
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
 # plants, `_result` is what they return, `_shared` combines several. `methods` holds one file a
 # method, `data` what they read from a recording, `models` what they fit, `fit` least squares,
-# profiles and residuals, `planning` the bounds of planned experiments.
+# profiles and residuals, `planning` the bounds of planned experiments, `running` the estimates while
+# a loop runs.
 
 from deadtime.estimation._choose import PlantChoice, choose_plant
 from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods
@@ -32,6 +34,9 @@ from deadtime.estimation.methods._waveform import Waveform
 from deadtime.estimation.planning._identifiability import Identifiability, identifiability
 from deadtime.estimation.planning._monte_carlo import MonteCarlo
 from deadtime.estimation.planning._planned_bound import PlannedBound
+from deadtime.estimation.running._estimate import OnlineEstimate
+from deadtime.estimation.running._estimator import OnlineEstimator
+from deadtime.estimation.running._track import DelayTrack, online
 
 __all__ = [
     "CTA",
@@ -42,6 +47,7 @@ __all__ = [
     "Decay",
     "Decrement",
     "DelayEstimate",
+    "DelayTrack",
     "FittedRun",
     "Frequency",
     "Graphical",
@@ -50,6 +56,8 @@ __all__ = [
     "Method",
     "MethodDifference",
     "MonteCarlo",
+    "OnlineEstimate",
+    "OnlineEstimator",
     "OutputError",
     "Overshoot",
     "PlannedBound",
@@ -63,5 +71,6 @@ __all__ = [
     "damping_ratio",
     "estimate_delay",
     "identifiability",
+    "online",
     "shared_number",
 ]

@@ -360,9 +360,9 @@ fn read(quantity: &str) -> PyResult<Quantity> {
 /// What moves the output besides the command, in deviations of the white noise.
 #[derive(FromPyObject)]
 pub(crate) struct GivenDisturbance {
-    at_input: bool,
-    time_constant: f64,
-    deviation: f64,
+    pub(crate) at_input: bool,
+    pub(crate) time_constant: f64,
+    pub(crate) deviation: f64,
 }
 
 /// Columns, one after the other, whitened by the covariance of their rows: that of disturbances of

@@ -11,6 +11,7 @@ mod fixed_step;
 mod frequency;
 mod held;
 mod matrix;
+mod online;
 mod pointers;
 mod quasipoly;
 mod runtime;
@@ -54,6 +55,8 @@ mod _deadtime {
     use super::held::{held_boundaries, held_crossings, held_map};
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
+    #[pymodule_export]
+    use super::online::OnlineBank;
     #[pymodule_export]
     use super::quasipoly::{Expansion, QuasiPolynomial};
     #[pymodule_export]

@@ -1,0 +1,198 @@
+"""What is known of the delay at one row, and whether the model holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+from deadtime._base.digits import between, stated
+
+#: From how many deviations the product of neighbouring innovations shows that they are not white.
+#: The test is repeated all the time, so that its level is about one in a hundred thousand.
+COLOURED = 4.5
+
+#: Covariance of innovations and commands that shows that the model lacks something: of χ² with six
+#: degrees, about one in a million.
+UNEXPLAINED = 38.0
+
+#: Probability of the last delay of a range from which the delay may be beyond.
+AT_END = 0.1
+
+#: White noise so many times the one that was given or fitted is another noise.
+LOUDER = 3.0
+
+#: Share of the range that an interval must be narrower than, to be an estimate.
+NARROWER = 0.5
+
+
+class BankNumbers(NamedTuple):
+    """The numbers of the kernel's answer, in its order."""
+
+    time: float
+    started: float
+    delay: float
+    delay_deviation: float
+    low: float
+    high: float
+    together: float
+    together_deviation: float
+    together_low: float
+    together_high: float
+    lag: float
+    gain: float
+    gain_deviation: float
+    rate: float
+    gate: float
+    changed: float
+    change_ratio: float
+    white: float
+    colour: float
+    unexplained: float
+    lowest: float
+    highest: float
+    evidence: float
+
+
+@dataclass(frozen=True, slots=True)
+class OnlineEstimate:
+    """The delay of a loop at one row, from that row and all before.
+
+    Attributes
+    ----------
+    time : float
+        Of the row, s.
+    delay : float
+        Posterior mean of the delay now, s. While there is no estimate yet, the middle of the range.
+    ci : (float, float)
+        Interval of the delay now, s: 95 % unless the estimator was told otherwise.
+    stderr : float
+        Posterior standard deviation of the delay, s.
+    lag : float
+        Posterior mean of the lags of the plant together, s.
+    delay_plus_lag : float
+        Posterior mean of delay and lags together, s.
+    delay_plus_lag_ci : (float, float)
+        Its interval, s.
+    gain : float
+        Posterior mean of the gain of the plant.
+    gain_stderr : float
+        Its posterior standard deviation.
+    informed : bool
+        Whether the last seconds told something about the delay: the command changed enough.
+    changed : bool
+        Whether a change of the delay, a jump and not a drift, was found at this row.
+    known : bool
+        Whether there is an estimate: the interval is narrower than half the range of delays.
+    adequate : bool
+        Whether the rows of the last half minute agree with the model.
+    message : str
+        Why there is no estimate yet, or why it is not adequate.
+    """
+
+    time: float
+    delay: float
+    ci: tuple[float, float]
+    stderr: float
+    lag: float
+    delay_plus_lag: float
+    delay_plus_lag_ci: tuple[float, float]
+    gain: float
+    gain_stderr: float
+    informed: bool
+    changed: bool
+    known: bool
+    adequate: bool
+    message: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers, as plain values for JSON."""
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in asdict(self).items()
+        }
+
+    def __str__(self) -> str:
+        told = f"{self.time:.2f} s: delay {stated(self.delay, self.stderr, 's')}"
+        told += f", 95 %: {between(*self.ci, self.stderr, 's')}"
+        return f"{told}; {self.message}" if self.message else told
+
+
+def reasons_against(numbers: BankNumbers, white: float, range_: tuple[float, float]) -> list[str]:
+    """Why the model does not hold at this row; `white` is the noise that was expected."""
+    found = []
+    if abs(numbers.colour) > COLOURED:
+        found.append(
+            "the innovations are not white: the noise is another one, or the plant lacks something"
+        )
+    if numbers.unexplained > UNEXPLAINED:
+        found.append("the innovations follow the command: the plant lacks something")
+    if numbers.highest > AT_END:
+        found.append(f"the delay may be above the range, which ends at {range_[1]:.3g} s")
+    if numbers.lowest > AT_END and range_[0] > 0.0:
+        found.append(f"the delay may be below the range, which begins at {range_[0]:.3g} s")
+    if numbers.white > LOUDER * white:
+        found.append(f"the noise is {numbers.white / white:.1f} times what was expected")
+    return found
+
+
+def estimate_of(
+    values: Sequence[float], white: float, range_: tuple[float, float], doubts: Sequence[str] = ()
+) -> OnlineEstimate:
+    """The estimate of the kernel's numbers."""
+    numbers = BankNumbers(*values)
+    known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
+    against = [*doubts, *reasons_against(numbers, white, range_)]
+    message = "; ".join(f"not adequate: {reason}" for reason in against)
+    if not known:
+        waits = (
+            "the command has not yet changed enough"
+            if numbers.started
+            else "the first command has not arrived at every delay"
+        )
+        message = f"no estimate yet: {waits}" + (f"; {message}" if message else "")
+    return OnlineEstimate(
+        time=numbers.time,
+        delay=numbers.delay,
+        ci=(max(numbers.low, 0.0), numbers.high),
+        stderr=numbers.delay_deviation,
+        lag=numbers.lag,
+        delay_plus_lag=numbers.together,
+        delay_plus_lag_ci=(max(numbers.together_low, 0.0), numbers.together_high),
+        gain=numbers.gain,
+        gain_stderr=numbers.gain_deviation,
+        informed=numbers.gate > 0.5,
+        changed=bool(numbers.changed),
+        known=known,
+        adequate=not against,
+        message=message,
+    )
+
+
+def not_yet(
+    time: float,
+    range_: tuple[float, float],
+    lags: tuple[float, float],
+    gain: tuple[float, float],
+    reason: str,
+) -> OnlineEstimate:
+    """What is known before there is an estimate: the whole range."""
+    low, high = range_
+    total = (low + lags[0], high + lags[1])
+    return OnlineEstimate(
+        time=time,
+        delay=0.5 * (low + high),
+        ci=range_,
+        stderr=(high - low) / math.sqrt(12.0),
+        lag=0.5 * (lags[0] + lags[1]),
+        delay_plus_lag=0.5 * sum(total),
+        delay_plus_lag_ci=total,
+        gain=gain[0],
+        gain_stderr=gain[1],
+        informed=False,
+        changed=False,
+        known=False,
+        adequate=True,
+        message=f"no estimate yet: {reason}",
+    )

@@ -1,0 +1,384 @@
+"""`OnlineEstimator`: the delay of a loop, row by row while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.errors import NotIdentifiableError, RecordingError
+from deadtime._base.validation import finite, positive
+from deadtime._deadtime import OnlineBank
+from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of, not_yet
+from deadtime.estimation.running._settings import (
+    DELAYS,
+    LAGS,
+    BankSettings,
+    lag_sets,
+    plant_model,
+    points_of_range,
+    settings_of,
+)
+from deadtime.experiments import FlightNoise, Noise
+from deadtime.loops import ControlLoop
+from deadtime.recordings import Recording
+
+Array = NDArray[np.float64]
+
+#: Rows of an online estimator: time, output or None where it was lost, command or None.
+Row = tuple[float, float | None, float | None]
+
+#: First rows from which the noise is learned: from so many seconds, again after as many, and for
+#: the last time after so many.
+LEARN, LAST = 10.0, 60.0
+
+#: Fewest rows that the noise is learned from.
+FEWEST = 40
+
+#: The range of delays by default, s, and how far it goes beyond a fitted one.
+RANGE, BEYOND = (0.0, 0.6), 2.0
+
+#: Rows that count for the deviation of noise that was given by its model.
+GIVEN = 200.0
+
+#: The largest number of rows that count for that of a fit.
+MOST_FITTED = 500.0
+
+#: Lags of a layer: standard errors on either side of the fit.
+AROUND = 2.0
+
+
+class OnlineEstimator:
+    """The delay of a loop with its interval, at every row while the loop runs.
+
+    A Kalman filter for each delay of a range, and each lag where that is not known, holds the
+    states of plant, air and trim, and the gain. Their weights are the posterior. The delay is a
+    random walk, and may jump: a jump is reported. Both need information: while the command does
+    not change, nothing is forgotten.
+
+    Parameters
+    ----------
+    loop : ControlLoop
+        What is known of the plant; controller and delay do not count.
+    delays : (low, high) or (low, high, n) or array_like
+        Delays of the filters, s; 50 of them by default. A delay outside cannot be found, but that
+        it may be outside is said.
+    lags : (low, high) or (low, high, n), optional
+        Lags of the filters, s, in place of the first lag of the plant; 5 of them by default.
+        Without: the lag of the plant is known.
+    noise : float or FlightNoise, optional
+        What is expected. Its scale is estimated as rows come; the ratio of its parts is not.
+        Without, it is learned from the first ten seconds or more in which the command changes, by
+        `deadtime.estimate_delay`; that update takes as long as the fit does.
+    gain : (float, float), optional
+        Mean and standard deviation of the gain before the first row. By default the gain of the
+        plant and half of it.
+    drift : float
+        Standard deviation that the delay gains in one second by its walk, s/√s.
+    gain_drift : float
+        The same for the gain, in parts of it.
+    false_alarms_per_hour : float
+        Changes that are reported where there is none, at most in the mean; zero for no search.
+    memory : float
+        Over how many seconds the scale of the noise is estimated again.
+    width : float
+        Walk and jumps have half their size where five seconds of rows tell the delay with this
+        standard error, s.
+    at_rest : bool
+        Whether the plant is at rest before the first command. Otherwise rows count from the time
+        when that has arrived at every delay.
+    level : float
+        Of the intervals.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or the plant is not linear.
+
+    Notes
+    -----
+    The filters are mixed as interacting multiple models; where nothing drifts the posterior is
+    that of the likelihood of `deadtime.estimate_delay`. A change is reported when the likelihood
+    ratio, summed over the times and new delays of a change, passes what its mean time between false
+    alarms asks for.
+
+    References
+    ----------
+    H. A. P. Blom and Y. Bar-Shalom, "The interacting multiple model algorithm for systems with
+    Markovian switching coefficients", IEEE Transactions on Automatic Control 33 (1988).
+    M. Pollak, "Optimal detection of a change in distribution", Annals of Statistics 13 (1985).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> from deadtime.estimation import OnlineEstimator
+    >>> loop = dtm.ControlLoop(
+    ...     dtm.Integrator(0.85), dtm.P(1.6), delay=0.3, sample_time=0.065, limit=1.0
+    ... )
+    >>> flight = dtm.Experiment.prbs(20.0, 0.5, 0.8, seed=2).run(loop, noise=0.005, seed=1)
+    >>> estimator = OnlineEstimator(loop, noise=0.005)
+    >>> for row in zip(flight.time, flight.output, flight.command):
+    ...     now = estimator.update(*row)
+    >>> now.adequate, bool(now.ci[0] < 0.3 < now.ci[1])
+    (True, True)
+    """
+
+    def __init__(
+        self,
+        loop: ControlLoop,
+        *,
+        delays: Any = RANGE,
+        lags: Any = None,
+        noise: Noise | None = None,
+        gain: tuple[float, float] | None = None,
+        drift: float = 0.001,
+        gain_drift: float = 0.0,
+        false_alarms_per_hour: float = 1.0,
+        memory: float = 60.0,
+        width: float = 0.05,
+        at_rest: bool = False,
+        level: float = 0.95,
+    ) -> None:
+        self._loop = loop
+        self._delays = points_of_range("delays", delays, DELAYS)
+        self._lags = None if lags is None else points_of_range("lags", lags, LAGS)
+        self._model = plant_model(loop, ("delay", "gain"))
+        known = loop.parameters.get("gain")
+        size = abs(known) if known else 1.0
+        self._gain = (float(known or 1.0), 0.5 * size) if gain is None else gain
+        self._lag_prior = np.zeros(1 if self._lags is None else self._lags.size)
+        self._freedom = GIVEN
+        self._doubts: tuple[str, ...] = ()
+        self._options = {
+            "drift": drift,
+            "gain_walk": gain_drift * size,
+            "false_alarms_per_hour": false_alarms_per_hour,
+            "memory": memory,
+            "width": width,
+            "at_rest": at_rest,
+            "level": level,
+        }
+        self._bank: OnlineBank | None = None
+        self._noise: FlightNoise | None = None
+        self._rows: list[tuple[float, float, float]] = []
+        self._commands: list[tuple[float, float]] = []
+        self._next_fit = LEARN
+        self._held = math.nan
+        # The settings are checked now, not with the first row.
+        checked = self._settings(FlightNoise(white=1.0))
+        OnlineBank(checked)
+        if noise is not None:
+            self._begin(_flight_noise(noise))
+
+    @classmethod
+    def from_estimate(cls, fit: DelayEstimate, **options: Any) -> OnlineEstimator:
+        """An estimator that begins with plant, gain, lags and noise of a fit.
+
+        Parameters
+        ----------
+        fit : DelayEstimate
+            Of an earlier recording of the same loop.
+        **options
+            As of the class. `delays` is by default the range from zero to twice the fitted delay,
+            at least to 0.6 s; every delay of it is as probable before the first row. Where the lag
+            was fitted, `lags` goes two standard errors to either side of it.
+
+        Returns
+        -------
+        OnlineEstimator
+        """
+        noise = options.pop("noise", None)
+        fitted = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
+        error = fit.stderr.get("lag", 0.0)
+        if "lags" not in options and fit.lag and error > 0.0 and math.isfinite(error):
+            low = max(fit.lag - AROUND * error, 0.1 * fit.lag)
+            options["lags"] = (low, fit.lag + AROUND * error, LAGS)
+        options.setdefault("delays", (0.0, max(RANGE[1], BEYOND * fit.delay)))
+        spread = fit.stderr.get("gain", 0.0)
+        if fit.gain and "gain" not in options and 0.0 < spread < math.inf:
+            options["gain"] = (fit.gain, 3.0 * spread)
+        found = cls(fit.loop, **options)
+        if found._lags is not None and error > 0.0 and fit.lag:
+            found._lag_prior = -0.5 * ((found._lags - fit.lag) / error) ** 2
+        found._freedom = min(MOST_FITTED, float(fit.residuals.size))
+        if not fit.adequate:
+            found._doubts = (f"the fit it began with was not ({fit.message})",)
+        found._begin(fitted if noise is None else _flight_noise(noise))
+        return found
+
+    @property
+    def noise(self) -> FlightNoise | None:
+        """The noise that is expected; None while it is being learned."""
+        return self._noise
+
+    @property
+    def delays(self) -> tuple[float, float]:
+        """The range of delays, s."""
+        return float(self._delays[0]), float(self._delays[-1])
+
+    def update(
+        self, time: float, output: float | None, command: float | None = None
+    ) -> OnlineEstimate:
+        """Take in one row.
+
+        Parameters
+        ----------
+        time : float
+            When the output was measured, s; later than that of the row before.
+        output : float or None
+            None (or NaN) where the row was lost.
+        command : float, optional
+            Sent at this time, after the output was read, and after any limit; it holds until the
+            next. None where none was sent, or where `command` told of it.
+
+        Returns
+        -------
+        OnlineEstimate
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite or the time does not increase.
+        """
+        lost = output is None or math.isnan(output)
+        if self._bank is None:
+            return self._learn(finite("time", time), math.nan if lost else float(output), command)
+        numbers = self._bank.row(time, None if lost else output)
+        if command is not None:
+            self._bank.command(time, command)
+        return self._estimate(numbers)
+
+    def command(self, time: float, value: float) -> None:
+        """Tell of a command that was sent at a time of its own, s.
+
+        Parameters
+        ----------
+        time : float
+            When it was sent, s; later than the command before.
+        value : float
+            After any limit.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite or the time does not increase.
+        """
+        if self._bank is None:
+            self._commands.append((finite("time", time), finite("value", value)))
+        else:
+            self._bank.command(time, value)
+
+    def run(self, rows: Iterable[Row]) -> Iterator[OnlineEstimate]:
+        """An estimate for each row of an iterator, as it comes.
+
+        Parameters
+        ----------
+        rows : iterable of (time, output, command)
+            As of `update`.
+
+        Yields
+        ------
+        OnlineEstimate
+        """
+        for time, output, command in rows:
+            yield self.update(time, output, command)
+
+    def _estimate(self, numbers: Any) -> OnlineEstimate:
+        assert self._noise is not None
+        return estimate_of(numbers, self._noise.white, self.delays, self._doubts)
+
+    def _settings(self, noise: FlightNoise) -> BankSettings:
+        sets = lag_sets(self._model, self._lags)
+        prior = np.repeat(self._lag_prior[:, None], self._delays.size, axis=1)
+        return settings_of(
+            self._model,
+            noise,
+            delays=self._delays,
+            lags=sets,
+            prior=prior,
+            gain=self._gain,
+            freedom=self._freedom,
+            **self._options,  # type: ignore[arg-type]
+        )
+
+    def _begin(self, noise: FlightNoise) -> None:
+        self._bank = OnlineBank(self._settings(noise))
+        self._noise = noise
+
+    def _learn(self, time: float, output: float, command: float | None) -> OnlineEstimate:
+        """Keep a row until the noise is known; then go over all that were kept."""
+        if self._rows and time <= self._rows[-1][0]:
+            raise ValueError(
+                f"the time {time} s follows {self._rows[-1][0]} s: give increasing times"
+            )
+        self._rows.append((time, output, math.nan))
+        if command is not None:
+            self.command(time, command)
+        sets = lag_sets(self._model, self._lags)
+        totals = [sum(one) - self._model.zero + self._model.own_lag for one in sets]
+        lags = (min(totals), max(totals))
+        span = time - self._rows[0][0]
+        reason = "the noise is being learned"
+        if span >= self._next_fit and len(self._rows) >= FEWEST:
+            self._next_fit += LEARN
+            try:
+                fit = self._fit()
+            except (NotIdentifiableError, RecordingError) as error:
+                reason = str(error)
+            else:
+                if fit.adequate or span > LAST:
+                    return self._replay(fit)
+                reason = fit.message
+        return not_yet(time, self.delays, lags, self._gain, reason)
+
+    def _fit(self) -> DelayEstimate:
+        """The batch estimate of the rows so far."""
+        rows = np.array(self._rows)
+        rows = rows[~np.isnan(rows[:, 1])]
+        sent = np.array(self._commands).reshape(-1, 2)
+        if not sent.size or np.ptp(sent[:, 1]) == 0.0:
+            raise NotIdentifiableError("the command has not changed")
+        rows = rows[rows[:, 0] >= sent[0, 0]]
+        held = sent[np.searchsorted(sent[:, 0], rows[:, 0], side="right") - 1, 1]
+        recording = Recording(rows[:, 0], held, rows[:, 1], sent=(sent[:, 0], sent[:, 1]))
+        free = ("delay", "gain") if self._lags is None else ("delay", "gain", "lag")
+        loop = self._loop.replace(delay=None)
+        return estimate_delay(recording, loop, method="output_error", free=free)
+
+    def _replay(self, fit: DelayEstimate) -> OnlineEstimate:
+        """Begin with the noise of a fit, and give the bank what was kept."""
+        noise = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
+        self._freedom = min(MOST_FITTED, float(fit.residuals.size))
+        if not fit.adequate:
+            self._doubts = (f"the first {LAST:.0f} s did not fit ({fit.message})",)
+        self._begin(replace(noise))
+        assert self._bank is not None
+        commands = iter([*self._commands, (math.inf, 0.0)])
+        coming = next(commands)
+        numbers: list[float] = []
+        for time, output, _ in self._rows:
+            while coming[0] < time:
+                self._bank.command(*coming)
+                coming = next(commands)
+            numbers = self._bank.row(time, None if math.isnan(output) else output)
+        while math.isfinite(coming[0]):
+            self._bank.command(*coming)
+            coming = next(commands)
+        self._rows.clear()
+        self._commands.clear()
+        return self._estimate(numbers)
+
+
+def _flight_noise(noise: Noise) -> FlightNoise:
+    if isinstance(noise, FlightNoise):
+        return noise
+    if isinstance(noise, (int, float)):
+        return FlightNoise(white=positive("noise", noise))
+    raise TypeError(f"noise must be a number or a FlightNoise, got {type(noise).__name__}")

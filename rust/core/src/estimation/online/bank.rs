@@ -1,0 +1,607 @@
+//! The bank: a Kalman filter for each delay and set of lags, its weights, and a second bank of
+//! delays that the vehicle may have changed to.
+
+use super::super::disturbance::Joint;
+use super::super::kept::Kept;
+use super::super::propagation::{Propagation, Square};
+use super::cell::{Cell, Column, Look};
+use super::history::{History, Jump};
+use super::judge::{AGES, Judge, Scale};
+use super::posterior::known;
+use super::response::StepResponse;
+use super::walk::Walk;
+use super::{Answer, Online, Settings};
+use crate::Error;
+
+/// Deviations of what a level or a state that is not known may be, in those of the white noise.
+const UNKNOWN: f64 = 1e3;
+
+/// Time over which information about the delay is averaged, and over which it has to tell the delay
+/// to the width of the gate, s.
+const RECENT: f64 = 2.0;
+const SPELL: f64 = 5.0;
+
+/// Innovations beyond so many deviations in every cell are outliers, at most so many in a row.
+const OUTLIER: f64 = 6.0;
+const MOST_OUTLIERS: u32 = 2;
+
+/// Time between changes that is expected before the first row, s. The hazard of the second bank is
+/// one a second, so that its weights over this time are the odds for a change.
+const RARE: f64 = 600.0;
+
+/// Weight below which a cell has no say whether a row is an outlier.
+const NO_SAY: f64 = 1e-6;
+
+/// Changes of the command are looked at for so many lags beyond the longest delay.
+const AFTER_LAGS: f64 = 3.0;
+
+/// One set of lags.
+struct Layer<const N: usize> {
+    a: Square<N>,
+    noise: Square<N>,
+    seen: [f64; N],
+    direct: f64,
+    response: StepResponse<N>,
+    steps: Kept<Propagation<N>>,
+    start: Square<N>,
+    /// Number of plant states.
+    plant: usize,
+    total: f64,
+}
+
+/// Cells by set of lags and delay, and their weights.
+struct Cells<const N: usize> {
+    cells: Vec<Cell<N>>,
+    weights: Vec<f64>,
+    /// Delays by their places among all.
+    places: Vec<usize>,
+    walk: Walk,
+}
+
+impl<const N: usize> Cells<N> {
+    fn new(delays: &[f64], places: Vec<usize>, layers: usize) -> Self {
+        let own: Vec<f64> = places.iter().map(|place| delays[*place]).collect();
+        let none = Cell {
+            mean: [0.0; N],
+            cov: [[0.0; N]; N],
+            slope: [0.0; N],
+        };
+        Self {
+            cells: vec![none; layers * places.len()],
+            weights: vec![0.0; layers * places.len()],
+            walk: Walk::new(&own),
+            places,
+        }
+    }
+
+    fn mix(&mut self, variance: f64, white: f64) {
+        let count = self.places.len();
+        let groups = self.cells.chunks_mut(count);
+        for (cells, weights) in groups.zip(self.weights.chunks_mut(count)) {
+            self.walk.mix(cells, weights, variance, white);
+        }
+    }
+
+    /// Set of lags and place of the delay of each cell.
+    fn indices(&self, delays: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let count = self.places.len();
+        (0..self.cells.len())
+            .map(move |i| (i / count, (i / count) * delays + self.places[i % count]))
+    }
+}
+
+/// A bank of filters of N states.
+pub(super) struct Bank<const N: usize> {
+    settings: Settings,
+    layers: Vec<Layer<N>>,
+    /// Places of gain, trim and offset among the states.
+    gain: usize,
+    trim: Option<usize>,
+    offset: Option<usize>,
+    main: Cells<N>,
+    /// After a change: the weights are Σ ρ Λ, the hazard times the likelihood ratio.
+    changed: Cells<N>,
+    columns: Vec<Column<N>>,
+    looks: Vec<Look<N>>,
+    logs: Vec<f64>,
+    jumps: Vec<Jump>,
+    history: History,
+    scale: Scale,
+    judge: Judge,
+    now: Option<f64>,
+    /// Time of the last row that was used.
+    used: Option<f64>,
+    first: Option<f64>,
+    largest: f64,
+    rate: f64,
+    outliers: u32,
+    evidence: f64,
+}
+
+impl<const N: usize> Bank<N> {
+    pub(super) fn new(settings: Settings) -> Result<Self, Error> {
+        let mut layers = Vec::new();
+        for one in &settings.layers {
+            layers.push(Layer::new(&settings, one)?);
+        }
+        let states = N - 1 - usize::from(settings.trim > 0.0) - usize::from(settings.has_offset());
+        let trim = (settings.trim > 0.0).then_some(states + 1);
+        let offset = settings.has_offset().then_some(N - 1);
+        let count = settings.delays.len();
+        let sets = layers.len();
+        let main = Cells::new(&settings.delays, (0..count).collect(), sets);
+        let every = settings.every.clamp(1, count.div_ceil(3).max(1));
+        let first = ((count - 1) % every) / 2;
+        let changed = Cells::new(
+            &settings.delays,
+            (first..count).step_by(every).collect(),
+            sets,
+        );
+        let longest = settings.delays[count - 1];
+        let lag = layers.iter().map(|layer| layer.total).fold(0.0, f64::max);
+        let history = History::new(&settings.delays, 2.0 * longest + AFTER_LAGS * lag + 1.0);
+        let none = Column {
+            moved: [0.0; N],
+            slope: [0.0; N],
+            seen: [0.0; N],
+        };
+        Ok(Self {
+            scale: Scale::new(settings.white, settings.freedom, settings.memory),
+            judge: Judge::new(settings.memory.min(MOST_MEMORY)),
+            columns: vec![none; sets * count],
+            looks: Vec::new(),
+            logs: Vec::new(),
+            jumps: Vec::new(),
+            layers,
+            gain: states,
+            trim,
+            offset,
+            main,
+            changed,
+            history,
+            settings,
+            now: None,
+            used: None,
+            first: None,
+            largest: 0.0,
+            rate: 0.0,
+            outliers: 0,
+            evidence: 0.0,
+        })
+    }
+
+    /// What the input does in every set of lags and delay up to `time`.
+    fn arrive(&mut self, time: f64, length: f64) {
+        let count = self.settings.delays.len();
+        for delay in 0..count {
+            let (before, input) = self.history.arrive(delay, time, length, &mut self.jumps);
+            for (set, layer) in self.layers.iter().enumerate() {
+                let mut moved = [0.0; N];
+                let mut slope = [0.0; N];
+                if before != 0.0 {
+                    moved = layer.response.at(length).map(|gamma| before * gamma);
+                }
+                for jump in &self.jumps {
+                    let gamma = layer.response.at(jump.age);
+                    let rate = layer.response.rate(&gamma);
+                    for i in 0..N {
+                        moved[i] += jump.size * gamma[i];
+                        slope[i] -= jump.size * rate[i];
+                    }
+                }
+                let mut seen = layer.seen;
+                seen[self.gain] = layer.direct * input;
+                self.columns[set * count + delay] = Column { moved, slope, seen };
+            }
+        }
+    }
+
+    /// Begin at the first row at which every delay has had its first command, or from rest.
+    fn start(&mut self, time: f64, output: f64) {
+        self.arrive(time, f64::INFINITY);
+        let (white, count) = (self.settings.white, self.settings.delays.len());
+        let (gain, spread) = self.settings.gain;
+        for (set, layer) in self.layers.iter().enumerate() {
+            for delay in 0..count {
+                let column = &self.columns[set * count + delay];
+                let mut cell = Cell {
+                    mean: [0.0; N],
+                    cov: layer.start,
+                    slope: column.slope.map(|slope| gain * slope),
+                };
+                cell.mean[self.gain] = gain;
+                let mut reach = column.moved;
+                reach[self.gain] = 1.0;
+                let variance = (spread / white).powi(2);
+                for i in 0..N {
+                    if i != self.gain {
+                        cell.mean[i] = gain * column.moved[i];
+                    }
+                    for j in 0..N {
+                        cell.cov[i][j] += variance * reach[i] * reach[j];
+                    }
+                }
+                if !self.settings.at_rest {
+                    let unknown = (gain.abs() + spread) * self.largest / white;
+                    for i in 0..layer.plant {
+                        cell.cov[i][i] += unknown * unknown;
+                    }
+                }
+                if let Some(trim) = self.trim {
+                    cell.cov[trim][trim] = (self.settings.trim / white).powi(2);
+                }
+                // The level is unknown: the offset, or the state that integrates.
+                let place = self
+                    .offset
+                    .unwrap_or_else(|| layer.integrates(&self.settings));
+                let seen = if layer.seen[place] == 0.0 {
+                    1.0
+                } else {
+                    layer.seen[place]
+                };
+                let expected: f64 = column.seen.iter().zip(&cell.mean).map(|(c, x)| c * x).sum();
+                cell.mean[place] += (output - expected) / seen;
+                cell.cov[place][place] += (UNKNOWN / seen).powi(2);
+                self.main.cells[set * count + delay] = cell;
+            }
+        }
+        let logs = self
+            .settings
+            .layers
+            .iter()
+            .flat_map(|layer| &layer.log_prior);
+        let top = logs.clone().copied().fold(f64::NEG_INFINITY, f64::max);
+        self.main.weights = logs.map(|log| (log - top).exp()).collect();
+        let total: f64 = self.main.weights.iter().sum();
+        self.main
+            .weights
+            .iter_mut()
+            .for_each(|weight| *weight /= total);
+        self.used = Some(time);
+    }
+
+    /// Go to `time` without looking.
+    fn go(&mut self, time: f64, length: f64) {
+        let gate = self.gate();
+        let white = self.scale.variance();
+        let walked = self.settings.drift.powi(2) * length * gate;
+        self.main.mix(walked, white);
+        if self.settings.alarm.is_finite() {
+            self.inject(length * gate, white);
+            self.changed.mix(walked, white);
+        }
+        self.arrive(time, length);
+        let wander = (self.settings.gain_walk).powi(2) * length * gate / white;
+        let delays = self.settings.delays.len();
+        let steps: Vec<Propagation<N>> = self
+            .layers
+            .iter_mut()
+            .map(|layer| {
+                let (a, noise) = (layer.a, layer.noise);
+                layer
+                    .steps
+                    .at(length, time, || Propagation::new(&a, &noise, length))
+                    .clone()
+            })
+            .collect();
+        for bank in [&mut self.main, &mut self.changed] {
+            let indices: Vec<(usize, usize)> = bank.indices(delays).collect();
+            for (cell, (set, column)) in bank.cells.iter_mut().zip(indices) {
+                cell.go(&steps[set], &self.columns[column], self.gain);
+                cell.cov[self.gain][self.gain] += wander;
+            }
+        }
+    }
+
+    /// The share of the walk and of the hazard that there is: both need information.
+    fn gate(&self) -> f64 {
+        let enough = 1.0 / (SPELL * self.settings.width.powi(2));
+        self.rate / (self.rate + enough)
+    }
+
+    /// The delay may change now: states of the main bank go over to every delay.
+    fn inject(&mut self, hazard: f64, white: f64) {
+        if hazard <= 0.0 {
+            return;
+        }
+        let (count, own) = (self.settings.delays.len(), self.changed.places.len());
+        for set in 0..self.layers.len() {
+            let range = set * count..(set + 1) * count;
+            let total: f64 = self.main.weights[range.clone()].iter().sum();
+            if total <= 0.0 {
+                continue;
+            }
+            let parts: Vec<(f64, &Cell<N>)> = self.main.weights[range.clone()]
+                .iter()
+                .map(|weight| weight / total)
+                .zip(&self.main.cells[range])
+                .filter(|(share, _)| *share > 1e-6)
+                .collect();
+            let here = Cell::blend(&parts, white);
+            let new = hazard * total / own as f64;
+            for i in set * own..(set + 1) * own {
+                let sum = self.changed.weights[i] + new;
+                let share = new / sum;
+                let cell = &mut self.changed.cells[i];
+                *cell = if share > 1.0 - 1e-9 {
+                    here.clone()
+                } else {
+                    Cell::blend(&[(1.0 - share, cell), (share, &here)], white)
+                };
+                self.changed.weights[i] = sum;
+            }
+        }
+    }
+
+    /// Take an output in. Has the delay changed?
+    fn see(&mut self, time: f64, output: f64) -> bool {
+        let delays = self.settings.delays.len();
+        let variance = self.scale.variance();
+        self.looks.clear();
+        self.logs.clear();
+        let mut top = f64::NEG_INFINITY;
+        let mut least = f64::INFINITY;
+        for (number, bank) in [&self.main, &self.changed].into_iter().enumerate() {
+            for (i, (_, column)) in bank.indices(delays).enumerate() {
+                let look = bank.cells[i].look(&self.columns[column], output);
+                let log = self.scale.log_density(look.innovation, look.variance);
+                if bank.weights[i] > 0.0 && number == 0 {
+                    top = top.max(log);
+                }
+                if bank.weights[i] > NO_SAY || (number == 1 && bank.weights[i] > 0.0) {
+                    least = least.min(look.innovation.powi(2) / look.variance);
+                }
+                self.looks.push(look);
+                self.logs.push(log);
+            }
+        }
+        if least > OUTLIER * OUTLIER * variance && self.outliers < MOST_OUTLIERS {
+            self.outliers += 1;
+            return false;
+        }
+        self.outliers = 0;
+        let length = self.used.map_or(0.0, |used| time - used);
+        self.used = Some(time);
+        self.judge_by(time, length, variance);
+        let split = self.main.cells.len();
+        let mut total = 0.0;
+        for (weight, log) in self.main.weights.iter_mut().zip(&self.logs) {
+            *weight *= (log - top).exp();
+            total += *weight;
+        }
+        self.evidence += top + total.ln();
+        let mut square = 0.0;
+        let mut known = 0.0;
+        for (weight, look) in self.main.weights.iter_mut().zip(&self.looks) {
+            *weight /= total;
+            square += *weight * look.innovation.powi(2) / look.variance;
+            known += *weight * look.slope.powi(2) / (look.variance * variance);
+        }
+        if length > 0.0 {
+            let fade = (-length / RECENT).exp();
+            self.rate = fade * self.rate + (1.0 - fade) * known / length;
+        }
+        self.scale.hear(square, length);
+        for (cell, look) in self.main.cells.iter_mut().zip(&self.looks) {
+            cell.take(look);
+        }
+        let mut sum = 0.0;
+        for i in 0..self.changed.cells.len() {
+            if self.changed.weights[i] > 0.0 {
+                let ratio = (self.logs[split + i] - top).min(500.0).exp() / total;
+                self.changed.weights[i] = (self.changed.weights[i] * ratio).min(1e200);
+                self.changed.cells[i].take(&self.looks[split + i]);
+                sum += self.changed.weights[i];
+            }
+        }
+        if sum < self.settings.alarm {
+            return false;
+        }
+        self.change(sum, variance);
+        true
+    }
+
+    /// Tell the judge how this row was predicted by all cells together.
+    fn judge_by(&mut self, time: f64, length: f64, variance: f64) {
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (weight, look) in self.main.weights.iter().zip(&self.looks) {
+            mean += weight * look.innovation;
+            square += weight * (look.variance * variance + look.innovation.powi(2));
+        }
+        let deviation = (square - mean * mean).max(f64::MIN_POSITIVE).sqrt();
+        let longest = self.settings.delays[self.settings.delays.len() - 1];
+        let lag = self
+            .layers
+            .iter()
+            .map(|layer| layer.total)
+            .fold(0.0, f64::max);
+        let step = (longest + AFTER_LAGS * lag) / AGES as f64;
+        let changes = std::array::from_fn(|k| {
+            let age = k as f64 * step;
+            self.history.at(time - age) - self.history.at(time - age - step)
+        });
+        self.judge.hear(mean / deviation, length, &changes);
+    }
+
+    /// Go over to what the second bank has found, as far as changes are more probable than not.
+    fn change(&mut self, sum: f64, white: f64) {
+        let (count, own) = (self.settings.delays.len(), self.changed.places.len());
+        let delays = &self.settings.delays;
+        let mut added = vec![0.0; self.main.cells.len()];
+        let mut nearest = vec![0; self.main.cells.len()];
+        for set in 0..self.layers.len() {
+            for (delay, late) in delays.iter().enumerate() {
+                let places = &self.changed.places;
+                let after = places.partition_point(|place| *place < delay).min(own - 1);
+                let before = match places[after] > delay {
+                    true => after.saturating_sub(1),
+                    false => after,
+                };
+                let (low, high) = (delays[places[before]], delays[places[after]]);
+                let share = if high > low {
+                    ((late - low) / (high - low)).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let weight = |place: usize| self.changed.weights[set * own + place];
+                let place = set * count + delay;
+                added[place] = (1.0 - share) * weight(before) + share * weight(after);
+                nearest[place] = set * own + if share < 0.5 { before } else { after };
+            }
+        }
+        let odds = sum / (RARE * added.iter().sum::<f64>());
+        let mut total = 0.0;
+        for (place, (added, nearest)) in added.iter().zip(nearest).enumerate() {
+            let (weight, added) = (self.main.weights[place], added * odds);
+            let whole = weight + added;
+            if added > 1e-9 * whole {
+                let parts = [
+                    (weight / whole, &self.main.cells[place]),
+                    (added / whole, &self.changed.cells[nearest]),
+                ];
+                self.main.cells[place] = Cell::blend(&parts, white);
+            }
+            self.main.weights[place] = whole;
+            total += whole;
+        }
+        for weight in &mut self.main.weights {
+            *weight /= total;
+        }
+        self.changed.weights.fill(0.0);
+        self.judge.forget();
+    }
+
+    fn answer(&self, time: f64, changed: bool) -> Answer {
+        let totals: Vec<f64> = self.layers.iter().map(|layer| layer.total).collect();
+        let weights = &self.main.weights;
+        let count = self.settings.delays.len();
+        let tail = 0.5 * (1.0 - self.settings.level);
+        let (delay, together) = known(&self.settings.delays, &totals, weights, tail);
+        let variance = self.scale.variance();
+        let (mut gain, mut square, mut lag) = (0.0, 0.0, 0.0);
+        let (mut lowest, mut highest) = (0.0, 0.0);
+        for (i, (weight, cell)) in weights.iter().zip(&self.main.cells).enumerate() {
+            gain += weight * cell.mean[self.gain];
+            square +=
+                weight * (variance * cell.cov[self.gain][self.gain] + cell.mean[self.gain].powi(2));
+            lag += weight * totals[i / count];
+            if i % count == 0 {
+                lowest += weight;
+            }
+            if i % count == count - 1 {
+                highest += weight;
+            }
+        }
+        Answer {
+            time,
+            started: true,
+            delay,
+            together,
+            lag,
+            gain,
+            gain_deviation: (square - gain * gain).max(0.0).sqrt(),
+            rate: self.rate,
+            gate: self.gate(),
+            changed,
+            change_ratio: self.changed.weights.iter().sum(),
+            white: variance.sqrt(),
+            colour: self.judge.colour(),
+            unexplained: self.judge.unexplained(),
+            lowest,
+            highest,
+            evidence: self.evidence,
+        }
+    }
+}
+
+/// Longest memory of the judge, s.
+const MOST_MEMORY: f64 = 30.0;
+
+impl<const N: usize> Layer<N> {
+    fn new(settings: &Settings, one: &super::Lags) -> Result<Self, Error> {
+        let space = settings.plant.space(&one.lags, one.zero);
+        let joint = Joint::new(&space, &settings.disturbances)?;
+        let (own, plant) = (joint.c.len(), space.b.len());
+        let embedded = |flat: &[f64]| -> Square<N> {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    if i < own && j < own {
+                        flat[i * own + j]
+                    } else {
+                        0.0
+                    }
+                })
+            })
+        };
+        let mut a = embedded(&joint.a);
+        let mut b = [0.0; N];
+        let mut seen = [0.0; N];
+        b[..plant].copy_from_slice(&space.b);
+        seen[..own].copy_from_slice(&joint.c);
+        let response = StepResponse::new(a, b);
+        if settings.trim > 0.0 {
+            for i in 0..plant {
+                a[i][own + 1] = b[i];
+            }
+            seen[own + 1] = space.d;
+        }
+        if settings.has_offset() {
+            seen[N - 1] = 1.0;
+        }
+        let direct = space.d;
+        Ok(Self {
+            noise: embedded(&joint.noise),
+            start: embedded(&joint.start),
+            a,
+            seen,
+            direct,
+            response,
+            steps: Kept::new(),
+            plant,
+            total: one.lags.iter().sum::<f64>() - one.zero + settings.own_lag,
+        })
+    }
+
+    /// The state that holds the level of a plant that integrates.
+    fn integrates(&self, settings: &Settings) -> usize {
+        self.plant - settings.plant.states(0)
+    }
+}
+
+impl<const N: usize> Online for Bank<N> {
+    fn command(&mut self, time: f64, value: f64) -> Result<(), Error> {
+        self.history.push(time, value)?;
+        self.first.get_or_insert(time);
+        self.largest = self.largest.max(value.abs());
+        Ok(())
+    }
+
+    fn row(&mut self, time: f64, output: Option<f64>) -> Result<Answer, Error> {
+        refuse_if!(!time.is_finite(), "a time is {time}: give finite numbers");
+        if let Some(output) = output.filter(|output| !output.is_finite()) {
+            refuse!("the output at {time} s is {output}: give a finite number, or none");
+        }
+        if let Some(now) = self.now {
+            refuse_if!(
+                time <= now,
+                "the time {time} s follows {now} s: give increasing times"
+            );
+        }
+        let before = self.now.replace(time);
+        let changed = if self.used.is_none() {
+            let longest = self.settings.delays[self.settings.delays.len() - 1];
+            let is_ready =
+                self.settings.at_rest || self.first.is_some_and(|first| time >= first + longest);
+            let Some(output) = output.filter(|_| is_ready) else {
+                return Ok(Answer::none(time, &self.settings));
+            };
+            self.start(time, output);
+            self.see(time, output)
+        } else {
+            self.go(time, before.map_or(0.0, |before| time - before));
+            output.is_some_and(|output| self.see(time, output))
+        };
+        self.history.tidy(time);
+        Ok(self.answer(time, changed))
+    }
+}
