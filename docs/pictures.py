@@ -210,7 +210,7 @@ def flying() -> None:
         figure, axes = new_figure(7.5, 4.4, rows=2, even=True)
         plot_learned(axes, found.learned.flights, found.learned.fit)
         figure.savefig(IMAGES / "flying-learned.png", dpi=90)
-        told = read_telemetry(found.before.telemetry, found.before.recording)
+        told = read_telemetry(found.before)
         figure, axes = new_figure(7.5, 4.2, rows=2)
         plot_telemetry(axes, told, found.before)
         figure.savefig(IMAGES / "flying-telemetry.png", dpi=90)

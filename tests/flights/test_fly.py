@@ -15,12 +15,12 @@ from deadtime._base.digits import between, stated
 from deadtime._cli.fly import _print_study
 from deadtime.flights import FlightPlan, FlownSteps, fly_experiment
 from deadtime.flights import _learn as learn_module
-from deadtime.flights._fly import fly_all
-from deadtime.flights._height_control import HeightControl, Velocity
+from deadtime.flights._axis_control import AxisControl, Velocity
+from deadtime.flights._fly import PlannedFlight, fly_all
 from deadtime.flights._learn import learn
 from deadtime.flights._runs import telemetry_of
 from deadtime.flights._split import split_delay
-from deadtime.flights._step_test import ROW, StepProgramme, check_gain
+from deadtime.flights._step_test import HEIGHT, StepProgramme, check_gain, row_columns
 from deadtime.links import Limits, run
 from deadtime.links import journal as journal_module
 from deadtime.links.journal import _Writer
@@ -47,7 +47,7 @@ def test_the_command_with_filtered_speed_is_that_of_the_exact_loop():
     )
     time = np.arange(80) * TS
     flown = loop.simulate(time, np.where(time < 0.5, 0.0, 1.0), reference_time=time)
-    control = HeightControl(dtm.PV(2.0, 0.4), TS)
+    control = AxisControl(dtm.PV(2.0, 0.4), TS)
     made = [
         control.command(reference, height, None)
         for reference, height in zip(flown.reference, flown.outputs, strict=True)
@@ -56,11 +56,11 @@ def test_the_command_with_filtered_speed_is_that_of_the_exact_loop():
 
 
 def test_a_reported_speed_replaces_the_filtered_one():
-    control = HeightControl(dtm.PV(2.0, 0.5), TS)
+    control = AxisControl(dtm.PV(2.0, 0.5), TS)
     control.command(1.0, 0.5, None)
     assert control.command(1.0, 0.9, 0.2) == pytest.approx(2.0 * 0.1 - 0.5 * 0.2)
     with pytest.raises(TypeError, match="P or PV"):
-        HeightControl(dtm.PI(1.0, 0.1), TS)
+        AxisControl(dtm.PI(1.0, 0.1), TS)
 
 
 def test_the_speed_filter_starts_at_rest():
@@ -145,9 +145,9 @@ def test_a_broken_rule_ends_the_flight_and_keeps_its_rows(reason, tmp_path):
     with pytest.raises(FlightAbortedError, match=message):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert vehicle.log == ["connected", "took off", "hovers", "landed", "closed"]
-    rows = columns_of(tmp_path / "flight-1-P.csv")
+    rows = columns_of(tmp_path / "flight-1-z-P.csv")
     assert 2.8 < rows["time_s"][-1] < 4.5
-    assert rows.dtype.names == ROW
+    assert rows.dtype.names == row_columns(HEIGHT)
 
 
 def test_a_constant_height_does_not_make_the_vehicle_climb_for_long(tmp_path):
@@ -155,7 +155,7 @@ def test_a_constant_height_does_not_make_the_vehicle_climb_for_long(tmp_path):
     vehicle = vehicle_with(lambda state: replace(state, height=1.0))
     with pytest.raises(FlightAbortedError, match=r"has read 1\.000 m"):
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
-    assert columns_of(tmp_path / "flight-1-P.csv")["time_s"][-1] < 6.1
+    assert columns_of(tmp_path / "flight-1-z-P.csv")["time_s"][-1] < 6.1
     assert vehicle.log[-2:] == ["landed", "closed"]
 
 
@@ -207,9 +207,9 @@ def test_a_disk_that_fills_up_in_flight_lands_the_vehicle(tmp_path, monkeypatch)
     with pytest.raises(OSError, match="No space left") as ended:
         fly_experiment(lambda: vehicle, FlightPlan(), tmp_path, run=run)
     assert synced
-    assert ended.value.filename.endswith("flight-1-P.csv")
+    assert ended.value.filename.endswith("flight-1-z-P.csv")
     assert vehicle.log[-2:] == ["landed", "closed"]
-    assert columns_of(tmp_path / "flight-1-P.csv").size > 5
+    assert columns_of(tmp_path / "flight-1-z-P.csv").size > 5
 
 
 @pytest.mark.parametrize("fails", [False, True])
@@ -236,7 +236,7 @@ def test_a_slow_disk_delays_neither_commands_nor_the_landing(fails, tmp_path, mo
             ashore.set()
 
     vehicle = Closing(change_state=change_state)
-    flight = fly_all(lambda: vehicle, [dtm.P(1.2)], FlightPlan(), 6.5, tmp_path, 1)
+    flight = fly_all(lambda: vehicle, [PlannedFlight(FlightPlan(), dtm.P(1.2), 6.5)], tmp_path)
     if fails:
         with pytest.raises(FlightAbortedError, match="tilted"):
             run(flight)
@@ -245,7 +245,7 @@ def test_a_slow_disk_delays_neither_commands_nor_the_landing(fails, tmp_path, mo
     assert waited
     assert all(waited)  # Nothing is written before the vehicle has landed and its link is closed.
     assert vehicle.log[-2:] == ["landed", "closed"]
-    rows = columns_of(tmp_path / "flight-1-P.csv")
+    rows = columns_of(tmp_path / "flight-1-z-P.csv")
     assert np.diff(rows["time_s"]) == pytest.approx(TS, abs=1e-6)
     assert rows["time_s"][-1] > (2.8 if fails else 17.8)
 
@@ -309,8 +309,8 @@ def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
     tmp_path, capsys, monkeypatch
 ):
     # Intervals of an inadequate fit do not assure a margin.
-    def undesigned(loop, *, controller, **how):  # The designed gains do not matter here.
-        return SimpleNamespace(loop=loop.replace(controller=controller))
+    def undesigned(fit, *, controller, **how):  # The designed gains do not matter here.
+        return SimpleNamespace(loop=fit.loop.replace(controller=controller))
 
     monkeypatch.setattr(learn_module, "design", undesigned)
 
@@ -319,7 +319,7 @@ def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
 
     def warn(doubt):
         warnings.append(doubt)
-        flights.append(len(list(tmp_path.glob("flight-?-*P.csv"))))
+        flights.append(len(list(tmp_path.glob("flight-?-z-*P.csv"))))
 
     warnings, flights = [], []
     random = np.random.default_rng(2)
@@ -329,7 +329,7 @@ def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
     assert found.learned.fit.adequate is False
     assert flights == [1]
     assert "margin is not assured" in warnings[0]
-    _print_study(found, tmp_path / "report.html")
+    _print_study(found)
     assert "not adequate (adequate=False)" in " ".join(capsys.readouterr().out.split())
     fine = replace(found.learned, fit=replace(found.learned.fit, adequate=True))
     assert "adequate" not in replace(found, learned=fine).verdict()
@@ -342,7 +342,7 @@ def test_recordings_in_which_the_vehicle_does_not_move_are_refused(tmp_path):
     asleep = dtm.Recording(time, reference, 1.0 + noise, np.clip(reference - 1.0, -1, 1))
     flight = FlownSteps(dtm.P(2.0), asleep, tmp_path / "none.csv", None, TS, 5.0)
     with pytest.raises(NotIdentifiableError):
-        learn([flight], 1.0, 0.25, 2.5)
+        learn([flight], FlightPlan())
 
 
 def test_link_delay_and_vehicle_lag_are_estimated_from_reported_setpoint_and_climb():

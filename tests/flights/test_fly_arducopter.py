@@ -1,4 +1,4 @@
-"""The whole experiment with ArduPilot's Copter, at the speed of the clock: two minutes."""
+"""The whole experiment with ArduPilot's Copter, on two axes, at the speed of the clock."""
 
 import json
 import os
@@ -17,29 +17,38 @@ SUPPORT = Path(__file__).parents[1] / "support"
 
 @pytest.mark.survey
 @pytest.mark.flight
-def test_the_delay_of_the_vehicle_is_found_and_its_designed_gains_fly(tmp_path):
+def test_the_delays_of_two_axes_are_found_and_their_designed_gains_fly(tmp_path):
     skip_without_firmware()
     folder = tmp_path / "flight"
     paths = os.pathsep.join(filter(None, [str(SUPPORT), os.environ.get("PYTHONPATH")]))
     program = [sys.executable, str(SUPPORT / "arducopter_experiment.py")]
+    options = ["--axes", "z,x", "--gains", "1.2", "--gains", "x=0.7", "--hold", "4.5"]
     done = subprocess.run(
-        [*alone(), *program, "--gains", "1.2", "--hold", "4.5", "--folder", str(folder), "--json"],
+        [*alone(), *program, *options, "--folder", str(folder), "--json"],
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=300.0,
+        timeout=400.0,
     )
-    if "old, more than 0.3 s" in done.stderr:
+    if "s old, more than" in done.stderr:
         pytest.skip("this machine is too busy for a loop in real time")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    # Seen over several flights: 0.27 to 0.34 s, of which the link has one or two periods of its
-    # messages, 20 ms, and half a period of the rows.
-    assert 0.22 < result["fit"]["delay_plus_lag"] < 0.42
-    assert 0.01 < result["transport"]["delay"] < 0.08
-    assert 0.2 < result["vehicle_delay"] < 0.42
+    late = [reason for one in result["axes"].values() for reason in one["irregular"]]
+    if late:
+        pytest.skip(f"this machine is too busy for a loop in real time: {late}")
     assert 0.0 < result["round_trip"] < 0.03
-    last = result["flights"][-1]
-    assert last["controller"].startswith("PV")
-    assert last["overshoot"] < 25.0
+    # Seen over several flights: 0.26 to 0.33 s on z, 0.57 to 0.62 s on x.
+    for name, low, high in (("z", 0.22, 0.42), ("x", 0.5, 0.72)):
+        axis = result["axes"][name]
+        assert low < axis["whole_delay"] < high
+        assert 0.01 < axis["transport"]["delay"] < 0.08
+        assert axis["vehicle_delay"] < high
+        assert len(axis["plants"]) > 1  # an integrator with a lag does not explain this vehicle
+        last = axis["flights"][-1]
+        assert last["controller"].startswith("PV")
+        assert last["overshoot"] < 25.0
+        assert last["clock_misfit"] < 0.005
+    before, after = (result["axes"]["x"]["flights"][place] for place in (0, -1))
+    assert after["settling_time"] < before["settling_time"]
     assert (folder / "report.html").exists()

@@ -16,7 +16,7 @@ from browser import check_page
 from command_line import run
 from deadtime._cli.fly import _free_folder
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
-from deadtime.flights._step_test import ROW
+from deadtime.flights._step_test import HEIGHT, row_columns
 from deadtime.links.ardrone2.emulator import Phase
 from emulated import emulator, skip_if_too_busy
 
@@ -45,8 +45,9 @@ def whole(tmp_path_factory):
 
 @pytest.mark.survey
 def test_the_whole_experiment_in_virtual_time(whole):
-    folder, result = whole
-    assert result["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
+    folder, whole_result = whole
+    assert whole_result["flown_on"] == "an emulated AR.Drone 2.0 (kit)"
+    result = whole_result["axes"]["z"]
     assert 0.33 < result["overshoot_method"][1] < 0.38
     assert result["fit"]["delay_plus_lag"] == pytest.approx(0.405, abs=0.01)
     assert result["transport"]["delay"] == pytest.approx(0.26, abs=0.01)
@@ -59,7 +60,7 @@ def test_the_whole_experiment_in_virtual_time(whole):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 3
     assert result["verdict"].split(".")[0] in page
-    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == result
+    assert json.loads((folder / "result.json").read_text(encoding="utf-8")) == whole_result
     again = run_fly("--virtual-time", "--folder", folder)
     assert again.returncode == 1
     assert "holds recordings already" in again.stderr
@@ -95,6 +96,9 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--max-height", "1.2"), "outside 0.2 to 1.2 m"),
         (("--host", "127.0.0.1", "--virtual-time"), "take one"),
         (("--max-climb", "nan"), "max_climb"),
+        (("--axes", "z,w"), "give some of z, x, y, yaw"),
+        (("--gains", "x=1"), "the axis x is not flown"),
+        (("--axes", "x", "--virtual-time"), "no axis x that speeds can be commanded on, only z"),
         (("--step", "-0.2"), "step"),
         (("--step", "1e-5"), "within the noise"),
         (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
@@ -112,7 +116,7 @@ def test_the_folder_is_the_first_that_holds_no_flight(tmp_path, monkeypatch):
     assert str(_free_folder()) == "flight"
     (tmp_path / "flight").mkdir()
     assert str(_free_folder()) == "flight"
-    (tmp_path / "flight" / "flight-1-P.csv").touch()
+    (tmp_path / "flight" / "flight-1-z-P.csv").touch()
     assert str(_free_folder()) == "flight-2"
     (tmp_path / "flight-2").touch()
     assert str(_free_folder()) == "flight-3"
@@ -122,7 +126,7 @@ def read_rows(path):
     """The rows of a recording, each of which must be complete."""
     with path.open(newline="") as stream:
         head, *rows = csv.reader(stream)
-    assert tuple(head) == ROW
+    assert tuple(head) == row_columns(HEIGHT)
     assert all(len(row) == len(head) for row in rows)
     return rows
 
@@ -233,7 +237,7 @@ def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
                 *options,
                 stderr=asyncio.subprocess.PIPE,
             )
-            recording = tmp_path / "flight-1-P.csv"
+            recording = tmp_path / "flight-1-z-P.csv"
             try:
                 for _ in range(600):
                     await asyncio.sleep(0.05)
@@ -281,7 +285,7 @@ def test_the_emulator_that_the_command_starts_ends_with_it(number, tmp_path):
     children = []
     for _ in range(200):
         children = own_emulators(process.pid)
-        if children and list(tmp_path.glob("flight-1-P.csv")):
+        if children and list(tmp_path.glob("flight-1-z-P.csv")):
             break
         time.sleep(0.1)
     assert children

@@ -8,7 +8,7 @@ import deadtime as dtm
 import pytest
 from deadtime import FlightAbortedError
 from deadtime.flights import FlightPlan
-from deadtime.flights._fly import fly_all
+from deadtime.flights._fly import PlannedFlight, fly_all
 from deadtime.flights._learn import learn
 from emulated import client_of, emulator, skip_if_too_busy
 
@@ -25,11 +25,12 @@ def test_one_flight_with_the_paper_s_gain_and_one_with_the_designed_gains(tmp_pa
                 async with client_of(emulated, PLAN.limits) as drone:
                     yield drone
 
-            (slow,) = await fly_all(connect, [dtm.P(2.4)], PLAN, PLAN.hold, tmp_path, 1)
-            learned = await asyncio.to_thread(learn, [slow], 1.0, PLAN.step, PLAN.gain_margin)
+            first = PlannedFlight(PLAN, dtm.P(2.4), PLAN.hold)
+            (slow,), _ = await fly_all(connect, [first], tmp_path)
+            learned = await asyncio.to_thread(learn, [slow], PLAN)
             brief = replace(PLAN, settle=2.5)
-            designed = [learned.designed.loop.controller]
-            (fast,) = await fly_all(connect, designed, brief, 2.5, tmp_path, 2)
+            designed = PlannedFlight(brief, learned.designed.loop.controller, 2.5)
+            (fast,), _ = await fly_all(connect, [designed], tmp_path, 2)
             return slow, learned, fast
 
     try:

@@ -20,6 +20,9 @@ SUPPORT = Path(__file__).parents[1] / "support"
 #: What the relay adds to the round trip, s.
 ADDED = 0.26
 
+#: Losses of the rough link, and the time between commands, s.
+LOSS, SAMPLE = 0.05, 0.065
+
 
 @pytest.fixture(scope="module")
 def links(tmp_path_factory):
@@ -31,30 +34,45 @@ def links(tmp_path_factory):
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=300.0,
+        timeout=400.0,
     )
-    if "old, more than 0.3 s" in done.stderr:
+    if "s old, more than" in done.stderr:
         pytest.skip("this machine is too busy for a loop in real time")
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    found = json.loads(done.stdout.splitlines()[-1])
+    if any(reasons := [one["irregular"] for one in found]):
+        pytest.skip(f"this machine is too busy for a loop in real time: {reasons}")
+    return found
 
 
 def test_the_link_s_share_by_timesync_is_what_the_relay_adds(links):
-    near, far = links
+    near, far, _ = links
     assert far["least"] - near["least"] == pytest.approx(ADDED, abs=0.005)
 
 
 def test_the_echo_of_the_set_point_is_later_by_what_the_relay_adds(links):
     """Up to the spacing of the messages."""
-    near, far = links
+    near, far, _ = links
     assert far["echo"] - near["echo"] == pytest.approx(ADDED, abs=0.02)
 
 
+def half_widths(*found):
+    """Half width of the interval of the difference of two estimates, s."""
+    return math.hypot(*[0.5 * (one["interval"][1] - one["interval"][0]) for one in found])
+
+
 def test_the_delay_rises_by_what_the_relay_adds(links):
-    """Seen: 264 and 260 ms with these steps, 252 and 241 ms with shorter and smaller ones."""
-    near, far = links
+    """Seen with the rows on the vehicle's clock: 265 ms, on a busy machine."""
+    near, far, _ = links
     rise = far["total"] - near["total"]
-    half = [0.5 * (one["interval"][1] - one["interval"][0]) for one in links]
-    assert rise == pytest.approx(ADDED, abs=min(0.02, math.hypot(*half)))
-    for one in links:  # with the limits of the vehicle in the plant, it follows its set point
+    assert rise == pytest.approx(ADDED, abs=min(0.01, half_widths(near, far)))
+    for one in (near, far):  # with the limits of the vehicle in the plant, it follows its set point
         assert one["gain"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_with_jitter_and_losses_the_interval_covers_the_mean_delay(links):
+    """A lost command prolongs the one before, on average by a share of the sample time."""
+    near, _, rough = links
+    mean = ADDED + LOSS * SAMPLE
+    assert rough["total"] - near["total"] == pytest.approx(mean, abs=half_widths(near, rough))
+    assert rough["mean"] - near["mean"] == pytest.approx(ADDED, abs=0.01)

@@ -1,8 +1,8 @@
-"""Flights of the firmware over two links, one of them with the package's relay in between.
+"""Flights of the firmware over three links, two of them with the package's relay in between.
 
-The vehicle has a port for each: one sends to the ground station, the other to the relay, which adds
-`ONE_WAY` in each direction. Prints one line of JSON: for each link the estimate from the flight,
-the echo of the set point, and the round trip by TIMESYNC.
+The vehicle has a port for each. The relay of the second adds `ONE_WAY` in each direction, that of
+the third the same with jitter and losses. Prints one line of JSON: for each link the estimate from
+the flight, the echo of the set point, and the round trip by TIMESYNC.
 """
 
 import asyncio
@@ -12,20 +12,25 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import deadtime as dtm
-import numpy as np
 from arducopter import firmware
 from deadtime.flights import FlightPlan
-from deadtime.flights._fly import fly_all
+from deadtime.flights._fly import PlannedFlight, fly_all
 from deadtime.flights._runs import read_telemetry
 from deadtime.flights._split import split_delay
 from deadtime.links import Limits
 from deadtime.links.mavlink import MAVLinkVehicle
 from deadtime.links.udp import Network, RelayOptions
+from deadtime.links.udp.delays import Normal
 from deadtime.links.udp.relay import Relay
 
 ONE_WAY = 0.13
 
-NEAR, FAR, RELAY = 14550, 14560, 14570
+#: Standard deviation of the delays of the rough link in each direction, s, and its losses.
+JITTER, LOSS = 0.02, 0.05
+
+#: Ports of the ground station, and of the relays.
+NEAR, FAR, ROUGH = 14550, 14560, 14570
+FAR_RELAY, ROUGH_RELAY = 14561, 14571
 
 PLAN = FlightPlan(
     gains=(0.7,),
@@ -33,12 +38,12 @@ PLAN = FlightPlan(
     base=3.0,
     settle=8.0,
     hold=8.0,
-    limits=Limits(max_climb=1.0, max_height=6.0, max_error=1.5),
+    limits=Limits(max_climb=1.0, max_height=6.0, max_error=1.5, max_state_age=0.5),
 )
 
 
 async def flown(port, folder):
-    """One flight over the link at a port."""
+    """One flight over the link at a port, its TIMESYNC, and the limits of the vehicle."""
     trips = []
 
     @asynccontextmanager
@@ -47,56 +52,59 @@ async def flown(port, folder):
         async with MAVLinkVehicle(address, PLAN.limits, take_off_height=PLAN.base) as link:
             yield link
             trips.append(link.link_time)
-            limits = [await link.parameter(name) for name in ("WPNAV_ACCEL_Z", "PSC_JERK_Z")]
-            trips.extend((0.01 * limits[0], limits[1]))
 
-    (flight,) = await fly_all(connect, [dtm.P(0.7)], PLAN, PLAN.hold, folder / str(port), 1)
-    return flight, *trips
+    planned = PlannedFlight(PLAN, dtm.P(0.7), PLAN.hold)
+    (flight,), shaping = await fly_all(connect, [planned], folder / str(port))
+    return flight, trips[0], shaping["z"]
+
+
+def relay(port, listening, delay, loss=0.0):
+    """A relay in front of the ground station at a port."""
+    path = Network(delay=delay, loss=loss)
+    return Relay(RelayOptions(("127.0.0.1", port), path, path, listen=("127.0.0.1", listening)))
 
 
 async def flights(folder):
-    """Over the near link, then over the far one."""
-    path = Network(delay=ONE_WAY)
-    options = RelayOptions(("127.0.0.1", FAR), path, path, listen=("127.0.0.1", RELAY))
-    async with Relay(options):
-        return [await flown(port, folder) for port in (NEAR, FAR)]
+    """Over the near link, then over the others."""
+    async with (
+        relay(FAR, FAR_RELAY, ONE_WAY),
+        relay(ROUGH, ROUGH_RELAY, Normal(ONE_WAY, JITTER), LOSS),
+    ):
+        return [await flown(port, folder) for port in (NEAR, FAR, ROUGH)]
 
 
-def from_messages(flight):
-    """The heights as the vehicle reported them, every third, and the commands when they were sent.
-
-    A row of the recording holds the newest height, whatever its age.
-    """
-    rows, heights = flight.recording, read_telemetry(flight.telemetry, flight.recording)
-    inside = (heights.time > rows.time[0]) & (heights.time <= rows.time[-1])
-    time, height = heights.time[inside][::3], heights.height[inside][::3]
-    reference = rows.reference[np.searchsorted(rows.time, time, side="right") - 1]
-    return dtm.Recording(time, reference, height, sent=(rows.time, rows.command))
-
-
-def told(flight, link_time, acceleration, jerk):
+def told(flight, link_time, shaping):
     """What a flight tells of the delay, by a plant with the limits of the vehicle."""
-    plant = dtm.RateLimited(dtm.Integrator(1.0, lag=0.1), acceleration, jerk)
+    plant = dtm.RateLimited(dtm.Integrator(1.0, lag=0.1), *shaping)
     loop = dtm.ControlLoop(plant, flight.controller, sample_time=0.065, limit=1.0)
     fit = dtm.estimate_delay(
-        from_messages(flight),
+        flight.measured,
         loop,
         method="output_error",
         free=("delay", "gain", "lag"),
         window=(0.5 * flight.settle, None),
     )
-    echo = split_delay([read_telemetry(flight.telemetry, flight.recording)]).transport
+    try:
+        echo = split_delay([read_telemetry(flight)]).transport.delay
+    except dtm.NotIdentifiableError:  # echoes that come as irregularly as messages
+        echo = None
     return {
         "total": fit.delay_plus_lag,
         "interval": fit.ci(0.95, "delay+lag"),
         "gain": fit.gain,
-        "echo": echo.delay,
+        "echo": echo,
         "median": link_time.median,
         "least": link_time.least,
+        "mean": link_time.mean,
+        "age": flight.age,
+        "irregular": flight.irregular,
+        "rows": [len(flight.recording), len(flight.measured)],
+        "misfit": flight.clock.misfit,
     }
 
 
 if __name__ == "__main__":
-    with firmware(f"udpclient:127.0.0.1:{NEAR}", f"udpclient:127.0.0.1:{RELAY}"):
+    ports = [f"udpclient:127.0.0.1:{port}" for port in (NEAR, FAR_RELAY, ROUGH_RELAY)]
+    with firmware(*ports):
         flights_and_times = asyncio.run(flights(Path(sys.argv[1])))
     print(json.dumps([told(*one) for one in flights_and_times]))

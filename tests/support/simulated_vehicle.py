@@ -2,7 +2,7 @@
 
 import asyncio
 
-from deadtime.links import VehicleState
+from deadtime.links import Motion, VehicleState
 
 #: The height model of the development kit: b1, b0, a of (b1 s + b0) / (s (s + a)).
 KIT = (0.15265, 5.1529, 5.820)
@@ -13,6 +13,8 @@ class SimulatedVehicle:
 
     `change_state` may change any state that the vehicle reports.
     """
+
+    axes = ("z",)
 
     def __init__(self, delay=0.26, noise=0.0, random=None, change_state=None, reports_climb=True):
         self.delay, self.noise, self.random = delay, noise, random
@@ -47,6 +49,10 @@ class SimulatedVehicle:
         climb = max(-1.0, min(1.0, climb))
         self.commands.append((self.clock(), climb))
         return climb
+
+    def command_velocity(self, north=0.0, east=0.0, up=0.0, turn=None):
+        assert (north, east, turn or 0.0) == (0.0, 0.0, 0.0)
+        return Motion(up=self.command(up))
 
     def hover(self):
         self.log.append("hovers")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -19,18 +19,20 @@ from deadtime._cli.show import (
     stages,
 )
 from deadtime._cli.vehicles import flown_vehicle
-from deadtime.flights import FlightPlan, FlightStudy, fly_experiment
-from deadtime.flights._learn import COLUMNS
+from deadtime.flights import FlightPlan, FlightStudy, fly_axes
 from deadtime.flights._page import PARTS, write_flight_page
+from deadtime.flights._plan import USUAL
+from deadtime.flights._study import COLUMNS
 from deadtime.links import Limits
 from deadtime.links.ardrone2.emulator.motion import PlantName
+from deadtime.links.axes import AxisName
 from deadtime.links.mavlink import LinkAddress
 
 #: Largest commanded climb in m/s: on this computer, as in the paper, and elsewhere: it can hurt.
 EMULATED_CLIMB, REAL_CLIMB = 1.0, 0.5
 
-#: Default gains of the first flights: for an AR.Drone, and for ArduPilot and PX4.
-GAINS, LINK_GAINS = "1.2,2.4", "0.8,1.4"
+#: Gains of the first flights on the height of ArduPilot and PX4, 1/s.
+LINK_GAINS = (0.8, 1.4)
 
 #: Assumed delay of ArduPilot and PX4, s, lags included, and their gain.
 LINK_PRIOR = (0.5, 1.0)
@@ -64,14 +66,32 @@ def command(
         ),
     ] = False,
     plant: Annotated[PlantName, typer.Option(help="What the emulator flies like.")] = "kit",
-    gains: Annotated[
-        str | None,
+    axes: Annotated[
+        str,
         typer.Option(
-            help=f"Proportional gains to learn from: {GAINS}, with --link {LINK_GAINS}.",
+            help="What is stepped, one after the other: z (height), x (to the north), y (to the "
+            "east), yaw (heading). An AR.Drone has z.",
+            metavar="AXIS,…",
+        ),
+    ] = "z",
+    gains: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Proportional gains to learn from; of another axis than z with its name: x=0.5,0.8"
+            " (may be repeated).",
+            metavar="[AXIS=]K,…",
             show_default=False,
         ),
     ] = None,
-    step: Annotated[float, typer.Option(help="Size of the steps, m.")] = 0.25,
+    step: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Size of the steps, m, of yaw rad: 0.25 of z, 0.5 of x and y, 0.4 of yaw; of "
+            "another axis than z with its name: x=1 (may be repeated).",
+            metavar="[AXIS=]SIZE",
+            show_default=False,
+        ),
+    ] = None,
     base: Annotated[float, typer.Option(help="Height the steps go up from, m.")] = 1.0,
     max_climb: Annotated[
         float | None,
@@ -82,6 +102,13 @@ def command(
         ),
     ] = None,
     max_height: Annotated[float, typer.Option(help="Height that ends a flight, m.")] = 3.0,
+    max_speed: Annotated[
+        float, typer.Option(help="Largest horizontal speed commanded, m/s.")
+    ] = 0.5,
+    max_distance: Annotated[
+        float,
+        typer.Option(help="Horizontal distance from the take-off that ends a flight, m."),
+    ] = 5.0,
     hold: Annotated[float, typer.Option(help="Time on each step that is learnt from, s.")] = 6.5,
     folder: Annotated[
         Path | None,
@@ -106,38 +133,35 @@ def command(
     elsewhere = host or (None if link is None or LinkAddress.of(link).loopback else link)
     if max_climb is None:
         max_climb = EMULATED_CLIMB if elsewhere is None else REAL_CLIMB
-    usual = FlightPlan()
-    if gains is None:
-        gains = GAINS if link is None else LINK_GAINS
-    prior = (usual.prior_delay, usual.prior_gain) if link is None else LINK_PRIOR
-    plan = FlightPlan(
-        gains=_numbers(gains),
-        step=step,
-        base=base,
-        hold=hold,
-        checked_hold=min(hold, usual.checked_hold),
-        limits=Limits(max_climb=max_climb, max_height=max_height),
-        prior_delay=prior[0],
-        prior_gain=prior[1],
+    limits = Limits(
+        max_climb=max_climb,
+        max_height=max_height,
+        max_speed=max_speed,
+        max_distance=max_distance,
     )
-    plan.check()
+    plans = _plans(axes, gains or [], step or [], base, hold, limits, link is not None)
+    for plan in plans:
+        plan.check()
     check_pages()  # needed for the report; fail before anything flies
     if virtual_time and (host is not None or link is not None):
         raise ValueError("--virtual-time is for the emulator, others are in real time: take one")
     if elsewhere is not None:
-        _ask_for_consent(elsewhere, plan, consent)
+        _ask_for_consent(elsewhere, plans, consent)
     elif not as_json:
-        _print_plan(plan, f"an emulator ({plant})" if link is None else f"the vehicle at {link}")
+        _print_plan(plans, f"an emulator ({plant})" if link is None else f"the vehicle at {link}")
     where = _free_folder() if folder is None else folder
     if any(where.glob("flight-*.csv")):
         raise ValueError(f"{where} holds recordings already: name another --folder")
     ports = (navdata_port, command_port, control_port)
     try:
+        count = sum(plan.flights for plan in plans) + 2 * len(plans)
         with (
-            flown_vehicle(host, link, plant, seed, virtual_time, plan, ports, consent) as vehicle,
-            stages(plan.flights + 2, quiet=as_json) as begin,
+            flown_vehicle(
+                host, link, plant, seed, virtual_time, base, limits, ports, consent
+            ) as vehicle,
+            stages(count, quiet=as_json) as begin,
         ):
-            study = fly_experiment(vehicle.connect, plan, where, begin, vehicle.run, _print_note)
+            studies = fly_axes(vehicle.connect, plans, where, begin, vehicle.run, _print_note)
     except BaseException as error:
         for note in getattr(error, "__notes__", ()):
             _print_note(note)
@@ -147,18 +171,20 @@ def command(
     trip = vehicle.round_trip()
     result = {
         "flown_on": vehicle.name,
-        **study.to_dict(),
+        "axes": {study.axis.name: study.to_dict() for study in studies},
         "round_trip": trip,
         "report": page,
         "folder": where,
     }
     text = as_json_text("flight", result)
     (where / "result.json").write_text(text + "\n", encoding="utf-8")
-    write_flight_page(study, page, vehicle.name)
+    write_flight_page(studies, page, vehicle.name)
     if as_json:
         print_json("flight", result)
     else:
-        _print_study(study, page)
+        for study in studies:
+            _print_study(study)
+        print_text(f"\nRecordings and report are in {page.parent}: {page.name}")
         if trip is not None:
             print_text(f"The round trip of the link, by TIMESYNC, was {1e3 * trip:.1f} ms.")
 
@@ -167,11 +193,55 @@ def _print_note(sentence: str) -> None:
     print_text(f"deadtime: {sentence}", wrapped=False, on=ERRORS)
 
 
-def _numbers(gains: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in gains.split(",") if part.strip())
-    except ValueError:
-        raise ValueError(f"--gains {gains}: give numbers with commas between them") from None
+def _plans(
+    axes: str,
+    gains: list[str],
+    step: list[str],
+    base: float,
+    hold: float,
+    limits: Limits,
+    over_link: bool,
+) -> list[FlightPlan]:
+    """The plan of each axis."""
+    names = [name.strip() for name in axes.split(",") if name.strip()]
+    unknown = [name for name in names if name not in USUAL]
+    if unknown or not names or len(set(names)) < len(names):
+        raise ValueError(f"--axes {axes}: give some of {', '.join(USUAL)}, each once")
+    given_gains, given_steps = _by_axis("--gains", gains, names), _by_axis("--step", step, names)
+    plans = []
+    for name in names:
+        changes: dict[str, Any] = {"limits": limits, "hold": hold}
+        changes["checked_hold"] = min(hold, FlightPlan().checked_hold)
+        if name == "z":
+            changes["base"] = base
+            if over_link:
+                changes |= {"gains": LINK_GAINS}
+                changes |= {"prior_delay": LINK_PRIOR[0], "prior_gain": LINK_PRIOR[1]}
+        if name in given_gains:
+            changes["gains"] = given_gains[name]
+        if name in given_steps:
+            if len(given_steps[name]) != 1:
+                raise ValueError(f"--step of {name}: give one size")
+            changes["step"] = given_steps[name][0]
+        plans.append(FlightPlan.of_axis(cast(AxisName, name), **changes))
+    return plans
+
+
+def _by_axis(option: str, given: list[str], names: list[str]) -> dict[str, tuple[float, ...]]:
+    """Numbers of each axis, from texts such as ``x=0.5,0.8``; without a name they are of z."""
+    found: dict[str, tuple[float, ...]] = {}
+    for text in given:
+        name, _, numbers = text.rpartition("=")
+        name = name.strip() or "z"
+        if name not in names:
+            raise ValueError(f"{option} {text}: the axis {name} is not flown, see --axes")
+        if name in found:
+            raise ValueError(f"{option} {text}: {name} is given twice")
+        try:
+            found[name] = tuple(float(part) for part in numbers.split(",") if part.strip())
+        except ValueError:
+            raise ValueError(f"{option} {text}: give numbers with commas between them") from None
+    return found
 
 
 def _free_folder() -> Path:
@@ -182,18 +252,19 @@ def _free_folder() -> Path:
     return folder
 
 
-def _print_plan(plan: FlightPlan, vehicle: str) -> None:
+def _print_plan(plans: list[FlightPlan], vehicle: str) -> None:
     print_text(f"About to fly {vehicle}:", on=ERRORS)
-    for line in plan.lines():
+    axes = tuple(plan.axis for plan in plans)
+    for line in (*(plan.line() for plan in plans), *plans[0].limits.lines(axes)):
         print_text(f"  {line}", wrapped=False, on=ERRORS)
 
 
-def _ask_for_consent(host: str, plan: FlightPlan, consent: bool) -> None:
-    _print_plan(plan, f"a drone at {host}")
+def _ask_for_consent(host: str, plans: list[FlightPlan], consent: bool) -> None:
+    _print_plan(plans, f"a drone at {host}")
     if not consent:
         raise ValueError(
-            f"nothing was sent to {host}: a drone there would take off {plan.flights} times and "
-            "fly as said above. If nobody and nothing can be hurt by it, add --i-have-a-safe-area"
+            f"nothing was sent to {host}: a drone there would take off twice and fly as said "
+            "above. If nobody and nothing can be hurt by it, add --i-have-a-safe-area"
         )
 
 
@@ -203,8 +274,8 @@ def _print_kept_recordings(folder: Path) -> None:
         print_text(f"kept in {folder}: {', '.join(path.name for path in kept)}", on=ERRORS)
 
 
-def _print_study(study: FlightStudy, page: Path) -> None:
-    print_table(results_table(COLUMNS, study.rows(), "Flights", COLUMNS[:1]))
-    print_table(results_table(PARTS, study.parts(), "The delay", PARTS[:1]))
+def _print_study(study: FlightStudy) -> None:
+    axis = study.axis.name
+    print_table(results_table(COLUMNS, study.rows(), f"Flights on {axis}", COLUMNS[:1]))
+    print_table(results_table(PARTS, study.parts(), f"The delay on {axis}", PARTS[:1]))
     print_text(study.verdict(), "bold")
-    print_text(f"\nRecordings and report are in {page.parent}: {page.name}")

@@ -10,8 +10,7 @@ from statistics import median
 
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
-from deadtime.flights import FlightPlan, FlownSteps
-from deadtime.flights._fly import Connect
+from deadtime.flights._fly import Connect, Flown
 from deadtime.links import Limits, Vehicle
 from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
@@ -33,7 +32,7 @@ class FlownVehicle:
 
     connect: Connect
     name: str
-    run: Callable[..., list[FlownSteps]]
+    run: Callable[..., Flown]
     link_times: list[LinkTime] = field(default_factory=list)
 
     def round_trip(self) -> float | None:
@@ -48,29 +47,30 @@ def flown_vehicle(
     plant: PlantName,
     seed: int,
     virtual_time: bool,
-    plan: FlightPlan,
+    height: float,
+    limits: Limits,
     ports: Ports,
     consent: bool = False,
 ) -> Iterator[FlownVehicle]:
     name = f"an emulated AR.Drone 2.0 ({plant})"
     if virtual_time:
-        yield FlownVehicle(emulated_drone(plant, seed, plan.limits), name, run_virtual)
+        yield FlownVehicle(emulated_drone(plant, seed, limits), name, run_virtual)
     elif link is not None:
         with terminated_like_interrupted():
             times: list[LinkTime] = []
-            connect = over_mavlink(link, plan, times, simulated=not consent)
+            connect = over_mavlink(link, height, limits, times, simulated=not consent)
             yield FlownVehicle(connect, f"the vehicle at {link}", run_landing, times)
     elif host is not None:
         with terminated_like_interrupted():
-            yield FlownVehicle(lambda: _client(host, plan.limits, ports), host, run_landing)
+            yield FlownVehicle(lambda: _client(host, limits, ports), host, run_landing)
     else:
         with terminated_like_interrupted(), own_emulator(plant, seed) as own:
             here = EmulatorOptions().host
-            yield FlownVehicle(lambda: _client(here, plan.limits, own), name, run_landing)
+            yield FlownVehicle(lambda: _client(here, limits, own), name, run_landing)
 
 
 def over_mavlink(
-    link: str, plan: FlightPlan, times: list[LinkTime], simulated: bool = False
+    link: str, height: float, limits: Limits, times: list[LinkTime], simulated: bool = False
 ) -> Connect:
     """Connect to a vehicle, or to a `simulated` one only.
 
@@ -80,7 +80,7 @@ def over_mavlink(
     @asynccontextmanager
     async def connect() -> AsyncIterator[Vehicle]:
         async with MAVLinkVehicle(
-            link, plan.limits, take_off_height=plan.base, simulated=simulated
+            link, limits, take_off_height=height, simulated=simulated
         ) as vehicle:
             yield vehicle
             if vehicle.link_time is not None:

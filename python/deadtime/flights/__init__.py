@@ -1,8 +1,16 @@
 """The experiment with a vehicle: fly steps, estimate the delay, design gains, fly these."""
 
-from deadtime.flights._fly import FlightPlan, fly_experiment
-from deadtime.flights._learn import FlightStudy
+from deadtime.flights._fly import fly_axes, fly_experiment
 from deadtime.flights._page import write_flight_page
+from deadtime.flights._plan import FlightPlan
 from deadtime.flights._runs import FlownSteps
+from deadtime.flights._study import FlightStudy
 
-__all__ = ["FlightPlan", "FlightStudy", "FlownSteps", "fly_experiment", "write_flight_page"]
+__all__ = [
+    "FlightPlan",
+    "FlightStudy",
+    "FlownSteps",
+    "fly_axes",
+    "fly_experiment",
+    "write_flight_page",
+]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from deadtime._base.digits import stated
 from deadtime._base.drawing import new_figure
 from deadtime._base.page import page, write_page
-from deadtime.flights._learn import COLUMNS, FlightStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
+from deadtime.flights._study import COLUMNS, FlightStudy
 from deadtime.tuning._live import live_design
 
 if TYPE_CHECKING:
@@ -19,39 +20,69 @@ if TYPE_CHECKING:
 PARTS = ("what", "time", "95 % interval")
 
 
-def write_flight_page(study: FlightStudy, path: Path, vehicle: str) -> Path:
-    """Write the page to `path` and return it; `vehicle` is its name in words."""
-    return write_page(render(study, vehicle), path)
+def write_flight_page(
+    studies: FlightStudy | Sequence[FlightStudy], path: Path, vehicle: str
+) -> Path:
+    """Write the page to `path` and return it.
+
+    Parameters
+    ----------
+    studies : FlightStudy or sequence of FlightStudy
+        One for each axis.
+    path : Path
+        The file.
+    vehicle : str
+        Its name in words.
+    """
+    several = [studies] if isinstance(studies, FlightStudy) else list(studies)
+    return write_page(render(several, vehicle), path)
 
 
-def render(study: FlightStudy, vehicle: str) -> str:
+def render(studies: Sequence[FlightStudy], vehicle: str) -> str:
     """The page as text."""
-    designed = study.learned.designed
     return page(
         "flights/page.html",
         title=f"Steps flown by {vehicle}",
-        described=_described(study, vehicle),
-        verdict=study.verdict(),
+        described=_described(studies, vehicle),
+        verdict=" ".join(study.verdict() for study in studies),
+        axes=[_axis(study, len(studies) > 1) for study in studies],
         heads=COLUMNS,
-        rows=study.rows(),
         parts_heads=PARTS,
-        parts=study.parts(),
-        fitted=_fitted(study),
-        checked=_checked(study),
-        learned=_learned(study),
-        telemetry=_telemetry(study),
-        gains=designed.summary(),
-        explorer=live_design(designed),
     )
 
 
-def _described(study: FlightStudy, vehicle: str) -> str:
-    learned = study.learned
-    gains = ", ".join(f"{one.controller.gains['Kp']:g}" for one in learned.flights)
+def _axis(study: FlightStudy, several: bool) -> dict[str, Any]:
+    """What the page has of one axis."""
+    designed, axis = study.learned.designed, study.axis
+    return {
+        "name": axis.name,
+        "of": f" of {axis.name}, the {axis.output}" if several else "",
+        "output": axis.output,
+        "rows": study.rows(),
+        "parts": study.parts(),
+        "fitted": _fitted(study),
+        "checked": _checked(study),
+        "learned": _learned(study),
+        "telemetry": _telemetry(study),
+        "gains": designed.summary(),
+        "explorer": live_design(designed),
+    }
+
+
+def _described(studies: Sequence[FlightStudy], vehicle: str) -> str:
+    flown = []
+    for study in studies:
+        axis, plan = study.axis, study.plan
+        gains = ", ".join(f"{one.controller.gains['Kp']:g}" for one in study.learned.flights)
+        largest = plan.limits.largest(axis)
+        flown.append(
+            f"steps of the {axis.output} by {plan.step:g} {axis.unit} under P control with Kp = "
+            f"{gains}, commands limited to {largest:g} {axis.rate_unit}"
+        )
+    count = sum(len(study.flights) for study in studies)
     return (
-        f"{len(study.flights)} flights of {vehicle}: steps of {study.step:g} m under P control "
-        f"with Kp = {gains}, commands limited to {study.max_climb:g} m/s; then under the gains "
-        "that were designed from these."
+        f"{count} flights of {vehicle}: {'; '.join(flown)}; then under the gains that were "
+        "designed from these."
     )
 
 
@@ -64,15 +95,25 @@ def _checked(study: FlightStudy) -> Figure:
 def _fitted(study: FlightStudy) -> str:
     learned = study.learned
     fit = learned.fit
+    small = study.axis.thousandth
     words = (
-        f"The residuals of the fit of all flights together are {1e3 * fit.rms:.1f} mm (gain "
+        f"The residuals of the fit of all flights together are {1e3 * fit.rms:.1f} {small} (gain "
         f"{stated(fit.gain or 0.0, fit.stderr['gain'])}); "
         + (
-            "they are white noise."
+            "they are no more than noise of the sensor and of the air."
             if fit.adequate
-            else "they are not white, so the intervals are an indication only."
+            else "they are more than noise, so the intervals are an indication only."
         )
     )
+    if len(learned.tried) > 1:
+        words += f" Plants that were tried: {'; '.join(one.line(small) for one in learned.tried)}."
+    ages = [one.age for one in learned.flights]
+    if all(age is not None for age in ages):
+        mean = sum(age for age in ages if age is not None) / len(ages)
+        words += (
+            f" Outputs are taken at the times of the vehicle's clock; when a command was computed "
+            f"they were {1e3 * mean:.0f} ms old on average, which is part of the delay."
+        )
     if learned.split is None:
         words += f" The delay is not divided between link and vehicle: {learned.unsplit}."
     return words
@@ -89,9 +130,7 @@ def _learned(study: FlightStudy) -> Figure:
 def _telemetry(study: FlightStudy) -> Figure | None:
     """What the vehicle reported of a step, if the delay was divided by that."""
     flight = study.before
-    if study.learned.split is None or flight.telemetry is None:
-        return None
-    telemetry = read_telemetry(flight.telemetry, flight.recording)
+    telemetry = None if study.learned.split is None else read_telemetry(flight)
     if telemetry is None:
         return None
     figure, axes = new_figure(7.5, 4.2, rows=2)

@@ -24,12 +24,12 @@ def plot_learned(
 ) -> Sequence[Axes]:
     """Draw each of the first flights, with the fit to its commands."""
     for ax, flight, fitted in zip(axes, flights, fit.runs, strict=True):
-        shown, window = flight.recording, fitted.recording
+        shown, window = flight.measured, fitted.recording
         ax.step(shown.time, shown.reference, where="post", label="reference", **REFERENCE)
-        ax.plot(shown.time, shown.output, label="height", **DATA)
+        ax.plot(shown.time, shown.output, label=flight.axis.output, **DATA)
         explained = window.output - fitted.residuals
         ax.plot(window.time, explained, color=COLOURS[0], lw=1.6, label="fit to its commands")
-        ax.set(title=flight.name, ylabel="height / m")
+        ax.set(title=flight.name, ylabel=_output(flight))
         ax.title.set_fontsize("small")
     axes[0].legend(frameon=False, fontsize="small")
     axes[-1].set_xlabel("time / s")
@@ -39,7 +39,7 @@ def plot_learned(
 def plot_telemetry(
     axes: Sequence[Axes], telemetry: Telemetry, flight: FlownSteps
 ) -> Sequence[Axes]:
-    """Draw the command, the echoed setpoint and the climb around the first step."""
+    """Draw the command, the echoed setpoint and the speed around the first step."""
     upper, lower = axes
     at = flight.recording.steps()[0].time
     low, high = at - BEFORE, at + 2.0
@@ -62,11 +62,11 @@ def plot_telemetry(
         lw=1.6,
         label="echoed setpoint",
     )
-    upper.plot(time, telemetry.climb[came], color=COLOURS[0], lw=1.0, label="reported climb")
-    upper.set(ylabel="vertical speed / (m/s)")
+    upper.plot(time, telemetry.rate[came], color=COLOURS[0], lw=1.0, label="reported speed")
+    upper.set(ylabel=f"speed / ({flight.axis.rate_unit})")
     upper.legend(frameon=False, fontsize="small")
-    lower.plot(time, telemetry.height[came], color="0.35", lw=1.2)
-    lower.set(xlabel="time since the step / s", ylabel="height / m")
+    lower.plot(time, telemetry.output[came], color="0.35", lw=1.2)
+    lower.set(xlabel="time since the step / s", ylabel=_output(flight))
     return axes
 
 
@@ -82,8 +82,8 @@ def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> Sequenc
             if np.isfinite(flight.settling_time)
             else "not settled"
         )
-        height = flight.recording.output[rows]
-        upper.plot(time[rows], height, color=colour, lw=1.6, label=name)
+        output = flight.recording.output[rows]
+        upper.plot(time[rows], output, color=colour, lw=1.6, label=name)
         if flight.recording.command is not None:
             command = flight.recording.command[rows]
             lower.step(time[rows], command, where="post", color=colour, lw=1.1)
@@ -94,7 +94,12 @@ def plot_checked(axes: Sequence[Axes], flights: Sequence[FlownSteps]) -> Sequenc
         where="post",
         **REFERENCE,
     )
-    upper.set(ylabel="height / m")
+    upper.set(ylabel=_output(flights[0]))
     upper.legend(frameon=False, fontsize="small", loc="lower right")
-    lower.set(xlabel="time since the step / s", ylabel="command / (m/s)")
+    unit = flights[0].axis.rate_unit
+    lower.set(xlabel="time since the step / s", ylabel=f"command / ({unit})")
     return axes
+
+
+def _output(flight: FlownSteps) -> str:
+    return f"{flight.axis.output} / {flight.axis.unit}"

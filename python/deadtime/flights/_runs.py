@@ -11,14 +11,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime.flights._clock import MISFIT, VehicleClock
+from deadtime.links.axes import AXES, Axis
 from deadtime.loops import PV, P
 from deadtime.recordings import Recording, Step
 
 Array = NDArray[np.float64]
 
 #: Half width of the settling band of a flown step, as a share of the step, and its least width as a
-#: multiple of the noise of the height. The usual 2 % are close to that noise.
+#: multiple of the noise of the output. The usual 2 % are close to that noise.
 BAND, NOISES = 0.05, 3.0
+
+#: Share of left out samples above which a flight is called irregular: the loop was not the one that
+#: gains are designed for.
+MISSED = 0.03
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,7 @@ class StepMeasures:
     overshoot : float
         Percent of the step, as sampled.
     settling_time : float
-        Time until the height stays within 5 % of the step, or within three times its noise where
+        Time until the output stays within 5 % of the step, or within three times its noise where
         that is more, s; NaN if it does not before the end.
     """
 
@@ -71,30 +77,30 @@ class Telemetry:
     ----------
     time : ndarray, shape (n,)
         Arrival of each message since the first sample of the controller, s.
-    setpoint, climb, height : ndarray, shape (n,)
-        Vertical speed that the vehicle follows, its vertical speed (m/s), and height (m).
+    setpoint, rate, output : ndarray, shape (n,)
+        The rate that the vehicle follows, its rate, and the output.
     command_time, command : ndarray, shape (m,)
-        Time of each command, s, and its value, m/s.
+        Time of each command, s, and its value.
     """
 
     time: Array
     setpoint: Array
-    climb: Array
-    height: Array
+    rate: Array
+    output: Array
     command_time: Array
     command: Array
 
 
 @dataclass(frozen=True)
 class FlownSteps:
-    """One flight of altitude steps.
+    """One flight of steps on an axis.
 
     Attributes
     ----------
     controller : P or PV
         The controller of the flight.
     recording : Recording
-        Reference, height and command of each sample, read back from `path`.
+        Reference, output and command of each sample, read back from `path`.
     path : Path
         The file.
     telemetry : Path or None
@@ -103,6 +109,8 @@ class FlownSteps:
         Intended time between two samples, s.
     settle : float
         Time from the first sample to the first step, s.
+    axis : Axis
+        What was stepped.
     """
 
     controller: P | PV
@@ -111,6 +119,65 @@ class FlownSteps:
     telemetry: Path | None
     sample_time: float
     settle: float
+    axis: Axis = AXES["z"]
+
+    @cached_property
+    def clock(self) -> VehicleClock | None:
+        """The vehicle's clock, by its messages; None where they have no stamps or are too few."""
+        if self.telemetry is None:
+            return None
+        return VehicleClock.of(*read_columns(self.telemetry, ("time_s", "vehicle_time_s")))
+
+    @cached_property
+    def measured(self) -> Recording:
+        """The outputs at the times at which they were measured, and the commands when sent.
+
+        Times are those of the vehicle's clock plus the mean age of the rows (see `_clock`). Where
+        there is no such clock, it is `recording`.
+        """
+        clock, rows = self.clock, self.recording
+        if clock is None or rows.command is None:
+            return rows
+        time, stamp = read_columns(self.path, ("time_s", "vehicle_time_s"))
+        if time.size != len(rows):
+            return rows
+        seen = clock.time(stamp)
+        seen += np.mean(time - seen)
+        # A message that was the newest for several samples counts once.
+        kept = np.append(True, np.diff(seen) > 0.0) & (seen >= time[0])
+        return Recording(
+            seen[kept],
+            rows.reference[kept],
+            rows.output[kept],
+            units=dict(rows.units),
+            source=rows.source,
+            sent=(time, rows.command),
+        )
+
+    @property
+    def age(self) -> float | None:
+        """Mean age of the outputs, s: how much older than the newest possible message they were."""
+        if self.clock is None:
+            return None
+        time, stamp = read_columns(self.path, ("time_s", "vehicle_time_s"))
+        return float(np.mean(time - self.clock.time(stamp)))
+
+    @property
+    def irregular(self) -> str:
+        """Why the times of the flight are not to be relied on, or nothing."""
+        clock, timing = self.clock, self.timing
+        if clock is not None and clock.misfit > MISFIT:
+            return (
+                f"the vehicle's clock was {1e3 * clock.misfit:.0f} ms off a steady rate against "
+                "that of this computer: one of them stood still or ran slowly"
+            )
+        samples = len(self.recording) + timing.missed
+        if timing.missed > MISSED * samples:
+            return (
+                f"the control loop ran late and left out {timing.missed} of {samples} samples: this"
+                " computer was too busy"
+            )
+        return ""
 
     @property
     def name(self) -> str:
@@ -125,8 +192,8 @@ class FlownSteps:
         return [self._measures(step, end) for step, end in zip(steps, ends, strict=True)]
 
     def _measures(self, step: Step, end: int) -> StepMeasures:
-        height = self.recording.output[step.index : end]
-        beyond = (height - step.after) / step.amplitude
+        output = self.recording.output[step.index : end]
+        beyond = (output - step.after) / step.amplitude
         band = max(BAND, NOISES * self.noise / abs(step.amplitude))
         outside = np.flatnonzero(np.abs(beyond) > band)
         settling = 0.0
@@ -137,7 +204,7 @@ class FlownSteps:
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of the height's noise, m: without the motion.
+        """Standard deviation of the output's noise: without the motion.
 
         From its second differences, to which motion adds little but around steps, by their median.
         """
@@ -178,33 +245,32 @@ def named(controller: P | PV) -> str:
     return f"{type(controller).__name__}, {gains}"
 
 
-def read_telemetry(path: Path, recording: Recording) -> Telemetry | None:
-    """Every message of a flight, or None where the vehicle does not report setpoint and climb.
-
-    Parameters
-    ----------
-    path : Path
-        The saved messages.
-    recording : Recording
-        The recording of the same flight, which holds the commands.
-    """
-    names = ("time_s", "climb_setpoint_m_s", "climb_m_s", "height_m")
+def read_columns(path: Path, names: Sequence[str]) -> Array:
+    """Columns of a saved file, shape (len(names), n), of the rows that have all of them."""
     with path.open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    cells = [[row[name] for name in names] for row in rows]
+        cells = [[row.get(name) for name in names] for row in csv.DictReader(stream)]
     whole = [row for row in cells if all(row)]
-    if len(whole) < 8 or recording.command is None:
+    return np.array(whole, dtype=np.float64).reshape(-1, len(names)).T
+
+
+def read_telemetry(flight: FlownSteps) -> Telemetry | None:
+    """Every message of a flight, or None where the vehicle does not report setpoint and rate."""
+    recording = flight.recording
+    if flight.telemetry is None or recording.command is None:
         return None
-    columns = np.array(whole, dtype=np.float64).T
+    output, rate, setpoint = flight.axis.columns
+    columns = read_columns(flight.telemetry, ("time_s", setpoint, rate, output))
+    if columns.shape[1] < 8:
+        return None
     return telemetry_of(columns, recording.time, recording.command)
 
 
 def telemetry_of(
     columns: Sequence[Array] | Array, command_time: Array, command: Array
 ) -> Telemetry:
-    """Columns of time, setpoint, climb and height without messages of the same instant."""
-    time, setpoint, climb, height = columns
+    """Columns of time, setpoint, rate and output without messages of the same instant."""
+    time, setpoint, rate, output = columns
     later = np.append(np.diff(time) > 0.0, True)
     return Telemetry(
-        time[later], setpoint[later], climb[later], height[later], command_time, command
+        time[later], setpoint[later], rate[later], output[later], command_time, command
     )

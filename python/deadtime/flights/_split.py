@@ -115,10 +115,10 @@ def _followed(flight: Telemetry) -> Recording:
 
 
 def _climbed(flight: Telemetry) -> Recording:
-    """Setpoint and climb at the used messages."""
+    """Setpoint and rate at the used messages."""
     rows = _kept(flight)
     setpoint = flight.setpoint[rows]
-    return Recording(flight.time[rows], setpoint, flight.climb[rows], setpoint, source="vehicle")
+    return Recording(flight.time[rows], setpoint, flight.rate[rows], setpoint, source="vehicle")
 
 
 def _kept(flight: Telemetry) -> NDArray[np.bool_]:

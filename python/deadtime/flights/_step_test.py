@@ -1,4 +1,4 @@
-"""Altitude steps with a vehicle in the air: one command and one saved row for each sample."""
+"""Steps of one axis with a vehicle in the air: one command and one saved row for each sample."""
 
 from __future__ import annotations
 
@@ -10,41 +10,48 @@ from dataclasses import dataclass, replace
 
 from deadtime._base.errors import FlightAbortedError, LinkError
 from deadtime._base.validation import finite, positive
-from deadtime.flights._height_control import HeightControl
+from deadtime.flights._axis_control import AxisControl
+from deadtime.links.axes import AXES, Axis, AxisReader
 from deadtime.links.clock import now
 from deadtime.links.journal import Journal
 from deadtime.links.safety import Limits, Watch, largest_gain
-from deadtime.links.vehicle import Vehicle
+from deadtime.links.vehicle import Vehicle, VehicleState
 
-#: Columns of a recording.
-ROW = (
-    "time_s",
-    "reference_m",
-    "height_m",
-    "command_m_s",
-    "climb_m_s",
-    "climb_setpoint_m_s",
-    "vehicle_time_s",
-    "sequence",
-    "age_s",
-    "roll_rad",
-    "pitch_rad",
-    "battery_percent",
-)
+HEIGHT = AXES["z"]
+
+
+def row_columns(axis: Axis) -> tuple[str, ...]:
+    """Columns of a recording of an axis."""
+    output, rate, setpoint = axis.columns
+    return (
+        "time_s",
+        f"reference_{axis.unit}",
+        output,
+        f"command_{axis.unit}_s",
+        rate,
+        setpoint,
+        "vehicle_time_s",
+        "sequence",
+        "age_s",
+        "roll_rad",
+        "pitch_rad",
+        "battery_percent",
+    )
+
 
 #: The error of a stable loop does not exceed the step: a flight ends where the error exceeds the
-#: step times this factor, plus this margin for disturbances, m.
+#: step times this factor, plus this margin for disturbances, m or rad.
 GROWTH, MARGIN = 1.5, 0.1
 
 
 @dataclass(frozen=True)
 class StepProgramme:
-    """A sequence of heights, each held for a time.
+    """A sequence of references, each held for a time.
 
     Attributes
     ----------
-    heights : tuple of float
-        The reference heights, m.
+    references : tuple of float
+        m or rad.
     holds : tuple of float
         Time for which each is held, s.
     sample_time : float
@@ -57,19 +64,19 @@ class StepProgramme:
     (277, 1.25, 0.25)
     """
 
-    heights: tuple[float, ...]
+    references: tuple[float, ...]
     holds: tuple[float, ...]
     sample_time: float = 0.065
 
     def __post_init__(self) -> None:
         positive("sample_time", self.sample_time)
-        if len(self.heights) != len(self.holds) or not self.heights:
+        if len(self.references) != len(self.holds) or not self.references:
             raise ValueError(
-                f"{len(self.heights)} heights and {len(self.holds)} holds: give one hold for each "
-                "height"
+                f"{len(self.references)} references and {len(self.holds)} holds: give one hold "
+                "for each reference"
             )
-        for height, hold in zip(self.heights, self.holds, strict=True):
-            finite("heights", height)
+        for reference, hold in zip(self.references, self.holds, strict=True):
+            finite("references", reference)
             positive("holds", hold)
 
     @property
@@ -84,45 +91,50 @@ class StepProgramme:
 
     @property
     def largest_step(self) -> float:
-        """Largest change of the reference, m."""
-        return max((abs(b - a) for a, b in itertools.pairwise(self.heights)), default=0.0)
+        """Largest change of the reference."""
+        return max((abs(b - a) for a, b in itertools.pairwise(self.references)), default=0.0)
 
     def reference(self, time: float) -> float:
-        """The reference at a time after the beginning, m."""
+        """The reference at a time after the beginning."""
         until = 0.0
-        for height, hold in zip(self.heights, self.holds, strict=True):
+        for reference, hold in zip(self.references, self.holds, strict=True):
             until += hold
             if time < until - 1e-9:
-                return height
-        return self.heights[-1]
+                return reference
+        return self.references[-1]
 
-    def check(self, limits: Limits) -> None:
+    def check(self, limits: Limits, axis: Axis = HEIGHT) -> None:
         """Refuse a sequence that would exceed the limits.
 
         Raises
         ------
         ValueError
-            If a height is outside the limits, or would be with an overshoot of a whole step; if
+            If a reference is outside the limits, or would be with an overshoot of a whole step; if
             a step alone exceeds the largest error; or if a command would be too old before the
             next one.
         """
-        if self.largest_step + MARGIN > limits.max_error:
+        most, unit, step = limits.error_of(axis), axis.unit, self.largest_step
+        if step + MARGIN > most:
             raise ValueError(
-                f"a step of {self.largest_step:g} m exceeds the error that ends a flight, "
-                f"{limits.max_error:g} m: fly steps of {limits.max_error - MARGIN:g} m or less"
+                f"a step of {step:g} {unit} exceeds the error that ends a flight, {most:g} {unit}: "
+                f"fly steps of {most - MARGIN:g} {unit} or less"
             )
         if self.sample_time >= limits.command_age:
             raise ValueError(
                 f"sample_time={self.sample_time:g} s is not below the {limits.command_age:g} s "
                 "for which a command is valid: use a shorter sample time"
             )
-        for height in self.heights:
-            for end in (height - self.largest_step, height + self.largest_step):
-                if not limits.min_height <= end <= limits.max_height:
+        if axis.wraps:
+            return
+        low, high = limits.min_height, limits.max_height
+        if not axis.absolute:
+            low, high = -limits.max_distance, limits.max_distance
+        for reference in self.references:
+            for end in (reference - step, reference + step):
+                if not low <= end <= high:
                     raise ValueError(
-                        f"a reference of {height:g} m with steps of {self.largest_step:g} m may "
-                        f"come to {end:g} m, outside {limits.min_height:g} to "
-                        f"{limits.max_height:g} m: fly smaller steps, or elsewhere"
+                        f"a reference of {reference:g} m with steps of {step:g} m may come to "
+                        f"{end:g} m, outside {low:g} to {high:g} m: fly smaller steps, or elsewhere"
                     )
 
 
@@ -151,48 +163,60 @@ def check_gain(Kp: float, delay: float, gain: float) -> None:
 
 async def fly_steps(
     vehicle: Vehicle,
-    control: HeightControl,
+    axis: Axis,
+    control: AxisControl,
     programme: StepProgramme,
     limits: Limits,
     journal: Journal,
     begin: float | None = None,
+    origin: VehicleState | None = None,
 ) -> None:
     """Fly a programme with a vehicle that is in the air; it hovers afterwards.
+
+    The other axes are commanded to rest: the vehicle holds them.
 
     Parameters
     ----------
     vehicle : Vehicle
         A vehicle in the air.
-    control : HeightControl
+    axis : Axis
+        What is stepped.
+    control : AxisControl
         Computes the commands; its sample time is that of the programme.
     programme : StepProgramme
-        The reference heights.
+        The references.
     limits : Limits
-        Limits of the flight; the error is limited further, to 1.5 times the step plus 0.1 m.
+        Limits of the flight; the error is limited further, to 1.5 times the step plus 0.1 m or rad.
     journal : Journal
-        Receives a row of `ROW` for each sample.
+        Receives a row of `row_columns` for each sample.
     begin : float, optional
         Time of the first sample, s of `deadtime.links.now`; now if not given.
+    origin : VehicleState, optional
+        From which references and distances count, where the axis is not absolute; the first state
+        if not given.
 
     Raises
     ------
     FlightAbortedError
         If a limit is exceeded; the vehicle hovers, and the caller has to land it.
     LinkError
-        If the link is lost.
+        If the link is lost, or the vehicle does not report the axis.
     """
     begin = now() if begin is None else begin
     first = await vehicle.state()
-    base = programme.heights[0]
-    distance = abs(first.height - base)
-    if distance + MARGIN > limits.max_error:
+    origin = first if origin is None else origin
+    reader, watched = AxisReader(axis, origin), AxisReader(axis, origin)
+    base, value = programme.references[0], reader.output(first)
+    distance, most = abs(value - base), limits.error_of(axis)
+    if distance + MARGIN > most:
         raise FlightAbortedError(
-            f"the vehicle hovers at {first.height:.2f} m: the distance to the first "
-            f"reference, {base:g} m, exceeds the error that ends a flight, {limits.max_error:g} m: "
-            "begin closer to it"
+            f"the vehicle hovers at {value:.2f} {axis.unit}: the distance to the first "
+            f"reference, {base:g} {axis.unit}, exceeds the error that ends a flight, {most:g} "
+            f"{axis.unit}: begin closer to it"
         )
-    largest = max(programme.largest_step, distance)
-    watch = Watch(replace(limits, max_error=min(limits.max_error, GROWTH * largest + MARGIN)))
+    error = min(most, GROWTH * max(programme.largest_step, distance) + MARGIN)
+    stricter = replace(limits, max_error=error, max_heading_error=error)
+    watch = Watch(stricter, watched, origin)
     sample = 0
     try:
         while sample < programme.samples:
@@ -205,15 +229,17 @@ async def fly_steps(
             time = now()
             reference = programme.reference(sample * programme.sample_time)
             watch.check(state, time, reference)
-            command = vehicle.command(control.command(reference, state.height, state.climb))
+            output, rate = reader.output(state), reader.rate(state)
+            motion = axis.motion(control.command(reference, output, rate))
+            command = getattr(vehicle.command_velocity(*motion), axis.command)
             journal.write(
                 (
                     time - begin,
                     reference,
-                    state.height,
+                    output,
                     command,
-                    state.climb,
-                    state.climb_setpoint,
+                    rate,
+                    reader.setpoint(state),
                     state.vehicle_time,
                     state.sequence,
                     time - state.time,

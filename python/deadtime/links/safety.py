@@ -14,6 +14,7 @@ from typing import Self, SupportsFloat
 
 from deadtime._base.errors import FlightAbortedError
 from deadtime._base.validation import finite, positive
+from deadtime.links.axes import AXES, Axis, AxisReader
 from deadtime.links.vehicle import VehicleState
 
 
@@ -74,6 +75,11 @@ class Limits:
         Charge below which a flight is aborted, percent.
     max_error : float
         Distance from the reference beyond which a flight is aborted, m.
+    max_heading_error : float
+        The same of a heading, rad.
+    max_distance : float
+        Horizontal distance from where the vehicle took off beyond which a flight is aborted, m,
+        where it reports its position.
     max_jump : float
         Largest plausible rate of change of the measured height, m/s.
     max_state_age : float
@@ -97,6 +103,8 @@ class Limits:
     max_angle: float = math.radians(15.0)
     min_battery: float = 20.0
     max_error: float = 1.0
+    max_heading_error: float = 1.0
+    max_distance: float = 5.0
     max_jump: float = 5.0
     max_state_age: float = 0.3
     max_still: float = 1.0
@@ -117,12 +125,30 @@ class Limits:
                 "a vehicle has to hover before it lands"
             )
 
-    def lines(self) -> list[str]:
-        """The limits in words, one for each line, to be shown before a flight."""
+    def largest(self, axis: Axis) -> float:
+        """Largest commanded rate of an axis."""
+        horizontal = {"north": self.max_speed, "east": self.max_speed}
+        return {"up": self.max_climb, "turn": self.max_yaw_rate, **horizontal}[axis.command]
+
+    def error_of(self, axis: Axis) -> float:
+        """Distance of an axis from its reference beyond which a flight is aborted."""
+        return self.max_heading_error if axis.wraps else self.max_error
+
+    def lines(self, axes: tuple[str, ...] = ("z",)) -> list[str]:
+        """The limits in words, one for each line, to be shown before a flight on some axes."""
+        commanded = [AXES[name] for name in axes]
+        moves = {"up": "climbs and sinks", "turn": "turns", "north": "flies", "east": "flies"}
+        rates = {
+            f"{moves[one.command]} at no more than {self.largest(one):g} {one.rate_unit}": None
+            for one in commanded
+        }
+        errors = {f"{self.error_of(one):g} {one.unit}": None for one in commanded}
+        far = f"{' and '.join(errors)} from the reference"
+        if axes != ("z",):
+            far += f", and {self.max_distance:g} m from where it took off"
         return [
-            f"climbs and sinks at no more than {self.max_climb:g} m/s",
-            f"stays between {self.min_height:g} and {self.max_height:g} m, no more than "
-            f"{self.max_error:g} m from the reference",
+            ", ".join(rates),
+            f"stays between {self.min_height:g} and {self.max_height:g} m, no more than {far}",
             f"aborts beyond {math.degrees(self.max_angle):g} degrees of roll or pitch, below "
             f"{self.min_battery:g} % of battery, after {self.max_state_age:g} s without a message",
             f"hovers {self.command_age:g} s after the last command, lands after "
@@ -170,7 +196,7 @@ def jumps(before: float, height: float, passed: float, max_jump: float) -> bool:
     return not abs(height - before) <= max_jump * passed + BUMP
 
 
-#: Distance from the reference, m, beyond which a constant height is suspicious.
+#: Distance from the reference, m or rad, beyond which a constant output is suspicious.
 AWAY = 0.05
 
 
@@ -180,6 +206,10 @@ class Watch:
     Parameters
     ----------
     limits : Limits
+    reader : AxisReader, optional
+        Reads the axis that follows the reference; without it that is the height.
+    origin : VehicleState, optional
+        The state from which the horizontal distance counts; without it that is not checked.
 
     Examples
     --------
@@ -190,9 +220,17 @@ class Watch:
     deadtime._base.errors.FlightAbortedError: the battery is at 9 %, below 20 %
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        reader: AxisReader | None = None,
+        origin: VehicleState | None = None,
+    ) -> None:
         self.limits = limits
+        self._reader, self._origin = reader, origin
+        self._axis = AXES["z"] if reader is None else reader.axis
         self._last: VehicleState | None = None
+        self._value = math.nan
         self._moved = -math.inf
         self._least_difference = math.inf
 
@@ -206,24 +244,26 @@ class Watch:
         now : float
             `deadtime.links.now`, s.
         reference : float, optional
-            Reference of the height, m; without it the error is not checked.
+            Reference of the axis; without it the error is not checked.
 
         Raises
         ------
         FlightAbortedError
             If a rule is broken.
+        LinkError
+            If the vehicle does not report the axis.
         """
-        if self._last is None or state.height != self._last.height or not self._away(reference):
+        value = state.height if self._reader is None else self._reader.output(state)
+        if self._last is None or value != self._value or not self._away(reference):
             self._moved = now
-        broken = self._broken(state, now, reference)
-        self._last = state
+        broken = self._broken(state, value, now, reference)
+        self._last, self._value = state, value
         if broken is not None:
             raise FlightAbortedError(broken)
 
     def _away(self, reference: float | None) -> bool:
-        """Whether the height was away from the reference."""
-        last = self._last
-        return last is not None and reference is not None and abs(last.height - reference) > AWAY
+        """Whether the output was away from the reference."""
+        return reference is not None and abs(self._value - reference) > AWAY
 
     def _lateness(self, state: VehicleState) -> float:
         """Delay of a message relative to the fastest one, by the clock of the vehicle, s."""
@@ -233,8 +273,10 @@ class Watch:
         self._least_difference = min(self._least_difference, difference)
         return difference - self._least_difference
 
-    def _broken(self, state: VehicleState, now: float, reference: float | None) -> str | None:
-        limits = self.limits
+    def _broken(
+        self, state: VehicleState, value: float, now: float, reference: float | None
+    ) -> str | None:
+        limits, axis = self.limits, self._axis
         if state.emergency:
             return "the vehicle reports an emergency"
         age = now - state.time + self._lateness(state)
@@ -257,17 +299,32 @@ class Watch:
                 f"the height is {state.height:.2f} m, outside {limits.min_height:g} to "
                 f"{limits.max_height:g} m"
             )
-        if reference is not None and not abs(state.height - reference) <= limits.max_error:
+        most = limits.error_of(axis)
+        if reference is not None and not abs(value - reference) <= most:
             return (
-                f"the height is {state.height:.2f} m and the reference {reference:.2f} m, more "
-                f"than {limits.max_error:g} m apart"
+                f"the {axis.output} is {value:.2f} {axis.unit} and the reference {reference:.2f} "
+                f"{axis.unit}, more than {most:g} {axis.unit} apart"
+            )
+        if not self._distance(state) <= limits.max_distance:
+            return (
+                f"the vehicle is {self._distance(state):.2f} m from where it took off, more than "
+                f"{limits.max_distance:g} m"
             )
         if now - self._moved > limits.max_still:
             return (
-                f"the height has read {state.height:.3f} m for {now - self._moved:.1f} s although "
-                "it is not at the reference"
+                f"the {axis.output} has read {value:.3f} {axis.unit} for {now - self._moved:.1f} s "
+                "although it is not at the reference"
             )
         return self._broken_since(state)
+
+    def _distance(self, state: VehicleState) -> float:
+        """Horizontal distance from the origin, m; 0 where it is not known."""
+        origin = self._origin
+        if origin is None or origin.north is None or origin.east is None:
+            return 0.0
+        if state.north is None or state.east is None:
+            return math.nan
+        return math.hypot(state.north - origin.north, state.east - origin.east)
 
     def _broken_since(self, state: VehicleState) -> str | None:
         """What is wrong with a state only in the light of the one before."""

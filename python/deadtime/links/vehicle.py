@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
+
+
+class Motion(NamedTuple):
+    """Speeds in m/s, and a rate of turn in rad/s, clockwise positive; None holds the heading."""
+
+    north: float = 0.0
+    east: float = 0.0
+    up: float = 0.0
+    turn: float | None = None
 
 
 @dataclass(frozen=True)
@@ -40,6 +49,8 @@ class VehicleState:
         Heading, rad, clockwise from north.
     yaw_rate : float, optional
         rad/s, clockwise positive.
+    north_setpoint, east_setpoint : float, optional
+        The horizontal speeds that the vehicle follows, m/s.
     battery : float, optional
         Charge left, percent.
     emergency : bool
@@ -70,14 +81,20 @@ class VehicleState:
     east_speed: float | None = None
     yaw: float | None = None
     yaw_rate: float | None = None
+    north_setpoint: float | None = None
+    east_setpoint: float | None = None
 
 
 class Vehicle(Protocol):
-    """A vehicle whose climb can be commanded.
+    """A vehicle whose speeds can be commanded, or some of them.
 
     As an asynchronous context manager it connects on entry, and lands and closes on exit, also by
     an exception. Connecting never takes off.
     """
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes that can be commanded, of ``z``, ``x``, ``y`` and ``yaw``."""
 
     async def connect(self) -> None:
         """Open the link and set the limits of the vehicle.
@@ -109,6 +126,17 @@ class Vehicle(Protocol):
         ------
         ValueError
             If `climb` is not finite.
+        """
+
+    def command_velocity(
+        self, north: float = 0.0, east: float = 0.0, up: float = 0.0, turn: float | None = None
+    ) -> Motion:
+        """Command a motion as `command` does a climb; return the one that was sent after limits.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite, or is not zero for an axis that the vehicle does not have.
         """
 
     def hover(self) -> None:

@@ -24,7 +24,7 @@ from deadtime.links.ardrone2.reader import (
 from deadtime.links.clock import now
 from deadtime.links.safety import Limits, UnitCommand
 from deadtime.links.uninterrupted import note, uninterrupted
-from deadtime.links.vehicle import VehicleState
+from deadtime.links.vehicle import Motion, VehicleState
 
 #: Longest wait for the first navdata, and for the end of bootstrap, s.
 FIRST_NAVDATA = 5.0
@@ -120,6 +120,11 @@ class ARDrone2:
     def statistics(self) -> LinkStatistics:
         """Statistics of the navdata since the last connection."""
         return self._reader.statistics
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The height: to the sides it is commanded angles, not speeds."""
+        return ("z",)
 
     @property
     def vz_max(self) -> float:
@@ -297,6 +302,25 @@ class ARDrone2:
         sent = self._sender.climb(share, now())
         self._link.send()
         return float(sent) * self.vz_max
+
+    def command_velocity(
+        self, north: float = 0.0, east: float = 0.0, up: float = 0.0, turn: float | None = None
+    ) -> Motion:
+        """Command a vertical speed, as `command` does: the drone has no other axis.
+
+        Raises
+        ------
+        ValueError
+            If a number but `up` is not zero.
+        LinkError
+            As `command`.
+        """
+        if north or east or turn:
+            raise ValueError(
+                "an AR.Drone 2.0 follows commanded climbs only: to the sides it is commanded "
+                "angles, not speeds"
+            )
+        return Motion(up=self.command(up))
 
     def hover(self) -> None:
         """Command no motion; like a command this is valid for a short time, then the drone lands.

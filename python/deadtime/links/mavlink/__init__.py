@@ -2,7 +2,6 @@
 
 from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.client import MAVLinkVehicle
-from deadtime.links.mavlink.set_points import Motion
 from deadtime.links.mavlink.time_sync import LinkTime
 
-__all__ = ["LinkAddress", "LinkTime", "MAVLinkVehicle", "Motion"]
+__all__ = ["LinkAddress", "LinkTime", "MAVLinkVehicle"]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
 
 from deadtime._base.errors import LinkError
 from deadtime.links.mavlink.codec import dialect
@@ -37,6 +38,13 @@ PX4_MODES = _numbered(1, "MANUAL ALTCTL POSCTL AUTO ACRO OFFBOARD STABILIZED RAT
 PX4_AUTO_MODES = _numbered(1, "READY TAKEOFF LOITER MISSION RTL LAND")
 
 
+class Scaled(NamedTuple):
+    """A parameter, and the factor from it to SI units."""
+
+    name: str
+    factor: float
+
+
 class Autopilot(ABC):
     """Conventions of one firmware.
 
@@ -56,6 +64,8 @@ class Autopilot(ABC):
         Message with the flags of its position estimate.
     simulated : str or None
         A parameter that its simulator has and vehicles have not.
+    shaping : mapping of str to (Scaled, Scaled or None)
+        The parameters that limit the change of a commanded rate, and the change of that, by axis.
     """
 
     name: ClassVar[str]
@@ -66,6 +76,7 @@ class Autopilot(ABC):
     integers_as_bits: ClassVar[bool]
     estimator: ClassVar[str]
     simulated: ClassVar[str | None] = None
+    shaping: ClassVar[Mapping[str, tuple[Scaled, Scaled | None]]] = {}
 
     @abstractmethod
     def mode(self, custom: int) -> tuple[float, ...]:
@@ -99,6 +110,11 @@ class ArduPilot(Autopilot):
     integers_as_bits = False
     estimator = "EKF_STATUS_REPORT"
     simulated = "SIM_SPEEDUP"
+    shaping: ClassVar[Mapping[str, tuple[Scaled, Scaled | None]]] = {
+        "z": (Scaled("WPNAV_ACCEL_Z", 0.01), Scaled("PSC_JERK_Z", 1.0)),
+        **{axis: (Scaled("WPNAV_ACCEL", 0.01), Scaled("PSC_JERK_XY", 1.0)) for axis in ("x", "y")},
+        "yaw": (Scaled("ATC_ACCEL_Y_MAX", math.radians(0.01)), None),
+    }
 
     def mode(self, custom: int) -> tuple[float, ...]:
         """As in `Autopilot`."""

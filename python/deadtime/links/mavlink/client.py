@@ -1,4 +1,4 @@
-"""A vehicle over MAVLink whose climb can be commanded."""
+"""A vehicle over MAVLink whose speeds can be commanded."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from deadtime._base.errors import FlightAbortedError, LinkError
 from deadtime._base.validation import positive
+from deadtime.links.axes import AXES
 from deadtime.links.clock import now
 from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.authority import Authority
@@ -18,13 +19,13 @@ from deadtime.links.mavlink.codec import dialect
 from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
-from deadtime.links.mavlink.set_points import CYCLE, HOVER, Motion, SetPoints
+from deadtime.links.mavlink.set_points import CYCLE, HOVER, SetPoints, within
 from deadtime.links.mavlink.states import ON_GROUND, StateReader
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_for_messages
 from deadtime.links.mavlink.time_sync import LinkTime
 from deadtime.links.safety import Limits
 from deadtime.links.uninterrupted import note, uninterrupted
-from deadtime.links.vehicle import VehicleState
+from deadtime.links.vehicle import Motion, VehicleState
 
 #: Longest wait for the first heartbeat, s.
 FIRST_HEARTBEAT = 10.0
@@ -123,6 +124,11 @@ commanding it
         self._set_points = SetPoints(self.limits)
         self._authority = Authority(str(self.address))
         self._landing_sent = -math.inf
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """All of them."""
+        return tuple(AXES)
 
     @property
     def link_time(self) -> LinkTime | None:
@@ -250,6 +256,33 @@ commanding it
         """
         await self._held.set(name, value)
 
+    async def shaping(self, axis: str) -> tuple[float, float | None] | None:
+        """Within which limits the vehicle lets a commanded rate change, by its parameters.
+
+        Parameters
+        ----------
+        axis : str
+            One of `axes`.
+
+        Returns
+        -------
+        (float, float or None) or None
+            Largest rate of change, 1/s² times the unit of the axis, and largest rate of that,
+            where it has one; None where the vehicle does not tell.
+
+        Raises
+        ------
+        LinkError
+            If it is not connected.
+        """
+        found: list[float | None] = []
+        for parameter in self._known.shaping.get(axis, ()):
+            value = None if parameter is None else await self._held.read(parameter.name)
+            found.append(None if not value or parameter is None else parameter.factor * value)
+        if not found or found[0] is None:
+            return None
+        return found[0], found[1]
+
     @property
     def _held(self) -> Parameters:
         if self._parameters is None:
@@ -371,7 +404,7 @@ commanding it
         LinkError
             As `command`.
         """
-        motion = Motion(north, east, up, turn).within(self.limits)
+        motion = within(Motion(north, east, up, turn), self.limits)
         if self._set_points.expired is None and not self._set_points.guarded:
             raise LinkError(f"{self.address} is not in the air: take off before commanding it")
         self._check_flight()

@@ -8,11 +8,12 @@ a time-out of its own beside this, for the case that this program ends or stands
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from deadtime._base.validation import finite
 from deadtime.links.mavlink.codec import dialect
 from deadtime.links.safety import Limits
+from deadtime.links.vehicle import Motion
 
 #: Time between two checks of its age, and between two set points where no new one comes, s.
 CYCLE, REPEAT = 0.05, 0.1
@@ -25,29 +26,21 @@ VELOCITY_ONLY, NO_TURN = 0x05C7, 0x0800
 LOCAL_NED = 1
 
 
-class Motion(NamedTuple):
-    """Speeds in m/s, and a rate of turn in rad/s, clockwise positive; None holds the heading."""
+def within(motion: Motion, limits: Limits) -> Motion:
+    """The nearest motion that the limits allow; the direction on the ground is kept.
 
-    north: float = 0.0
-    east: float = 0.0
-    up: float = 0.0
-    turn: float | None = None
-
-    def within(self, limits: Limits) -> Motion:
-        """The nearest motion that the limits allow; the direction on the ground is kept.
-
-        Raises
-        ------
-        ValueError
-            If a number is not finite.
-        """
-        for name, value in self._asdict().items():
-            if value is not None:
-                finite(name, value)
-        share = min(1.0, limits.max_speed / max(math.hypot(self.north, self.east), 1e-300))
-        turn = None if self.turn is None else _bounded(self.turn, limits.max_yaw_rate)
-        up = _bounded(self.up, limits.max_climb)
-        return Motion(share * self.north, share * self.east, up, turn)
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    for name, value in motion._asdict().items():
+        if value is not None:
+            finite(name, value)
+    share = min(1.0, limits.max_speed / max(math.hypot(motion.north, motion.east), 1e-300))
+    turn = None if motion.turn is None else _bounded(motion.turn, limits.max_yaw_rate)
+    up = _bounded(motion.up, limits.max_climb)
+    return Motion(share * motion.north, share * motion.east, up, turn)
 
 
 def _bounded(value: float, most: float) -> float:

@@ -18,6 +18,9 @@ ESTIMATED, CONSTANT = 16 | 32, 128
 #: Time over which lost frames are looked at, s.
 RECENT = 1.0
 
+#: Longest time over which a heading is continued by its rate, s.
+OLDEST = 0.1
+
 #: Flags of MAV_MODE_FLAG and values of MAV_STATE.
 ARMED, CRITICAL, EMERGENCY, TERMINATED = 128, 5, 6, 8
 
@@ -51,7 +54,7 @@ class StateReader:
         self._status = 0
         self._battery: float | None = None
         self._attitude: Any = None
-        self._setpoint: float | None = None
+        self._setpoint: dict[str, float | None] = {}
         self._frames = 0
         self._sequence: int | None = None
         self._gaps: deque[tuple[float, int]] = deque()
@@ -71,7 +74,11 @@ class StateReader:
             left = int(message.battery_remaining)
             self._battery = None if left < 0 else float(left)
         elif kind == "POSITION_TARGET_LOCAL_NED":
-            self._setpoint = _finite(-message.vz)
+            self._setpoint = {
+                "climb_setpoint": _finite(-message.vz),
+                "north_setpoint": _finite(message.vx),
+                "east_setpoint": _finite(message.vy),
+            }
         elif kind == self.estimator:
             flags = int(message.flags)
             self.ready = flags & ESTIMATED == ESTIMATED and not flags & CONSTANT
@@ -110,15 +117,15 @@ class StateReader:
             sequence=self._frames,
             vehicle_time=stamp,
             climb=-float(message.vz),
-            climb_setpoint=self._setpoint,
             roll=0.0 if turned is None else float(turned.roll),
             pitch=0.0 if turned is None else float(turned.pitch),
-            yaw=None if turned is None else float(turned.yaw),
+            yaw=None if turned is None else _heading(turned, stamp),
             yaw_rate=None if turned is None else float(turned.yawspeed),
             north=float(message.x),
             east=float(message.y),
             north_speed=float(message.vx),
             east_speed=float(message.vy),
+            **self._setpoint,
             battery=self._battery,
             emergency=self._emergency,
             fault="a failsafe of its own is active" if self._status == CRITICAL else None,
@@ -132,6 +139,13 @@ class StateReader:
         return off or self._status in (EMERGENCY, TERMINATED)
 
 
+def _heading(attitude: Any, stamp: float) -> float:
+    """The heading at a time of the vehicle, s, by its rate: the attitude is up to a period old."""
+    passed = stamp - 1e-3 * attitude.time_boot_ms
+    turned = float(attitude.yaw) + float(attitude.yawspeed) * min(max(passed, 0.0), OLDEST)
+    return math.remainder(turned, 2.0 * math.pi)
+
+
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
@@ -142,7 +156,7 @@ def wanted_messages(estimator: str) -> dict[str, tuple[int, float]]:
     rates = {
         "LOCAL_POSITION_NED": 50.0,
         "POSITION_TARGET_LOCAL_NED": 50.0,
-        "ATTITUDE": 25.0,
+        "ATTITUDE": 50.0,
         "EXTENDED_SYS_STATE": 10.0,
         "HEARTBEAT": 5.0,
         "SYS_STATUS": 2.0,

@@ -1,4 +1,4 @@
-"""P and PV control of a height, sample by sample, during a flight."""
+"""P and PV control of one axis, sample by sample, during a flight."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from deadtime.loops._derivative_filter import PAPER_FILTER, discretised
 
 
 class Velocity:
-    """Vertical speed from samples of the height: the filtered derivative by the trapezoidal rule.
+    """Rate of an output from its samples: the filtered derivative by the trapezoidal rule.
 
     Parameters
     ----------
@@ -33,33 +33,33 @@ class Velocity:
         )
         self._state: np.ndarray | None = None
 
-    def next(self, height: float) -> float:
-        """The speed at the next sample, m/s; 0 at the first, where rest is assumed."""
+    def next(self, output: float) -> float:
+        """The rate at the next sample, 1/s; 0 at the first, where rest is assumed."""
         discrete = self._filter
         if self._state is None:
-            self._state = np.linalg.solve(np.eye(2) - discrete.F, discrete.G) * height
-        speed = float(discrete.C @ self._state + discrete.D * height)
-        self._state = discrete.F @ self._state + discrete.G * height
+            self._state = np.linalg.solve(np.eye(2) - discrete.F, discrete.G) * output
+        speed = float(discrete.C @ self._state + discrete.D * output)
+        self._state = discrete.F @ self._state + discrete.G * output
         return speed
 
 
-class HeightControl:
+class AxisControl:
     """The command of a P or PV controller at each sample, before any limit.
 
     Parameters
     ----------
     controller : P or PV
-        Gains in 1/s for the error, and without unit for the vertical speed.
+        Gains in 1/s for the error, and without unit for the rate of the output.
     sample_time : float
         s.
     smoothing : DerivativeFilter
-        Filter of the speed where the vehicle reports none.
+        Filter of the rate where the vehicle reports none.
 
     Examples
     --------
-    >>> HeightControl(P(2.0), 0.065).command(reference=1.25, height=1.0, climb=0.1)
+    >>> AxisControl(P(2.0), 0.065).command(reference=1.25, output=1.0, rate=0.1)
     0.5
-    >>> HeightControl(PV(2.0, 0.5), 0.065).command(reference=1.25, height=1.0, climb=0.1)
+    >>> AxisControl(PV(2.0, 0.5), 0.065).command(reference=1.25, output=1.0, rate=0.1)
     0.45
     """
 
@@ -75,21 +75,21 @@ class HeightControl:
         self.sample_time = sample_time
         self._velocity = Velocity(smoothing, sample_time)
 
-    def command(self, reference: float, height: float, climb: float | None) -> float:
-        """The commanded vertical speed, m/s.
+    def command(self, reference: float, output: float, rate: float | None) -> float:
+        """The commanded rate.
 
         Parameters
         ----------
-        reference, height : float
-            m.
-        climb : float or None
-            Vertical speed reported by the vehicle, m/s; None to derive it from the heights.
+        reference, output : float
+            m or rad.
+        rate : float or None
+            Rate of the output reported by the vehicle; None to derive it from the outputs.
         """
-        # The filter gets every height, so that its state is right whenever a report is missing.
-        speed = self._velocity.next(height)
-        if climb is not None:
-            speed = climb
-        command = self.controller.Kp * (reference - height)
+        # The filter gets every output, so that its state is right whenever a report is missing.
+        speed = self._velocity.next(output)
+        if rate is not None:
+            speed = rate
+        command = self.controller.Kp * (reference - output)
         if isinstance(self.controller, PV):
             command -= self.controller.Kv * speed
         return command

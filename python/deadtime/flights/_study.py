@@ -1,0 +1,182 @@
+"""Results of the experiment on one axis: the verdict, tables, and what is written as JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from deadtime._base.digits import between, stated
+from deadtime.estimation import DelayEstimate
+from deadtime.flights._learn import Learned
+from deadtime.flights._plan import FlightPlan
+from deadtime.flights._plants import lag_of_limits
+from deadtime.flights._runs import FlownSteps
+from deadtime.links.axes import Axis
+from deadtime.loops import RateLimited
+
+#: Headings of the columns of `FlightStudy.rows`.
+COLUMNS = (
+    "flight",
+    "overshoot / %",
+    "settled / s",
+    "paper's delay / s",
+    "period / ms",
+    "missed",
+)
+
+
+@dataclass(frozen=True)
+class FlightStudy:
+    """Results of the whole experiment on one axis.
+
+    Attributes
+    ----------
+    plan : FlightPlan
+        What was flown.
+    learned : Learned
+        Results of the first flights.
+    checked : tuple of FlownSteps
+        The flights with designed gains: the best P, then PV.
+    """
+
+    plan: FlightPlan
+    learned: Learned
+    checked: tuple[FlownSteps, ...]
+
+    @property
+    def axis(self) -> Axis:
+        """The axis that was flown."""
+        return self.plan.flown_axis
+
+    @property
+    def before(self) -> FlownSteps:
+        """The one of the first flights with the largest gain."""
+        return max(self.learned.flights, key=lambda one: one.controller.gains["Kp"])
+
+    @property
+    def after(self) -> FlownSteps:
+        """The flight under the PV gains."""
+        return self.checked[-1]
+
+    @property
+    def flights(self) -> tuple[FlownSteps, ...]:
+        """All flights, in order of time."""
+        return (*self.learned.flights, *self.checked)
+
+    def verdict(self) -> str:
+        """The outcome in a few sentences."""
+        fit = self.learned.fit
+        ends = fit.ci(0.95, "delay+lag")
+        whole = fit.stderr["delay+lag"]
+        parts = [f"a delay of {stated(fit.delay, fit.stderr['delay'], 's')}"]
+        if "lag" in fit.stderr:
+            parts.append(f"a lag of {stated(fit.lag or 0.0, fit.stderr['lag'], 's')}")
+        beside = ""
+        if isinstance(fit.loop.plant, RateLimited):
+            beside = " beside the limits within which the vehicle follows a command"
+            if slow := lag_of_limits(fit):
+                beside += f", which are a further lag of {slow:g} s for small ones"
+        sentences = [
+            f"The delay of the loop on {self.axis.name}, lag included, is "
+            f"{stated(fit.delay_plus_lag, whole, 's')}, {between(*ends, whole, 's')} with 95 % "
+            f"confidence{beside}: {' and '.join(parts)}, at a gain of "
+            f"{stated(fit.gain or 0.0, fit.stderr['gain'])}."
+        ]
+        split = self.learned.split
+        if split is not None:
+            link = stated(split.transport.delay, split.transport.stderr["delay"], "s")
+            own = stated(split.vehicle_delay, split.vehicle.stderr[split.late], "s")
+            sentences.append(
+                f"According to the vehicle's reports, {link} of it is the link and {own} the "
+                "vehicle."
+            )
+        before, after = self.before, self.after
+        sentences.append(
+            f"A step {_did(before)} under {before.name}, and {_did(after)} under {after.name}."
+        )
+        sentences += self.learned.warnings()
+        return " ".join(sentences)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A row for each flight, with the headings `COLUMNS`."""
+        found: list[tuple[str, ...]] = []
+        methods = [*self.learned.overshoot, *([""] * len(self.checked))]
+        for flight, paper in zip(self.flights, methods, strict=True):
+            delay = paper if isinstance(paper, str) else f"{paper.delay:.3f}"
+            settled = flight.settling_time
+            timing = flight.timing
+            found.append(
+                (
+                    flight.name,
+                    f"{flight.overshoot:.1f}",
+                    f"{settled:.2f}" if np.isfinite(settled) else "not",
+                    delay if len(delay) < 8 else "none",
+                    f"{1e3 * timing.period:.1f} ± {1e3 * timing.jitter:.1f}",
+                    f"{timing.missed}",
+                )
+            )
+        return found
+
+    def parts(self) -> list[tuple[str, ...]]:
+        """The parts of the delay: a name, a value and a 95 % interval for each row."""
+        fit, split = self.learned.fit, self.learned.split
+        lines: list[tuple[str, ...]] = [
+            _part(fit, name, f"{words}, from command and {self.axis.output}")
+            for name, words in (("delay", "delay"), ("lag", "lag"), ("delay+lag", "together"))
+            if name in fit.stderr
+        ]
+        speed = self.axis.rate.replace("_", " ")
+        if split is not None:
+            lines.append(_part(split.transport, "delay", "link, from the setpoint it echoes"))
+            lines.append(_part(split.vehicle, split.late, f"vehicle, from setpoint to {speed}"))
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """All results but the recordings, as plain values for JSON."""
+        learned = self.learned
+        split, small = learned.split, self.axis.thousandth
+        return {
+            "verdict": self.verdict(),
+            "adequate": learned.adequate,
+            "irregular": list(learned.irregular),
+            "plants": [one.line(small) for one in learned.tried],
+            "fit": learned.fit.to_dict(),
+            "whole_delay": learned.whole_delay,
+            "overshoot_method": [
+                one if isinstance(one, str) else one.delay for one in learned.overshoot
+            ],
+            "transport": None if split is None else split.transport.to_dict(),
+            "vehicle": None if split is None else split.vehicle.to_dict(),
+            "vehicle_delay": None if split is None else split.vehicle_delay,
+            "no_split_because": learned.unsplit,
+            "designed": learned.designed.gains,
+            "designed_p": learned.proportional.gains,
+            "flights": [
+                {
+                    "controller": flight.name,
+                    "overshoot": flight.overshoot,
+                    "settling_time": flight.settling_time,
+                    "recording": flight.path,
+                    "period": flight.timing.period,
+                    "jitter": flight.timing.jitter,
+                    "longest_period": flight.timing.longest,
+                    "missed": flight.timing.missed,
+                    "age": flight.age,
+                    "clock_misfit": None if flight.clock is None else flight.clock.misfit,
+                }
+                for flight in self.flights
+            ],
+        }
+
+
+def _part(fit: DelayEstimate, name: str, words: str) -> tuple[str, str, str]:
+    value, error = fit._value(name), fit.stderr[name]
+    return words, stated(value, error, "s"), between(*fit.ci(0.95, name), error, "s")
+
+
+def _did(flight: FlownSteps) -> str:
+    settled = flight.settling_time
+    when = f"settled in {settled:.1f} s" if np.isfinite(settled) else "did not settle"
+    return f"{when} with {flight.overshoot:.0f} % overshoot"
