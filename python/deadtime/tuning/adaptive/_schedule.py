@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from deadtime._base.errors import NotProvedError
-from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
+from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Stages, stage_report
 from deadtime._base.validation import interval, non_negative, positive, whole_number
@@ -42,8 +42,8 @@ _HALVINGS = 5
 _WHOLE = 1e-6
 
 
-@dataclass(frozen=True)
-class GainSet:
+@dataclass(frozen=True, eq=False)
+class GainSet(ReadOnlyArrays):
     """Gains, and the interval of the delay in which they may be used.
 
     Attributes
@@ -57,7 +57,7 @@ class GainSet:
     """
 
     factor: float
-    gains: Mapping[str, float]
+    gains: dict[str, float]
     delays: tuple[float, float]
 
 
@@ -278,7 +278,7 @@ def adaptive_gains(
         tuple(
             GainSet(
                 factor,
-                FrozenDict({name: factor * value for name, value in gains.items()}),
+                {name: factor * value for name, value in gains.items()},
                 (first * period, end * period),
             )
             for factor, end in zip(found.factors, ends, strict=True)
