@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         LinkError,
         MissingExtraError,
         NotIdentifiableError,
+        NotProvedError,
         PacketError,
         RecordingError,
         WorkerError,
@@ -72,8 +73,8 @@ if TYPE_CHECKING:
 _ROOMS = {
     "_base.errors": (
         "CertificateError ContourError ConvergenceError CountMismatchError DeadtimeError "
-        "FlightAbortedError LinkError MissingExtraError NotIdentifiableError PacketError "
-        "RecordingError WorkerError"
+        "FlightAbortedError LinkError MissingExtraError NotIdentifiableError NotProvedError "
+        "PacketError RecordingError WorkerError"
     ),
     "special": "lambertw lambertw0 lambertwm1 wrightomega",
     "dde": "solve_dde",
@@ -121,6 +122,7 @@ __all__ = [
     "LinkError",
     "MissingExtraError",
     "NotIdentifiableError",
+    "NotProvedError",
     "P",
     "PacketError",
     "ParametricPlant",

@@ -9,6 +9,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import Experiment
+from deadtime.tuning import adaptive_gains
 from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
@@ -36,6 +37,11 @@ def filtered():
     return dtm.design_filter(LOOP, fixed={"Kp": 1.5}, omegas=[20.0, 40.0], loss=0.9)
 
 
+def adapted():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=0.1)
+    return adaptive_gains(loop, (0.0, 0.2), sets=2)
+
+
 def told():
     time = np.arange(200) * 0.02
     square = np.where(np.sin(3.7 * time) > 0.0, 1.0, -1.0)
@@ -59,6 +65,7 @@ DRAWN = {
     "DelayTrack.plot": lambda: tracked().plot(),
     "Design.plot": lambda: designed().plot(),
     "FilterChoice.plot": lambda: filtered().plot(),
+    "GainSchedule.plot": lambda: adapted().plot(),
     "Identifiability.plot": lambda: planned().plot(),
     "Latency.plot": lambda: told().plot(),
     "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),

@@ -57,8 +57,14 @@ def logged():
         return dtm.open_log(path)
 
 
+def adapted():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=0.1)
+    return dtm.tuning.adaptive_gains(loop, (0.0, 0.2), sets=2)
+
+
 #: An expression for one object of every public type that is not an error or a plain number.
 MADE = {
+    "Choice": lambda: dtm.tuning.Choice(1, True),
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
     "Chain": lambda: h.chains()[0],
     "ControlLoop": lambda: LOOP,
@@ -86,6 +92,8 @@ MADE = {
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ).runs[0],
     "FactoredPlant": lambda: dtm.FactoredPlant([0.2, 0.1], zero=0.05),
+    "GainSchedule": adapted,
+    "GainSet": lambda: adapted().robust,
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
     "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
@@ -125,6 +133,7 @@ MADE = {
     "StabilityRadius": lambda: dtm.stability_radius(FAMILY, {"Kp": 1.0, "T": 0.3}),
     "Step": lambda: dtm.recordings.Step(1, 0.1, 0.0, 1.0),
     "Series": lambda: logged().loops["roll"].setpoint,
+    "SwitchingProof": lambda: adapted().proof,
     "Sweep": lambda: dtm.sweep(LOOP, {"Kp": np.array([1.0, 2.0])}),
     "Response of a system": lambda: SYSTEM.step_response([0.0, 0.5, 1.0]),
     "Trade": lambda: dtm.tuning.Trade("fixed", 1.0, float("nan"), True, 1.0, "so"),
@@ -169,7 +178,7 @@ def test_the_list_of_types_is_complete():
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW", "NoiseModel", "DisturbanceModel",
         "Comparison", "MethodDifference", "ConfidenceRegion", "RecordingCheck", "Finding", "Hole",
-        "SentCommands", "OnlineEstimator",
+        "SentCommands", "OnlineEstimator", "GainFollower",
     }  # fmt: skip
 
 

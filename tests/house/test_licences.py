@@ -10,7 +10,13 @@ from packaging.requirements import Requirement
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-NAMED = [*PROJECT["dependencies"], *EXTRAS["plot"], *EXTRAS["cli"], *EXTRAS["logs"]]
+NAMED = [
+    *PROJECT["dependencies"],
+    *EXTRAS["plot"],
+    *EXTRAS["cli"],
+    *EXTRAS["logs"],
+    *EXTRAS["adapt"],
+]
 
 #: LGPL: a library that a user may exchange, imported where a log is read and not passed on.
 EXCHANGEABLE = {"pymavlink"}

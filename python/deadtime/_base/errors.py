@@ -93,6 +93,10 @@ class NotIdentifiableError(DeadtimeError):
     """The recording does not determine what was asked for; the message names why."""
 
 
+class NotProvedError(DeadtimeError):
+    """No proof was found, and nothing is returned without one; the message says what to change."""
+
+
 class RecordingError(DeadtimeError, ValueError):
     """A recording cannot be used as it is; the message says what is wrong and where."""
 

@@ -19,7 +19,14 @@ from deadtime._cli.show import (
     stages,
 )
 from deadtime._cli.vehicles import flown_vehicle
-from deadtime.flights import FlightPlan, FlightStudy, fly_axes
+from deadtime.flights import (
+    AdaptivePlan,
+    FlightPlan,
+    FlightStudy,
+    MovingDelay,
+    fly_adaptive,
+    fly_axes,
+)
 from deadtime.flights._page import PARTS, write_flight_page
 from deadtime.flights._plan import USUAL
 from deadtime.flights._study import COLUMNS
@@ -117,6 +124,24 @@ def command(
             show_default=False,
         ),
     ] = None,
+    adapt: Annotated[
+        bool,
+        typer.Option(
+            "--adapt",
+            help="Afterwards fly gains that follow the delay beside robust ones, both proved.",
+        ),
+    ] = False,
+    longest_delay: Annotated[
+        float, typer.Option(help="Longest delay for which --adapt proves gains, s.")
+    ] = AdaptivePlan().longest,
+    moving_delay: Annotated[
+        str | None,
+        typer.Option(
+            help="Delay of the emulator's commands in --virtual-time, s: the first one, and the one"
+            " that it goes to and back from during --adapt.",
+            metavar="FIRST,LONGEST",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the emulator's noise.")] = 0,
     virtual_time: Annotated[
         bool,
@@ -145,6 +170,10 @@ def command(
     check_pages()  # needed for the report; fail before anything flies
     if virtual_time and (host is not None or link is not None):
         raise ValueError("--virtual-time is for the emulator, others are in real time: take one")
+    if moving_delay is not None and not virtual_time:
+        raise ValueError("--moving-delay is for the emulator in --virtual-time: add that")
+    moving = None if moving_delay is None else MovingDelay(_two_delays(moving_delay))
+    adaptive = AdaptivePlan(longest=longest_delay)
     if elsewhere is not None:
         _ask_for_consent(elsewhere, plans, consent)
     elif not as_json:
@@ -154,14 +183,21 @@ def command(
         raise ValueError(f"{where} holds recordings already: name another --folder")
     ports = (navdata_port, command_port, control_port)
     try:
-        count = sum(plan.flights for plan in plans) + 2 * len(plans)
+        count = sum(plan.flights for plan in plans) + (6 if adapt else 2) * len(plans)
         with (
             flown_vehicle(
-                host, link, plant, seed, virtual_time, base, limits, ports, consent
+                host, link, plant, seed, virtual_time, base, limits, ports, consent, moving
             ) as vehicle,
             stages(count, quiet=as_json) as begin,
         ):
             studies = fly_axes(vehicle.connect, plans, where, begin, vehicle.run, _print_note)
+            adapted = {
+                study.axis.name: fly_adaptive(
+                    vehicle.connect, study, adaptive, where, begin, vehicle.run, moving
+                )
+                for study in studies
+                if adapt
+            }
     except BaseException as error:
         for note in getattr(error, "__notes__", ()):
             _print_note(note)
@@ -172,6 +208,7 @@ def command(
     result = {
         "flown_on": vehicle.name,
         "axes": {study.axis.name: study.to_dict() for study in studies},
+        "adaptive": {name: one.to_dict() for name, one in adapted.items()},
         "round_trip": trip,
         "report": page,
         "folder": where,
@@ -184,6 +221,8 @@ def command(
     else:
         for study in studies:
             _print_study(study)
+            for line in adapted[study.axis.name].lines() if adapt else ():
+                print_text(line)
         print_text(f"\nRecordings and report are in {page.parent}: {page.name}")
         if trip is not None:
             print_text(f"The round trip of the link, by TIMESYNC, was {1e3 * trip:.1f} ms.")
@@ -242,6 +281,14 @@ def _by_axis(option: str, given: list[str], names: list[str]) -> dict[str, tuple
         except ValueError:
             raise ValueError(f"{option} {text}: give numbers with commas between them") from None
     return found
+
+
+def _two_delays(text: str) -> tuple[float, float]:
+    try:
+        first, longest = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--moving-delay {text}: give two delays, such as 0.1,0.5") from None
+    return first, longest
 
 
 def _free_folder() -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -11,6 +12,7 @@ from statistics import median
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
 from deadtime.flights._fly import Connect, Flown
+from deadtime.flights._moving_delay import MovingDelay
 from deadtime.links import Limits, Vehicle
 from deadtime.links import run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
@@ -51,10 +53,11 @@ def flown_vehicle(
     limits: Limits,
     ports: Ports,
     consent: bool = False,
+    moving: MovingDelay | None = None,
 ) -> Iterator[FlownVehicle]:
     name = f"an emulated AR.Drone 2.0 ({plant})"
     if virtual_time:
-        yield FlownVehicle(emulated_drone(plant, seed, limits), name, run_virtual)
+        yield FlownVehicle(emulated_drone(plant, seed, limits, moving), name, run_virtual)
     elif link is not None:
         with terminated_like_interrupted():
             times: list[LinkTime] = []
@@ -94,8 +97,13 @@ def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
     return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
 
 
-def emulated_drone(plant: PlantName, seed: int, limits: Limits) -> Connect:
-    """Connect to an emulator in the same event loop; each link has a different noise seed."""
+def emulated_drone(
+    plant: PlantName, seed: int, limits: Limits, moving: MovingDelay | None = None
+) -> Connect:
+    """Connect to an emulator in the same event loop; each link has a different noise seed.
+
+    Its transport delay is that of the plant, or one that moves.
+    """
     seeds = itertools.count(seed, SEED_STEP)
 
     @asynccontextmanager
@@ -105,7 +113,16 @@ def emulated_drone(plant: PlantName, seed: int, limits: Limits) -> Connect:
         )
         async with Emulator(options) as emulator:
             ports = (emulator.navdata_port, emulator.command_port, emulator.control_port)
-            async with _client(emulator.host, limits, ports) as drone:
-                yield drone
+            moves = (
+                None
+                if moving is None
+                else asyncio.create_task(moving.drive(emulator.drone.set_delay))
+            )
+            try:
+                async with _client(emulator.host, limits, ports) as drone:
+                    yield drone
+            finally:
+                if moves is not None:
+                    moves.cancel()
 
     return connect

@@ -1,7 +1,8 @@
 """Choose the gains of a loop whose delay is known up to an interval.
 
 `design` looks for gains that are best in the worst case over delay and gain of the plant and keep
-their margins there, and `design_filter` chooses the filter of the derivative.
+their margins there, and `design_filter` chooses the filter of the derivative. `adaptive_gains`
+makes a list of gains for a delay that moves, with a proof.
 """
 
 # The files. `_problem` holds what is free and what is not known, `_region` the region of an
@@ -15,13 +16,27 @@ from deadtime.tuning._filter_choice import design_filter
 from deadtime.tuning._region import ConfidenceRegion
 from deadtime.tuning._result import Design, FilterChoice, LeastMargins, Trade
 from deadtime.tuning._stabilising import critical_gain
+from deadtime.tuning.adaptive import (
+    Choice,
+    GainFollower,
+    GainSchedule,
+    GainSet,
+    SwitchingProof,
+    adaptive_gains,
+)
 
 __all__ = [
+    "Choice",
     "ConfidenceRegion",
     "Design",
     "FilterChoice",
+    "GainFollower",
+    "GainSchedule",
+    "GainSet",
     "LeastMargins",
+    "SwitchingProof",
     "Trade",
+    "adaptive_gains",
     "critical_gain",
     "design",
     "design_filter",

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from deadtime._base.validation import non_negative
 from deadtime.links.addresses import Address
 from deadtime.links.ardrone2.commands import (
     Command,
@@ -121,6 +122,7 @@ class Drone:
         self._order, self._listener = Order(), Listener()
         self._jitter = np.random.default_rng((options.seed, 1))
         self._in_transit: deque[tuple[Micros, Setpoints]] = deque()
+        self._delay = options.transport_delay
         self._last_arrival: Micros = 0
         self._moved_at: Micros | None = None
         self._bootstrap, self._to_acknowledge = True, False
@@ -236,9 +238,13 @@ class Drone:
             if flight.airborne:
                 self._take_off_requested, self._ticked = False, time
 
+    def set_delay(self, delay: float) -> None:
+        """Change the transport delay of further motion commands, s; their order stays."""
+        self._delay = non_negative("delay", delay)
+
     def _move(self, command: Move | MoveFrom, time: Micros) -> None:
         self._moved_at = time
-        late = self.options.transport_delay + self.options.jitter * self._jitter.random()
+        late = self._delay + self.options.jitter * self._jitter.random()
         self._last_arrival = max(self._last_arrival, time + micros(late))
         if len(self._in_transit) < MOST_IN_TRANSIT:
             self._in_transit.append((self._last_arrival, self._setpoints_of(command)))

@@ -1,0 +1,84 @@
+"""Control of one axis with gains that follow the delay, sample by sample, during a flight."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from deadtime.estimation import OnlineEstimator
+from deadtime.flights._axis_control import AxisControl
+from deadtime.links.clock import now
+from deadtime.loops import PV, P
+from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.tuning import GainSchedule
+
+#: Columns of the choices of a flight.
+CHOICE = ("time_s", "low_s", "high_s", "set", "covered")
+
+
+class ChosenSet(NamedTuple):
+    """What was known of the delay at one sample, and the set that was used."""
+
+    time: float
+    low: float
+    high: float
+    number: int
+    covered: bool
+
+
+class ScheduledControl(AxisControl):
+    """The command with the robust gains of a schedule.
+
+    Parameters
+    ----------
+    schedule : GainSchedule
+        The proved gains.
+    """
+
+    def __init__(self, schedule: GainSchedule) -> None:
+        controller = schedule.loop.controller
+        if not isinstance(controller, (P, PV)):
+            raise TypeError(f"controller={controller!r}: give a schedule for P or PV")
+        smoothing = getattr(controller, "filter", None)
+        super().__init__(controller, schedule.proof.sample_time, smoothing or PAPER_FILTER)
+        self._filtered = smoothing is not None
+
+    def command(self, reference: float, output: float, rate: float | None) -> float:
+        """The commanded rate; `rate` is used where the proof is without a filter."""
+        return super().command(reference, output, None if self._filtered else rate)
+
+
+class AdaptiveControl(ScheduledControl):
+    """The command with the gains that the delay permits, which is estimated during the flight.
+
+    Parameters
+    ----------
+    schedule : GainSchedule
+        The proved gains.
+    estimator : OnlineEstimator
+        Of the loop's delay, without rows yet; it is told of every output and command.
+    limit : float
+        Largest command.
+
+    Attributes
+    ----------
+    choices : list of ChosenSet
+        One for each sample.
+    """
+
+    def __init__(self, schedule: GainSchedule, estimator: OnlineEstimator, limit: float) -> None:
+        super().__init__(schedule)
+        self._schedule, self._estimator, self._limit = schedule, estimator, limit
+        self._follower = schedule.follow()
+        self.choices: list[ChosenSet] = []
+
+    def command(self, reference: float, output: float, rate: float | None) -> float:
+        """The commanded rate with the gains of now."""
+        time = now()
+        known = self._estimator.update(time, output)
+        low, high = known.ci
+        choice = self._follower.update(time, low, high, known.known and known.adequate)
+        self.choices.append(ChosenSet(time, low, high, choice.number, choice.covered))
+        command = super().command(reference, output, rate)
+        command *= self._schedule.sets[choice.number].factor
+        self._estimator.command(time, max(-self._limit, min(self._limit, command)))
+        return command

@@ -1,0 +1,167 @@
+"""Gains that follow the delay in flight: in virtual time, and on the firmware behind a relay."""
+
+import asyncio
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime._cli.vehicles import emulated_drone
+from deadtime.estimation import OnlineEstimator
+from deadtime.flights import AdaptivePlan, FlightPlan, MovingDelay
+from deadtime.flights._adaptive_control import AdaptiveControl, ScheduledControl
+from deadtime.links import Limits, now, run
+from deadtime.tuning import SwitchingProof, adaptive_gains
+
+SUPPORT = Path(__file__).parents[1] / "support"
+LOOP = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(1.0), sample_time=0.1, limit=1.0)
+
+
+@pytest.fixture(scope="module")
+def schedule():
+    return adaptive_gains(LOOP, (0.0, 0.5), sets=3)
+
+
+def controlled(control, delays, duration=40.0):
+    """Fly an integrator with moving delays in virtual time; the outputs."""
+
+    async def fly():
+        y, coming, last, held = 0.0, [], 0.0, 0.0
+        outputs = []
+        for k in range(round(duration / 0.1)):
+            await asyncio.sleep(0.1)
+            time, until = 0.1 * k, 0.1 * k
+            outputs.append(y)
+            reference = 0.3 * (k // 40 % 2)
+            command = float(np.clip(control.command(reference, y, None), -1.0, 1.0))
+            last = max(last, time + delays(time))
+            coming.append((last, command))
+            while coming and coming[0][0] < time + 0.1:
+                arrival, following = coming.pop(0)
+                y += 0.9 * held * (arrival - until)
+                until, held = arrival, following
+            y += 0.9 * held * (time + 0.1 - until)
+        return np.array(outputs)
+
+    return run(fly())
+
+
+def test_control_takes_faster_gains_when_the_delay_is_known_to_be_short(schedule):
+    estimator = OnlineEstimator(LOOP, delays=(0.0, 0.6), noise=0.002, level=0.999)
+    control = AdaptiveControl(schedule, estimator, 1.0)
+    outputs = controlled(control, lambda time: 0.1)
+    numbers = [one.number for one in control.choices]
+    robust = len(schedule.sets) - 1
+    assert len(numbers) == len(outputs)
+    assert numbers[0] == robust
+    assert not control.choices[0].covered
+    assert min(numbers) < robust
+    settled = control.choices[-1]
+    assert settled.covered
+    assert settled.low <= 0.1 <= settled.high <= schedule.sets[settled.number].delays[1]
+
+
+def test_control_without_following_keeps_the_robust_gains(schedule):
+    control = ScheduledControl(schedule)
+    Kp = schedule.robust.gains["Kp"]
+    assert control.command(1.25, 1.0, None) == pytest.approx(0.25 * Kp)
+
+
+def test_the_emulator_obeys_a_delay_that_moves():
+    """The set point that the drone echoes comes later by what the delay was moved."""
+    moving = MovingDelay((0.1, 0.5))
+
+    async def hover(drone):
+        for _ in range(15):
+            drone.hover()
+            await asyncio.sleep(0.1)
+
+    async def fly():
+        async with emulated_drone("kit", 0, Limits(max_climb=1.0), moving)() as drone:
+            await drone.take_off()
+            found = []
+            for begin in (1e9, now() - 50.0):  # before the move; at its longest
+                moving.start(begin, 100.0)
+                await hover(drone)
+                sent, seen = now(), None
+                while seen is None:
+                    drone.command(0.2)
+                    await asyncio.sleep(0.005)
+                    if (await drone.state()).climb_setpoint:
+                        seen = now() - sent
+                found.append(seen)
+                await hover(drone)
+            await drone.land()
+            return found
+
+    short, long = run(fly())
+    assert long - short == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--moving-delay", "0.1,0.5"], "--virtual-time"),
+        (["--moving-delay", "0.5", "--virtual-time"], "two delays"),
+        (["--moving-delay", "0.5,0.1", "--virtual-time"], "0.5"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, message, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "deadtime", "fly", "--adapt", "--folder", str(tmp_path), *options],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+    )
+    assert done.returncode != 0
+    assert message in done.stderr
+
+
+def test_the_programme_steps_up_and_down_for_its_duration():
+    programme = AdaptivePlan(duration=40.0, hold=8.0).programme(FlightPlan())
+    assert programme.references == (1.0, 1.25, 1.0, 1.25, 1.0)
+    assert programme.duration == 40.0
+
+
+@pytest.mark.survey
+def test_the_command_flies_them_in_virtual_time(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "deadtime", "fly", "--virtual-time", "--adapt", "--json",
+         "--moving-delay", "0.1,0.5", "--folder", str(tmp_path)],
+        capture_output=True, text=True, timeout=900.0,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    adaptive = json.loads(done.stdout)["adaptive"]["z"]
+    assert adaptive["error_adaptive"] < adaptive["error_robust"]
+    assert SwitchingProof.from_json((tmp_path / "proof-z.json").read_text()).verify() >= 0.5
+    with (tmp_path / "choices-z.csv").open() as file:
+        choices = list(csv.DictReader(file))
+    assert len({row["set"] for row in choices}) > 1
+
+
+@pytest.mark.survey
+@pytest.mark.flight
+def test_they_fly_on_the_firmware_behind_a_relay_whose_delay_moves(tmp_path):
+    pytest.importorskip("pymavlink", reason="pymavlink is the codec")
+    from arducopter import alone, skip_without_firmware
+
+    skip_without_firmware()
+    paths = os.pathsep.join(filter(None, [str(SUPPORT), os.environ.get("PYTHONPATH")]))
+    done = subprocess.run(
+        [*alone(), sys.executable, str(SUPPORT / "arducopter_adaptive.py"), str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=900.0,
+    )
+    if "s old, more than" in done.stderr:
+        pytest.skip("this machine is too busy for a loop in real time")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found["error_adaptive"] <= 1.1 * found["error_robust"]
+    assert SwitchingProof.from_json((tmp_path / "proof-z.json").read_text()).verify() >= 0.75
