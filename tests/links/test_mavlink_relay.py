@@ -34,7 +34,7 @@ def links(tmp_path_factory):
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=400.0,
+        timeout=560.0,
     )
     if "s old, more than" in done.stderr:
         pytest.skip("this machine is too busy for a loop in real time")
