@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,9 @@ LEARN, LAST = 10.0, 30.0
 
 #: Fewest rows that the noise is learned from.
 FEWEST = 40
+
+#: So many changes within so many seconds are not those of a delay.
+RESTLESS, MINUTE = 3, 60.0
 
 #: The range of delays by default, s, and how far it goes beyond a fitted one.
 RANGE, BEYOND = (0.0, 0.6), 2.0
@@ -165,6 +169,7 @@ class OnlineEstimator:
             "level": level,
         }
         self._bank: OnlineBank | None = None
+        self._changes: list[float] = []
         self._noise: FlightNoise | None = None
         self._rows: list[tuple[float, float | None]] = []
         self._commands: list[tuple[float, float]] = []
@@ -291,7 +296,16 @@ class OnlineEstimator:
 
     def _estimate(self, numbers: Any) -> OnlineEstimate:
         assert self._noise is not None
-        return estimate_of(numbers, self._noise.white, self.delays, self._doubts)
+        found = estimate_of(numbers, self._noise.white, self.delays, self._doubts)
+        if found.changed:
+            self._changes.append(found.time)
+        self._changes = [time for time in self._changes if time > found.time - MINUTE]
+        if len(self._changes) < RESTLESS:
+            return found
+        count = len(self._changes)
+        reason = f"not adequate: {count} changes in a minute: the plant lacks something"
+        message = f"{found.message}; {reason}" if found.message else reason
+        return replace(found, adequate=False, message=message)
 
     def _settings(self, noise: FlightNoise) -> BankSettings:
         sets = lag_sets(self._model, self._lags)
