@@ -72,6 +72,29 @@ def test_control_without_following_keeps_the_robust_gains(schedule):
     assert control.command(1.25, 1.0, None) == pytest.approx(0.25 * Kp)
 
 
+class Told(OnlineEstimator):
+    """An estimator that keeps what it is told."""
+
+    def __init__(self):
+        super().__init__(LOOP, delays=(0.0, 0.6), noise=0.002)
+        self.commands = []
+
+    def command(self, time, value):
+        self.commands.append((time, value))
+        super().command(time, value)
+
+
+def test_the_estimator_is_told_of_commands_as_the_vehicle_follows_them(schedule):
+    shaping = dtm.RateLimited(dtm.Integrator(0.9), rate=1.0, rate_of_rate=5.0)
+    estimator = Told()
+    control = AdaptiveControl(schedule, estimator, 1.0, shaping)
+    controlled(control, lambda time: 0.1, duration=12.0)
+    times = np.array([one.time for one in control.choices])
+    sent = np.array([value for _, value in control._sent])
+    expected = np.column_stack(shaping.limited(times, sent))[:-1]
+    assert np.array(estimator.commands) == pytest.approx(expected, abs=1e-9)
+
+
 def test_the_emulator_obeys_a_delay_that_moves():
     """The set point that the drone echoes comes later by what the delay was moved."""
     moving = MovingDelay((0.1, 0.5))

@@ -34,7 +34,7 @@ PLAN = FlightPlan(
     prior_gain=1.0,
     limits=Limits(max_climb=1.0, max_height=6.0, max_error=1.5, max_state_age=0.8),
 )
-ADAPT = AdaptivePlan(longest=0.8, duration=112.0, hold=8.0)
+ADAPT = AdaptivePlan(longest=1.0, duration=112.0, hold=8.0)
 
 
 class Moved:

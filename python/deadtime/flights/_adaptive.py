@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from deadtime._base.errors import NotProvedError
 from deadtime._base.validation import positive
-from deadtime.estimation import DelayEstimate, OnlineEstimator
+from deadtime.estimation import OnlineEstimator
 from deadtime.flights._adaptive_control import (
     CHOICE,
     AdaptiveControl,
@@ -29,7 +29,7 @@ from deadtime.flights._step_test import StepProgramme, fly_steps, row_columns
 from deadtime.flights._study import FlightStudy
 from deadtime.links.clock import now
 from deadtime.links.journal import Journal
-from deadtime.loops import PV, ControlLoop, DerivativeFilter, Integrator, P
+from deadtime.loops import PV, ControlLoop, DerivativeFilter, Integrator, P, RateLimited
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.loops._plants import steady_lag
 from deadtime.recordings import Recording, read_recording
@@ -132,8 +132,8 @@ class AdaptiveStudy:
 
 def schedule_of(
     study: FlightStudy, adapt: AdaptivePlan, report: Callable[[str], object]
-) -> tuple[GainSchedule, DelayEstimate]:
-    """Proved gains for the estimated plant, and the estimate with that plant.
+) -> GainSchedule:
+    """Proved gains for the estimated plant.
 
     A plant of higher order is taken as an integrator with a lag that is late by as much.
     """
@@ -158,7 +158,7 @@ def schedule_of(
             f"the delay was estimated as {fit.delay:.3g} s, and gains are to be proved up to "
             f"{adapt.longest:g} s: prove them up to a longer delay"
         )
-    schedule = adaptive_gains(
+    return adaptive_gains(
         loop,
         (0.0, adapt.longest),
         gain=fit.ci(0.95, "gain"),
@@ -166,7 +166,6 @@ def schedule_of(
         gain_margin=plan.gain_margin,
         progress=report,
     )
-    return schedule, fit
 
 
 def fly_adaptive(
@@ -204,11 +203,11 @@ def fly_adaptive(
     FlightAbortedError, LinkError
         As `fly_experiment`.
     """
-    schedule, fit = schedule_of(study, adapt, report)
+    schedule = schedule_of(study, adapt, report)
     (folder / f"proof-{study.axis.name}.json").write_text(
         schedule.proof.to_json(indent=1) + "\n", encoding="utf-8"
     )
-    controls = _controls(schedule, fit, study, adapt)
+    controls = _controls(schedule, study, adapt)
     axis = study.axis.name
     paths = [folder / f"flight-{axis}-{name}.csv" for name in ("robust", "adaptive")]
     programme = adapt.programme(study.plan)
@@ -225,14 +224,18 @@ def fly_adaptive(
 
 
 def _controls(
-    schedule: GainSchedule, fit: DelayEstimate, study: FlightStudy, adapt: AdaptivePlan
+    schedule: GainSchedule, study: FlightStudy, adapt: AdaptivePlan
 ) -> tuple[AxisControl, AdaptiveControl]:
     """The control with the robust gains alone, and the one that follows the delay."""
+    fit, shaping = study.learned.fit, study.learned.fit.loop.plant
+    if isinstance(shaping, RateLimited):
+        fit = replace(fit, loop=fit.loop.replace(plant=shaping.plant))
     estimator = OnlineEstimator.from_estimate(
         fit, delays=(0.0, adapt.longest + BEYOND), drift=DRIFT, level=LEVEL
     )
     largest = study.plan.limits.largest(study.axis)
-    following = AdaptiveControl(schedule, estimator, largest)
+    limits = shaping if isinstance(shaping, RateLimited) else None
+    following = AdaptiveControl(schedule, estimator, largest, limits)
     return ScheduledControl(schedule), following
 
 

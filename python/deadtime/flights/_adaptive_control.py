@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import NamedTuple
+
+import numpy as np
 
 from deadtime.estimation import OnlineEstimator
 from deadtime.flights._axis_control import AxisControl
 from deadtime.links.clock import now
-from deadtime.loops import PV, P
+from deadtime.loops import PV, P, RateLimited
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.tuning import GainSchedule
+
+#: Commands that are kept to shape the newest one: it takes a few seconds to follow any.
+KEPT = 150
 
 #: Columns of the choices of a flight.
 CHOICE = ("time_s", "low_s", "high_s", "set", "covered")
@@ -58,6 +64,9 @@ class AdaptiveControl(ScheduledControl):
         Of the loop's delay, without rows yet; it is told of every output and command.
     limit : float
         Largest command.
+    shaping : RateLimited, optional
+        The limits within which the vehicle follows its commands; the plant of the estimator is what
+        comes after them.
 
     Attributes
     ----------
@@ -65,20 +74,43 @@ class AdaptiveControl(ScheduledControl):
         One for each sample.
     """
 
-    def __init__(self, schedule: GainSchedule, estimator: OnlineEstimator, limit: float) -> None:
+    def __init__(
+        self,
+        schedule: GainSchedule,
+        estimator: OnlineEstimator,
+        limit: float,
+        shaping: RateLimited | None = None,
+    ) -> None:
         super().__init__(schedule)
         self._schedule, self._estimator, self._limit = schedule, estimator, limit
+        self._shaping = shaping
+        self._sent: deque[tuple[float, float]] = deque(maxlen=KEPT)
         self._follower = schedule.follow()
         self.choices: list[ChosenSet] = []
 
     def command(self, reference: float, output: float, rate: float | None) -> float:
         """The commanded rate with the gains of now."""
         time = now()
+        self._tell(time)
         known = self._estimator.update(time, output)
         low, high = known.ci
         choice = self._follower.update(time, low, high, known.known and known.adequate)
         self.choices.append(ChosenSet(time, low, high, choice.number, choice.covered))
         command = super().command(reference, output, rate)
         command *= self._schedule.sets[choice.number].factor
-        self._estimator.command(time, max(-self._limit, min(self._limit, command)))
+        self._sent.append((time, max(-self._limit, min(self._limit, command))))
         return command
+
+    def _tell(self, time: float) -> None:
+        """Tell the estimator of the last command, as the vehicle followed it until now."""
+        if not self._sent:
+            return
+        if self._shaping is None:
+            self._estimator.command(*self._sent[-1])
+            return
+        # At rest at the first command that is kept: what that differs by has faded since.
+        times, commands = np.array([*self._sent, (time, self._sent[-1][1])]).T
+        pieces = zip(*self._shaping.limited(times, commands), strict=True)
+        for begin, value in pieces:
+            if times[-2] <= begin < time:
+                self._estimator.command(float(begin), float(value))
