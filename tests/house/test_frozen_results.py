@@ -173,8 +173,8 @@ def public_types():
 
 
 def test_the_list_of_types_is_complete():
-    # Base classes that are never instantiated, tuples of arrays, what has a test of its own, and what
-    # goes on with each row.
+    # Base classes that are never instantiated, tuples of arrays, what has a test of its own, and
+    # what goes on with each row.
     assert {kind.__name__ for kind in public_types()} - MADE.keys() == {
         "Controller", "Plant", "OffsetW", "NoiseModel", "DisturbanceModel",
         "Comparison", "MethodDifference", "ConfidenceRegion", "RecordingCheck", "Finding", "Hole",
