@@ -188,12 +188,12 @@ def test_a_hundred_drifts_in_wind():
 @pytest.mark.survey
 def test_changes_of_six_bounds_are_found_and_calm_hours_are_calm():
     for up in (True, False):
-        assert changes(100, up).in_time >= 0.95
+        assert changes(200, up).in_time >= 0.93
     hours = calm(100.0)
     assert hours.alarms < 100
     inside, after, coverage = quiet(20)
     assert inside < 0.05
-    assert after < 0.05
+    assert after < 0.1  # after a false alarm
     assert coverage > 0.93
 
 

@@ -93,6 +93,10 @@ impl<const N: usize> Cell<N> {
 
     /// The Gaussian with the mean and covariance of a mixture; the shares sum to one. The white
     /// noise has the variance `white`.
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "entries of a matrix and of two vectors by the same numbers"
+    )]
     pub(super) fn blend(parts: &[(f64, &Self)], white: f64) -> Self {
         let mut sum = Self {
             mean: [0.0; N],

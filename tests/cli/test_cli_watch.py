@@ -1,0 +1,115 @@
+"""`deadtime watch`: a table, a table that grows, and a link that is only listened to."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import deadtime as dtm
+import numpy as np
+import pytest
+from deadtime._cli.watch_page import WatchPage
+from deadtime._cli.watched import Columns, Row, Sent, growing, heard, recorded
+from deadtime.estimation import online
+from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink.codec import Codec, dialect
+
+COLUMNS = Columns("time", "output", "command")
+
+
+def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path):
+    values = np.random.default_rng(1).normal(size=(20, 2))
+    lines = [f"{0.1 * k!r},{y!r},{u!r}\n" for k, (y, u) in enumerate(values.tolist())]
+    whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
+    whole.write_text("time,output,command\n" + "".join(lines))
+    part.write_text("time,output,command\n" + "".join(lines[:10]) + lines[10][:7])
+
+    def write():
+        time.sleep(0.3)
+        with part.open("a") as file:
+            file.write(lines[10][7:] + "".join(lines[11:]))
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    found = list(growing(part, COLUMNS, silence=1.0))
+    writer.join()
+    assert found == list(recorded(whole, COLUMNS))
+
+
+def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,output,command\n0.0,,0.5\n0.1,1.0,\n")
+    assert list(growing(path, COLUMNS, 0.1)) == [Row(0.0, None, 0.5), Row(0.1, 1.0, None)]
+    path.write_text("time,output,command\n0.0,height,0.5\n")
+    with pytest.raises(dtm.RecordingError, match=r"line 2 of .*log\.csv is '0.0,height,0.5'"):
+        list(growing(path, COLUMNS, 0.1))
+    path.write_text("time,output\n")
+    with pytest.raises(dtm.RecordingError, match="no column 'command', only time, output"):
+        list(growing(path, COLUMNS, 0.1))
+
+
+def test_a_link_is_listened_to_and_never_answered():
+    messages, codec = dialect(), Codec(1, 1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    found = []
+    listener = threading.Thread(
+        target=lambda: found.extend(heard(LinkAddress("udp", "127.0.0.1", port), "z", 0.5))
+    )
+    listener.start()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        vehicle.settimeout(0.1)
+        time.sleep(0.2)
+        target = (1, 1, messages.MAV_FRAME_LOCAL_NED)
+        sent = [
+            messages.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3),
+            messages.MAVLink_set_position_target_local_ned_message(
+                0, *target, 0b110111000111, 0, 0, 0, 0, 0, -0.5, 0, 0, 0, 0, 0
+            ),
+            messages.MAVLink_local_position_ned_message(0, 0, 0, -3.0, 0, 0, 0),
+            messages.MAVLink_set_position_target_local_ned_message(
+                0, *target, 0b111111111000, 0, 0, 0, 0, 0, -9.0, 0, 0, 0, 0, 0
+            ),
+        ]
+        for message in sent:
+            vehicle.sendto(codec.encode(message), ("127.0.0.1", port))
+        vehicle.sendto(b"\xfd\x09nonsense", ("127.0.0.1", port))
+        with pytest.raises(TimeoutError):
+            vehicle.recv(2048)
+    listener.join()
+    assert [type(one) for one in found] == [Sent, Row]
+    assert found[0].value == 0.5
+    assert found[1].output == 3.0
+    assert found[1].time > found[0].time
+
+
+def test_a_link_that_would_be_sent_to_is_refused():
+    with pytest.raises(ValueError, match="give udp:HOST:PORT"):
+        list(heard(LinkAddress.of("tcp:127.0.0.1:5760"), "z", 0.1))
+
+
+def test_the_page_is_for_this_computer_alone():
+    steps = 0.065 * np.arange(12)
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
+    last = online(dtm.Recording(steps, steps, steps, steps), loop, noise=0.01).last
+    shown = WatchPage("<flight>.csv")
+    try:
+        shown.show(last)
+        with urllib.request.urlopen(shown.address, timeout=5) as answer:
+            text = answer.read().decode()
+        assert "&lt;flight&gt;.csv" in text
+        assert "http://" not in text.replace("http://www.w3.org", "")
+        with urllib.request.urlopen(shown.address + "track", timeout=5) as answer:
+            found = json.loads(answer.read())
+        assert found["rows"][0][:2] == [last.time, last.delay]
+        foreign = urllib.request.Request(shown.address, headers={"Host": "evil.example:80"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(foreign, timeout=5)
+    finally:
+        shown.close()
