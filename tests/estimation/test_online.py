@@ -194,7 +194,7 @@ def test_a_hundred_drifts_in_wind():
 def test_changes_of_six_bounds_are_found_and_calm_hours_are_calm():
     for up in (True, False):
         assert changes(200, up).in_time >= 0.92
-    # The stated rate is one an hour; in 100 hours there were 69 (`docs/theory/measured-estimates.md`).
+    # The stated rate is one an hour; `docs/theory/measured-estimates.md` has 100 hours.
     assert stats.poisson.sf(calm(HOURS).alarms - 1, HOURS) > 0.001
     inside, after, coverage = quiet(20)
     assert inside < 0.05
