@@ -82,10 +82,11 @@ def command(
     if shown is not None and not as_json:
         print_text(f"page: {shown.address}")
     found: list[OnlineEstimate] = []
+    events = _events(source, Columns(time, output, command), follow, axis, silence)
+    rows = 0
     try:
-        for estimate in _estimates(
-            estimator, _events(source, Columns(time, output, command), follow, axis, silence)
-        ):
+        for estimate in _estimates(estimator, events):
+            rows += 1
             if shown is not None:
                 shown.show(estimate)
             if not found or _is_told(estimate, found[-1], every):
@@ -104,6 +105,7 @@ def command(
     if as_json:
         print_json("watch", {"source": source, **track.to_dict()})
     else:
+        print_text(f"{rows} rows; of those that are printed above:")
         print_text(track.summary())
 
 
