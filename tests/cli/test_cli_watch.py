@@ -40,6 +40,14 @@ def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path):
     assert found == list(recorded(whole, COLUMNS))
 
 
+def test_a_saved_recording_is_watched_as_it_is(tmp_path):
+    path = tmp_path / "saved.csv"
+    times = np.arange(9.0)
+    saved = dtm.Recording(times, times, 2.0 * times, 3.0 * times)
+    saved.save(path)
+    assert list(growing(path, COLUMNS, 0.1)) == list(recorded(path, COLUMNS))
+
+
 def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,output,command\n0.0,,0.5\n0.1,1.0,\n")

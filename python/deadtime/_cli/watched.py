@@ -70,7 +70,9 @@ def recorded(file: Path, columns: Columns) -> Iterator[Row]:
 def growing(file: Path, columns: Columns, silence: float) -> Iterator[Row]:
     """The rows of a CSV file as they are written, until none has come for `silence` s."""
     with file.open(encoding="utf-8", newline="") as lines:
-        head = _whole_line(lines, silence)
+        number, head = 1, _whole_line(lines, silence)
+        while head is not None and head.startswith("#"):  # as in a saved recording
+            number, head = number + 1, _whole_line(lines, silence)
         if head is None:
             raise RecordingError(f"{file} has no header line")
         heads = [name.strip() for name in next(csv.reader([head]))]
@@ -78,7 +80,6 @@ def growing(file: Path, columns: Columns, silence: float) -> Iterator[Row]:
             if name not in heads:
                 raise RecordingError(f"{file} has no column {name!r}, only {', '.join(heads)}")
         places = [heads.index(name) for name in columns]
-        number = 1
         while (line := _whole_line(lines, silence)) is not None:
             number += 1
             cells = next(csv.reader([line]), [])
