@@ -95,7 +95,7 @@ impl<const N: usize> Cells<N> {
     }
 }
 
-/// A bank of filters of N states.
+/// A bank of filters of N states; those beyond `Settings::states` stay zero.
 pub(super) struct Bank<const N: usize> {
     settings: Settings,
     layers: Vec<Layer<N>>,
@@ -129,9 +129,10 @@ impl<const N: usize> Bank<N> {
         for one in &settings.layers {
             layers.push(Layer::new(&settings, one)?);
         }
-        let states = N - 1 - usize::from(settings.trim > 0.0) - usize::from(settings.has_offset());
+        let last = settings.states() - 1;
+        let states = last - usize::from(settings.trim > 0.0) - usize::from(settings.has_offset());
         let trim = (settings.trim > 0.0).then_some(states + 1);
-        let offset = settings.has_offset().then_some(N - 1);
+        let offset = settings.has_offset().then_some(last);
         let count = settings.delays.len();
         let sets = layers.len();
         let main = Cells::new(&settings.delays, (0..count).collect(), sets);
@@ -556,7 +557,7 @@ impl<const N: usize> Layer<N> {
             seen[own + 1] = space.d;
         }
         if settings.has_offset() {
-            seen[N - 1] = 1.0;
+            seen[settings.states() - 1] = 1.0;
         }
         let direct = space.d;
         Ok(Self {
