@@ -241,6 +241,7 @@ def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, f
         page.tab.fill(f"#number-{name}", f"{loop.parameters[name]:.9f}")
         page.tab.keyboard.press("Enter")
     page.tab.click("#fit")
+    page.tab.wait_for_function("() => window.drawn.state.interval")
     state = page.drawn["state"]
     known = dtm.estimate_delay(recording, loop, free=("delay", "gain"))
     assert state["interval"] == pytest.approx(known.ci(), abs=1e-3)

@@ -161,7 +161,7 @@ def test_a_longer_delay_is_seen_as_a_real_change(found, tmp_path):
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.010 < one.ci[1]
     assert one.verdict.startswith("really longer")
-    again = dtm.latency(log_of(tmp_path, seed=7))
+    again = dtm.latency(log_of(tmp_path, seed=8))
     changes = dtm.reports.compare_latencies(found, again)
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.0 < one.ci[1]

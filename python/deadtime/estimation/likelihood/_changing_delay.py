@@ -41,8 +41,8 @@ STEP = 1e-3
 CLOSER = 0.9
 
 #: Rise of -2 ln L by which a changing delay without air has to be likelier than a constant one in
-#: air or with scattered times. 1 % of flights in weak air have more, and 3 % of those with jitter.
-CLEARLY = 5.0
+#: air or with scattered times. 1 % of flights in weak air have more, and 2 % of those with jitter.
+CLEARLY = 6.0
 
 #: Share of a change that the fitted numbers have to leave.
 LEFT = 1e-3
