@@ -24,7 +24,7 @@ PLANT = dtm.Integrator(VEHICLE.gain, lag=VEHICLE.lag)
 LOOP = dtm.ControlLoop(PLANT, dtm.P(VEHICLE.Kp), sample_time=SAMPLE, limit=1.0)
 
 #: Hours without a change in the survey; 100 take ten minutes.
-HOURS = float(os.environ.get("DEADTIME_HOURS", "4"))
+HOURS = float(os.environ.get("DEADTIME_HOURS", "1"))
 
 
 def flown(seconds, delay=0.3, vehicle=VEHICLE, seed=1):
@@ -184,19 +184,19 @@ def test_what_is_wrong_is_said():
 
 @pytest.mark.survey
 def test_a_hundred_drifts_in_wind():
-    found = drifts(100)
+    found = drifts(30)
     assert found.rmse < 1.5 * found.bound
-    assert 0.93 <= found.coverage <= 0.97
+    assert 0.92 <= found.coverage <= 0.98
     assert found.adequate > 0.999
 
 
 @pytest.mark.survey
 def test_changes_of_six_bounds_are_found_and_calm_hours_are_calm():
     for up in (True, False):
-        assert changes(200, up).in_time >= 0.92
+        assert changes(60, up).in_time >= 0.85
     # The stated rate is one an hour; `docs/theory/measured-estimates.md` has 100 hours.
     assert stats.poisson.sf(calm(HOURS).alarms - 1, HOURS) > 0.001
-    inside, after, coverage = quiet(20)
+    inside, after, coverage = quiet(5)
     assert inside < 0.05
     assert after < 0.1  # after a false alarm
     assert coverage > 0.93

@@ -133,7 +133,7 @@ def test_flights_with_the_delay_estimated_online():
     import adaptation
 
     schedule = adaptation.made_schedule()
-    draws = adaptation.drawn(int(os.environ.get("DEADTIME_FLIGHTS", "40")))  # 200 in the bench
+    draws = adaptation.drawn(int(os.environ.get("DEADTIME_FLIGHTS", "12")))  # 200 in the bench
     fixed = adaptation.flown(draws, schedule, None)
     adaptive = adaptation.flown(draws, schedule, adaptation.online(draws))
     assert not fixed.outside.any()
