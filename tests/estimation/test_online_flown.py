@@ -37,7 +37,7 @@ def test_the_log_of_the_vehicle_and_the_link_agree(tmp_path):
     flight = Flight("height", "calm", 0.0, 1)
     firmware.fly(tmp_path, [flight])
     own, link = (track.last for track in both(tmp_path, flight))
-    # The limits of the vehicle are not in the plant: a track that found changes has to doubt itself.
+    # The limits of the vehicle are not in the plant: what finds changes has to doubt itself.
     if not (own.known and link.known):
         assert not own.adequate or not link.adequate
         return
