@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
@@ -18,7 +17,6 @@ from deadtime.flights._adaptive_control import AdaptiveControl, ScheduledControl
 from deadtime.links import Limits, now, run
 from deadtime.tuning import SwitchingProof, adaptive_gains
 
-SUPPORT = Path(__file__).parents[1] / "support"
 LOOP = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(1.0), sample_time=0.1, limit=1.0)
 
 
@@ -173,23 +171,12 @@ def test_the_command_flies_them_in_virtual_time(tmp_path):
 @pytest.mark.flight
 def test_they_fly_on_the_firmware_behind_a_relay_whose_delay_moves(tmp_path):
     pytest.importorskip("pymavlink", reason="pymavlink is the codec")
-    from arducopter import alone, skip_without_firmware
+    from arducopter import told_by
 
-    skip_without_firmware()
     if "DEADTIME_LONG_FLIGHTS" not in os.environ:
         pytest.skip("eight minutes: set DEADTIME_LONG_FLIGHTS to fly them")
-    paths = os.pathsep.join(filter(None, [str(SUPPORT), os.environ.get("PYTHONPATH")]))
-    done = subprocess.run(
-        [*alone(), sys.executable, str(SUPPORT / "arducopter_adaptive.py"), str(tmp_path)],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=900.0,
-    )
-    if "s old, more than" in done.stderr:
-        pytest.skip("this machine is too busy for a loop in real time")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout.splitlines()[-1])
+    told = told_by("arducopter_adaptive.py", str(tmp_path), timeout=900.0)
+    found = json.loads(told.splitlines()[-1])
     # The limits of the firmware keep the estimate inadequate: the robust gains flew in both, 1.07.
     assert found["error_adaptive"] <= 1.2 * found["error_robust"]
     assert SwitchingProof.from_json((tmp_path / "proof-z.json").read_text()).verify() >= 0.75

@@ -1,39 +1,21 @@
 """The whole experiment with ArduPilot's Copter, on two axes, at the speed of the clock."""
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
-from arducopter import alone, skip_without_firmware
-
-SUPPORT = Path(__file__).parents[1] / "support"
+from arducopter import told_by
 
 
 @pytest.mark.survey
 @pytest.mark.flight
 def test_the_delays_of_two_axes_are_found_and_their_designed_gains_fly(tmp_path):
-    skip_without_firmware()
     folder = tmp_path / "flight"
-    paths = os.pathsep.join(filter(None, [str(SUPPORT), os.environ.get("PYTHONPATH")]))
-    program = [sys.executable, str(SUPPORT / "arducopter_experiment.py")]
     options = ["--axes", "z,x", "--gains", "1.2", "--gains", "x=0.7", "--hold", "4.5"]
-    done = subprocess.run(
-        [*alone(), *program, *options, "--folder", str(folder), "--json"],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=400.0,
-    )
-    if "s old, more than" in done.stderr:
-        pytest.skip("this machine is too busy for a loop in real time")
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+    options += ["--folder", str(folder), "--json"]
+    result = json.loads(told_by("arducopter_experiment.py", *options, timeout=400.0))
     late = [reason for one in result["axes"].values() for reason in one["irregular"]]
     if late:
         pytest.skip(f"this machine is too busy for a loop in real time: {late}")

@@ -1,35 +1,19 @@
 """ArduPilot's Copter itself: a flight, another station that lands it, a station that is killed."""
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
-from arducopter import alone, skip_without_firmware
+from arducopter import told_by
 
 pytestmark = [pytest.mark.survey, pytest.mark.flight]
-
-SESSION = Path(__file__).parents[1] / "support" / "arducopter_session.py"
 
 
 @pytest.fixture(scope="module")
 def session():
-    skip_without_firmware()
-    paths = os.pathsep.join(filter(None, [str(SESSION.parent), os.environ.get("PYTHONPATH")]))
-    done = subprocess.run(
-        [*alone(), sys.executable, str(SESSION)],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=240.0,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(told_by("arducopter_session.py", timeout=240.0).splitlines()[-1])
 
 
 def test_it_takes_off_to_the_height_that_was_asked_for(session):

@@ -2,20 +2,14 @@
 
 import json
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
-from arducopter import alone, skip_without_firmware
+from arducopter import told_by
 
 pytestmark = [pytest.mark.survey, pytest.mark.flight]
-
-SUPPORT = Path(__file__).parents[1] / "support"
 
 #: What the relay adds to the round trip, s.
 ADDED = 0.26
@@ -26,20 +20,8 @@ LOSS, JITTER, SAMPLE, STEPS = 0.05, 0.02, 0.065, 2
 
 @pytest.fixture(scope="module")
 def links(tmp_path_factory):
-    skip_without_firmware()
-    paths = os.pathsep.join(filter(None, [str(SUPPORT), os.environ.get("PYTHONPATH")]))
     folder = tmp_path_factory.mktemp("relay")
-    done = subprocess.run(
-        [*alone(), sys.executable, str(SUPPORT / "arducopter_relay.py"), str(folder)],
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        timeout=560.0,
-    )
-    if "s old, more than" in done.stderr:
-        pytest.skip("this machine is too busy for a loop in real time")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout.splitlines()[-1])
+    found = json.loads(told_by("arducopter_relay.py", str(folder), timeout=560.0).splitlines()[-1])
     if any(reasons := [one["irregular"] for one in found]):
         pytest.skip(f"this machine is too busy for a loop in real time: {reasons}")
     return found

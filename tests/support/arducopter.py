@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,6 +38,24 @@ def skip_without_firmware():
         subprocess.run([*alone(), "true"], check=True, capture_output=True)
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("no network namespace, and the firmware listens on all interfaces")
+
+
+def told_by(program, *options, timeout):
+    """What a program of this folder prints: it flies the firmware, in a network of its own."""
+    skip_without_firmware()
+    here = Path(__file__).parent
+    paths = os.pathsep.join(filter(None, [str(here), os.environ.get("PYTHONPATH")]))
+    done = subprocess.run(
+        [*alone(), sys.executable, str(here / program), *options],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+    )
+    if "s old, more than" in done.stderr:
+        pytest.skip("this machine is too busy for a loop in real time")
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 @contextmanager
