@@ -57,7 +57,7 @@ def recorded(file: Path, columns: Columns) -> Iterator[Row]:
     recording = read_recording(
         file,
         time=columns.time,
-        reference=columns.command,
+        reference=columns.output,  # none is needed
         output=columns.output,
         command=columns.command,
     )
