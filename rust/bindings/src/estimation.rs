@@ -360,9 +360,23 @@ fn read(quantity: &str) -> PyResult<Quantity> {
 /// What moves the output besides the command, in deviations of the white noise.
 #[derive(FromPyObject)]
 pub(crate) struct GivenDisturbance {
-    pub(crate) at_input: bool,
-    pub(crate) time_constant: f64,
-    pub(crate) deviation: f64,
+    at_input: bool,
+    time_constant: f64,
+    deviation: f64,
+}
+
+impl GivenDisturbance {
+    pub(crate) fn disturbance(&self) -> Disturbance {
+        Disturbance {
+            entry: if self.at_input {
+                Entry::Input
+            } else {
+                Entry::Output
+            },
+            time_constant: self.time_constant,
+            deviation: self.deviation,
+        }
+    }
 }
 
 /// Columns, one after the other, whitened by the covariance of their rows: that of disturbances of
@@ -379,15 +393,7 @@ pub(crate) fn whitened_columns<'py>(
     let plant = converted(Plant::new(&num, &den))?;
     let disturbances: Vec<Disturbance> = disturbances
         .iter()
-        .map(|one| Disturbance {
-            entry: if one.at_input {
-                Entry::Input
-            } else {
-                Entry::Output
-            },
-            time_constant: one.time_constant,
-            deviation: one.deviation,
-        })
+        .map(GivenDisturbance::disturbance)
         .collect();
     let (time, columns) = (owned(&time)?, owned(&columns)?);
     let found = run_here(py, |task| {

@@ -1,8 +1,6 @@
 //! Bindings of the estimators that take rows as they come.
 
-use deadtime::estimation::{
-    Answer, Disturbance, Entry, Known, Lags, Online, Plant, Settings, online,
-};
+use deadtime::estimation::{Answer, Known, Lags, Online, Plant, Settings, online};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -56,15 +54,7 @@ impl GivenSettings {
             disturbances: self
                 .disturbances
                 .iter()
-                .map(|one| Disturbance {
-                    entry: if one.at_input {
-                        Entry::Input
-                    } else {
-                        Entry::Output
-                    },
-                    time_constant: one.time_constant,
-                    deviation: one.deviation,
-                })
+                .map(GivenDisturbance::disturbance)
                 .collect(),
             gain: self.gain,
             trim: self.trim,

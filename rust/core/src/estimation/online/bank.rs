@@ -1,18 +1,16 @@
 //! The bank: a Kalman filter for each delay and set of lags, its weights, and a second bank of
 //! delays that the vehicle may have changed to.
 
-use super::super::disturbance::Joint;
-use super::super::kept::Kept;
-use super::super::propagation::{Propagation, Square};
+use super::super::propagation::Propagation;
 use super::answer::Answer;
 use super::cell::{Cell, Column, Look};
+use super::cells::Cells;
 use super::history::{History, Jump};
 use super::judge::{AGES, Judge, Scale};
+use super::layer::Layer;
 use super::posterior::known;
-use super::response::StepResponse;
 use super::row_by_row::Online;
-use super::settings::{Lags, Settings};
-use super::walk::Walk;
+use super::settings::Settings;
 use crate::Error;
 
 /// Deviations of what a level or a state that is not known may be, in those of the white noise.
@@ -37,63 +35,11 @@ const WINDOW: f64 = 30.0;
 /// Weight below which a cell has no say whether a row is an outlier.
 const NO_SAY: f64 = 1e-6;
 
+/// Longest memory of the judge, s.
+const MOST_MEMORY: f64 = 30.0;
+
 /// Changes of the command are looked at for so many lags beyond the longest delay.
 const AFTER_LAGS: f64 = 3.0;
-
-/// One set of lags.
-struct Layer<const N: usize> {
-    a: Square<N>,
-    noise: Square<N>,
-    seen: [f64; N],
-    direct: f64,
-    response: StepResponse<N>,
-    steps: Kept<Propagation<N>>,
-    start: Square<N>,
-    /// Number of plant states.
-    plant: usize,
-    total: f64,
-}
-
-/// Cells by set of lags and delay, and their weights.
-struct Cells<const N: usize> {
-    cells: Vec<Cell<N>>,
-    weights: Vec<f64>,
-    /// Delays by their places among all.
-    places: Vec<usize>,
-    walk: Walk,
-}
-
-impl<const N: usize> Cells<N> {
-    fn new(delays: &[f64], places: Vec<usize>, layers: usize) -> Self {
-        let own: Vec<f64> = places.iter().map(|place| delays[*place]).collect();
-        let none = Cell {
-            mean: [0.0; N],
-            cov: [[0.0; N]; N],
-            slope: [0.0; N],
-        };
-        Self {
-            cells: vec![none; layers * places.len()],
-            weights: vec![0.0; layers * places.len()],
-            walk: Walk::new(&own),
-            places,
-        }
-    }
-
-    fn mix(&mut self, variance: f64, white: f64) {
-        let count = self.places.len();
-        let groups = self.cells.chunks_mut(count);
-        for (cells, weights) in groups.zip(self.weights.chunks_mut(count)) {
-            self.walk.mix(cells, weights, variance, white);
-        }
-    }
-
-    /// Set of lags and place of the delay of each cell.
-    fn indices(&self, delays: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let count = self.places.len();
-        (0..self.cells.len())
-            .map(move |i| (i / count, (i / count) * delays + self.places[i % count]))
-    }
-}
 
 /// A bank of filters of N states; those beyond `Settings::states` stay zero.
 pub(super) struct Bank<const N: usize> {
@@ -522,60 +468,6 @@ impl<const N: usize> Bank<N> {
             highest,
             evidence: self.evidence,
         }
-    }
-}
-
-/// Longest memory of the judge, s.
-const MOST_MEMORY: f64 = 30.0;
-
-impl<const N: usize> Layer<N> {
-    fn new(settings: &Settings, one: &Lags) -> Result<Self, Error> {
-        let space = settings.plant.space(&one.lags, one.zero);
-        let joint = Joint::new(&space, &settings.disturbances)?;
-        let (own, plant) = (joint.c.len(), space.b.len());
-        let embedded = |flat: &[f64]| -> Square<N> {
-            std::array::from_fn(|i| {
-                std::array::from_fn(|j| {
-                    if i < own && j < own {
-                        flat[i * own + j]
-                    } else {
-                        0.0
-                    }
-                })
-            })
-        };
-        let mut a = embedded(&joint.a);
-        let mut b = [0.0; N];
-        let mut seen = [0.0; N];
-        b[..plant].copy_from_slice(&space.b);
-        seen[..own].copy_from_slice(&joint.c);
-        let response = StepResponse::new(a, b);
-        if settings.trim > 0.0 {
-            for i in 0..plant {
-                a[i][own + 1] = b[i];
-            }
-            seen[own + 1] = space.d;
-        }
-        if settings.has_offset() {
-            seen[settings.states() - 1] = 1.0;
-        }
-        let direct = space.d;
-        Ok(Self {
-            noise: embedded(&joint.noise),
-            start: embedded(&joint.start),
-            a,
-            seen,
-            direct,
-            response,
-            steps: Kept::new(),
-            plant,
-            total: one.lags.iter().sum::<f64>() - one.zero + settings.own_lag,
-        })
-    }
-
-    /// The state that holds the level of a plant that integrates.
-    fn integrates(&self, settings: &Settings) -> usize {
-        self.plant - settings.plant.states(0)
     }
 }
 

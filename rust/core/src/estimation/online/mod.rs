@@ -11,9 +11,11 @@
 mod answer;
 mod bank;
 mod cell;
+mod cells;
 mod estimator;
 mod history;
 mod judge;
+mod layer;
 mod posterior;
 mod response;
 mod row_by_row;
