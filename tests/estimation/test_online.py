@@ -165,6 +165,24 @@ def test_short_forms_of_the_survey():
     assert changes(12).in_time > 0.8
 
 
+def test_rows_of_a_long_rest_are_not_kept():
+    # A fit just after its end, whose rows do not tell the gain, once raised a ValueError.
+    random, rest, count = np.random.default_rng(2), 1500, 2420
+    reference = references(1, count, random)
+    reference[:, :rest] = 0.0
+    runs = fly(VEHICLE, np.full((1, count), 0.3), reference, random)
+    command = np.where(np.arange(count) < rest, 0.0, runs.command[0])
+    estimator = OnlineEstimator(LOOP)
+    rows = zip(runs.time, runs.output[0], command, strict=True)
+    for row, (time, output, sent) in enumerate(rows):
+        found = estimator.update(float(time), output, sent)
+        if row < rest:
+            assert not found.known
+            assert len(estimator._rows) < 45.0 / SAMPLE
+    assert found.adequate
+    assert found.ci[0] < 0.3 < found.ci[1]
+
+
 def test_what_is_wrong_is_said():
     with pytest.raises(ValueError, match="give times of at least zero"):
         OnlineEstimator(LOOP, delays=(-0.1, 0.5))

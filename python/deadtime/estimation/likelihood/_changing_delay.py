@@ -83,8 +83,13 @@ def delay_change(fit: NoiseFit, run: int) -> DelayChange:
         calm = fit.moved(fit.likelihood.fit(with_noise(fit.with_gain, quiet), ROUGH, noise=False))
         beside = fit
         for start in (calm, None):
-            _, further = _scored(start or beside, run)
-            beside = _later(beside, run, further, (fit.numbers.noise, quiet))
+            one = start or beside
+            if not math.isfinite(one.gain):  # the rows do not tell it there
+                continue
+            later = _later(beside, run, _scored(one, run)[1], (fit.numbers.noise, quiet))
+            if not math.isfinite(later.gain):
+                continue
+            beside = later
             rise = fit.numbers.objective - beside.numbers.objective
             if rise > CLEARLY and beside.numbers.noise[run].air == 0.0:
                 rise = math.inf

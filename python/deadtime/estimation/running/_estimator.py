@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.errors import NotIdentifiableError, RecordingError
+from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, positive
 from deadtime._deadtime import OnlineBank
 from deadtime.estimation._estimate import estimate_delay
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 Row = tuple[float, float | None, float | None]
 
 #: First rows from which the noise is learned: from so many seconds, again after as many, and for
-#: the last time after so many.
+#: the last time after so many. Where they tell nothing, no more than these are kept.
 LEARN, LAST = 10.0, 30.0
 
 #: Fewest rows that the noise is learned from.
@@ -173,7 +173,7 @@ class OnlineEstimator:
         self._noise: FlightNoise | None = None
         self._rows: list[tuple[float, float | None]] = []
         self._commands: list[tuple[float, float]] = []
-        self._next_fit = LEARN
+        self._next_fit = math.inf
         self._reason = "the noise is being learned"
         # The settings are checked now, not with the first row.
         checked = self._settings(FlightNoise(white=1.0))
@@ -331,24 +331,33 @@ class OnlineEstimator:
             raise ValueError(
                 f"the time {time} s follows {self._rows[-1][0]} s: give increasing times"
             )
+        if not self._rows:
+            self._next_fit = time + LEARN
         self._rows.append((time, None if output is None else finite("output", output)))
         if command is not None:
             self.command(time, command)
         sets = lag_sets(self._model, self._lags)
         totals = [sum(one) - self._model.zero + self._model.own_lag for one in sets]
         lags = (min(totals), max(totals))
-        span = time - self._rows[0][0]
-        if span >= self._next_fit and len(self._rows) >= FEWEST:
-            self._next_fit += LEARN
+        if time >= self._next_fit and len(self._rows) >= FEWEST:
+            self._next_fit = time + LEARN
             try:
                 fit = self._fit()
-            except (NotIdentifiableError, RecordingError) as error:
+            except DeadtimeError as error:
                 self._reason = str(error)
+                if not self._options["at_rest"]:
+                    self._forget(time - LAST)
             else:
-                if fit.adequate or span >= LAST:
+                if fit.adequate or time - self._rows[0][0] >= LAST:
                     return self._replay(fit)
                 self._reason = fit.message
         return not_yet(time, self.delays, lags, self._gain, self._reason)
+
+    def _forget(self, time: float) -> None:
+        """Forget what was before `time`, but for the command that held then."""
+        self._rows = [row for row in self._rows if row[0] >= time]
+        held = sum(one[0] < time for one in self._commands)
+        self._commands = self._commands[max(held - 1, 0) :]
 
     def _fit(self) -> DelayEstimate:
         """The batch estimate of the rows so far."""
