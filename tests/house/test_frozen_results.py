@@ -58,6 +58,7 @@ def logged():
 
 
 def adapted():
+    pytest.importorskip("clarabel", reason="the form of a proof is searched with clarabel")
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), sample_time=0.1)
     return dtm.tuning.adaptive_gains(loop, (0.0, 0.2), sets=2)
 
