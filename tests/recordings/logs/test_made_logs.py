@@ -175,6 +175,29 @@ def test_text_logs_say_the_same_as_binary_ones(opened):
     assert np.array_equal(again.loops["roll"].setpoint.values, text.loops["roll"].setpoint.values)
 
 
+@pytest.mark.parametrize(
+    ("name", "columns", "disarmed"), [("ARM", "ArmState", 0), ("EV", "Id", 11)]
+)
+def test_a_log_that_was_begun_in_the_air_was_armed_before_it_was_disarmed(
+    opened, name, columns, disarmed
+):
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        "FMT, 5, 19, ATT, Qcccc, TimeUS,DesRoll,Roll,DesPitch,Pitch",
+        "FMT, 1, 75, MSG, QZ, TimeUS,Message",
+        f"FMT, 4, 12, {name}, QB, TimeUS,{columns}",
+        "MSG, 0, ArduCopter V4.5.7 (01234567)",
+    ]
+    for k in range(200):
+        asked, came = 10 * (k % 50 < 25), 10 * ((k - 3) % 50 < 25)
+        lines.append(f"ATT, {10_000 + 20_000 * k}, {asked}, {came}, 1.0, 1.00")
+        if k == 149:
+            lines.append(f"{name}, {10_000 + 20_000 * k}, {disarmed}")
+    loop = opened(as_text(lines)).loops["roll"]
+    assert np.array(loop.segments) == pytest.approx(np.array([(0.01, 2.99)]))
+    assert loop.why_left_out == ("1 s are left out: the vehicle is disarmed",)
+
+
 def flying(rows=400, period=0.02):
     """A ULog of a vehicle in the air, in position control."""
     log = ULogFile()

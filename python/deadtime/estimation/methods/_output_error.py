@@ -170,8 +170,8 @@ def estimate_from_commands(
     if all(one is run for one, run in zip(regular, runs, strict=True)):
         return stamped
     even = _estimated(method, regular, free, assumed)
-    better = _criterion(stamped) - _criterion(even)
-    if not better > CLEARLY:
+    # Each has as many numbers, and neither is more usual.
+    if not _criterion(even) < _criterion(stamped):
         return stamped
     text = "the rows are taken as evenly spaced, which is likelier than the times of their stamps"
     return replace(

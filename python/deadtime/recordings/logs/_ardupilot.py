@@ -5,20 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from deadtime.recordings.logs._ardupilot_modes import HORIZONTAL, UNCONTROLLED, VERTICAL
-from deadtime.recordings.logs._conditions import first_told, in_modes, not_in_modes, state
+from deadtime.recordings.logs._conditions import in_modes, not_in_modes, state
 from deadtime.recordings.logs._contents import LogContents
 from deadtime.recordings.logs._names import AutopilotNames, Condition, LoopNames, Signal
 from deadtime.recordings.logs._rotations import unwrapped
 
 DEGREE = np.pi / 180.0
 
-ARMED = Condition(
-    first_told(
-        state("ARM", "ArmState", lambda values: values > 0),
-        state("armed", "state", lambda values: values > 0),
-    ),
-    "the vehicle is disarmed",
-)
+ARMED = Condition(state("armed", "state", lambda values: values > 0), "the vehicle is disarmed")
 IN_THE_AIR = Condition(
     state("landed", "state", lambda values: values == 0), "the vehicle is on the ground"
 )

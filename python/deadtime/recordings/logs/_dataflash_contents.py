@@ -6,9 +6,10 @@ import re
 from collections import ChainMap
 
 import numpy as np
+from numpy.typing import NDArray
 
 from deadtime.recordings.logs._ardupilot_modes import COPTER, PLANE, ROVER
-from deadtime.recordings.logs._contents import LogContents, Topic
+from deadtime.recordings.logs._contents import Array, LogContents, Topic
 from deadtime.recordings.logs._dataflash_messages import Messages
 
 #: Numbers of events.
@@ -64,18 +65,24 @@ def _modes(messages: Messages, vehicle: str) -> tuple[tuple[float, str], ...]:
 
 
 def _events(messages: Messages) -> dict[str, Topic]:
-    """Topics "armed" and "landed" from the numbered events, if there are such events."""
-    topic = messages.get("EV")
-    if topic is None or "Id" not in topic.columns:
-        return {}
-    number = topic.columns["Id"]
+    """Topics "armed" and "landed" from the messages that tell their changes, if there are any."""
     found = {}
-    for name, on, off in (("armed", ARMED, DISARMED), ("landed", LANDED, FLYING)):
-        rows = ((number == on) | (number == off)) & np.isfinite(topic.time)
-        if rows.any():
-            state = (number[rows] == on).astype(float)
-            time = topic.time[rows]
-            # Before the first event the state was the other one.
-            time = np.concatenate(([np.nextafter(time[0], -np.inf)], time))
-            found[name] = Topic(time, {"state": np.concatenate(([1.0 - state[0]], state))})
-    return found
+    arming, events = messages.get("ARM"), messages.get("EV")
+    if events is not None and "Id" in events.columns:
+        number = events.columns["Id"]
+        for name, on, off in (("armed", ARMED, DISARMED), ("landed", LANDED, FLYING)):
+            rows = (number == on) | (number == off)
+            found[name] = _changes(events.time[rows], number[rows] == on)
+    if arming is not None and "ArmState" in arming.columns:
+        found["armed"] = _changes(arming.time, arming.columns["ArmState"] > 0)
+    return {name: topic for name, topic in found.items() if topic.time.size}
+
+
+def _changes(time: Array, state: NDArray[np.bool_]) -> Topic:
+    """A state that is logged when it changes: before the first row it was the other one."""
+    rows = np.isfinite(time)
+    time, state = time[rows], state[rows]
+    if time.size:
+        time = np.concatenate(([np.nextafter(time[0], -np.inf)], time))
+        state = np.concatenate(([not state[0]], state))
+    return Topic(time, {"state": state.astype(float)})
