@@ -82,14 +82,28 @@ where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
+    let mut result = None;
+    let place = &mut result;
+    let job = move || *place = Some(catch_unwind(AssertUnwindSafe(|| work(task))));
+    let interrupted = wait_for(pool, task, progress, Box::new(job));
+    (result, interrupted)
+}
+
+/// Run a job in the pool; the exception that stopped it, if one did.
+fn wait_for<'a>(
+    pool: &Arc<Pool>,
+    task: &Task,
+    progress: Option<&Py<PyAny>>,
+    work: Box<dyn FnOnce() + Send + 'a>,
+) -> Option<PyErr> {
     let (sender, receiver) = channel();
-    let job: Box<dyn FnOnce() + Send + '_> = Box::new(move || {
-        let result = catch_unwind(AssertUnwindSafe(|| work(task)));
-        // The receiver outlives this job: the caller waits below until it has the result.
-        let _ = sender.send(result);
+    let job: Box<dyn FnOnce() + Send + 'a> = Box::new(move || {
+        work();
+        // The receiver outlives this job: the caller waits below until it is told.
+        let _ = sender.send(());
     });
     // SAFETY: only the lifetime of the borrowed values changes. `Waiting` keeps the caller here
-    // until the job has sent its result, after which the job uses no borrowed value. A scope of
+    // until the job has said that it is done, after which the job uses no borrowed value. A scope of
     // rayon would do the same, but it cannot be left in a forked child, in which the job never
     // ends: its thread does not exist there, so it uses no borrowed value there either.
     #[allow(unsafe_code)]
@@ -103,8 +117,7 @@ where
     let mut interrupted = None;
     loop {
         match waiting.poll() {
-            Ok(result) => return (Some(result), interrupted),
-            Err(RecvTimeoutError::Disconnected) => return (None, interrupted),
+            Ok(()) | Err(RecvTimeoutError::Disconnected) => return interrupted,
             Err(RecvTimeoutError::Timeout) if interrupted.is_none() => {
                 task.look_at_memory();
                 if let Err(error) = attached(|py| poll_python(py, task, progress)) {
@@ -114,7 +127,7 @@ where
                 if waiting.is_in_forked_child() {
                     // The pool has no threads in this process that could be joined: forget it.
                     std::mem::forget(Arc::clone(pool));
-                    return (None, interrupted.or_else(|| Some(fork_error())));
+                    return interrupted.or_else(|| Some(fork_error()));
                 }
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -123,15 +136,15 @@ where
 }
 
 /// Waits for a job to end when it is dropped, except in a forked child.
-struct Waiting<T> {
-    receiver: Receiver<Finished<T>>,
+struct Waiting {
+    receiver: Receiver<()>,
     process: u32,
     is_finished: bool,
 }
 
-impl<T> Waiting<T> {
-    /// The result, if it is received within `POLL`.
-    fn poll(&mut self) -> Result<Finished<T>, RecvTimeoutError> {
+impl Waiting {
+    /// Whether the job is done, within `POLL`.
+    fn poll(&mut self) -> Result<(), RecvTimeoutError> {
         let received = self.receiver.recv_timeout(POLL);
         self.is_finished = !matches!(received, Err(RecvTimeoutError::Timeout));
         received
@@ -142,10 +155,10 @@ impl<T> Waiting<T> {
     }
 }
 
-impl<T> Drop for Waiting<T> {
+impl Drop for Waiting {
     fn drop(&mut self) {
         if !self.is_finished && !self.is_in_forked_child() {
-            // Either the result, or an error because the job no longer exists.
+            // Either it is done, or there is an error because the job no longer exists.
             let _ = self.receiver.recv();
         }
     }
