@@ -1,5 +1,6 @@
 """The experiment over MAVLink, with the stand-in in virtual time and a relay in between."""
 
+import math
 from contextlib import asynccontextmanager
 
 import pytest
@@ -11,6 +12,7 @@ from deadtime.flights import FlightPlan, fly_experiment
 from deadtime.links import Limits, run
 from deadtime.links.mavlink import MAVLinkVehicle
 from deadtime.links.udp import Network, RelayOptions
+from deadtime.links.udp.delays import Normal
 from deadtime.links.udp.relay import Relay
 from stand_in_autopilot import GROUND, LAG, StandIn
 
@@ -22,13 +24,13 @@ PLAN = FlightPlan(
 )
 
 
-def flown(folder, one_way, firmware="ardupilot"):
+def flown(folder, one_way, firmware="ardupilot", loss=0.0):
     """The study, and what TIMESYNC said during the flights."""
     trips = []
 
     @asynccontextmanager
     async def connect():
-        path = Network(delay=one_way)
+        path = Network(delay=one_way, loss=loss)
         async with (
             Relay(RelayOptions(GROUND, path, path)) as relay,
             StandIn(firmware, ground=relay.address, noise=0.003),
@@ -58,6 +60,19 @@ def test_what_the_relay_adds_is_what_the_estimate_rises_by(tmp_path, firmware):
     # Whether the fit is adequate is not asked: rows with messages of different ages may show.
     for study in (near, far):
         assert study.learned.fit.gain == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.survey
+def test_with_jitter_and_losses_the_estimate_is_the_mean(tmp_path):
+    near, _ = flown(tmp_path / "near", 0.0)
+    rough, _ = flown(tmp_path / "rough", Normal(0.13, 0.02), loss=0.05)
+    ends = [study.learned.fit.ci(0.95, "delay+lag") for study in (near, rough)]
+    totals = [study.learned.fit.delay_plus_lag for study in (near, rough)]
+    lost = 0.05 * PLAN.sample_time
+    half = math.hypot(*[0.5 * (high - low) for low, high in ends])
+    assert 0.005 < half < 0.03
+    assert totals[1] - totals[0] == pytest.approx(0.26 + lost, abs=half + SPACING)
+    assert all(one.effects.error > 0.0 for one in rough.learned.flights)
 
 
 def test_another_computer_needs_consent(tmp_path):

@@ -14,6 +14,7 @@ from pathlib import Path
 import deadtime as dtm
 from arducopter import firmware
 from deadtime.flights import FlightPlan
+from deadtime.flights._arrivals import error_of_mean
 from deadtime.flights._fly import PlannedFlight, fly_all
 from deadtime.flights._runs import read_telemetry
 from deadtime.flights._split import split_delay
@@ -84,6 +85,7 @@ def told(flight, link_time, shaping):
         free=("delay", "gain", "lag"),
         window=(0.5 * flight.settle, None),
     )
+    fit = fit.with_error_beside(error_of_mean([flight.effects]))
     try:
         echo = split_delay([read_telemetry(flight)]).transport.delay
     except dtm.NotIdentifiableError:  # echoes that come as irregularly as messages
@@ -97,6 +99,7 @@ def told(flight, link_time, shaping):
         "least": link_time.least,
         "mean": link_time.mean,
         "age": flight.age,
+        "error_of_times": flight.effects.error,
         "irregular": flight.irregular,
         "rows": [len(flight.recording), len(flight.measured)],
         "misfit": flight.clock.misfit,

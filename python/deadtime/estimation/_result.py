@@ -14,7 +14,7 @@ from deadtime._base.digits import between, stated
 from deadtime._base.drawing import empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
-from deadtime._base.validation import real_array
+from deadtime._base.validation import non_negative, real_array
 from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
@@ -140,6 +140,7 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
     others: tuple[FittedRun, ...] = ()
     noise: FlightNoise | None = None
     _profile: Profile | LikelihoodProfile | None = None
+    _beside: float = 0.0
 
     @property
     def runs(self) -> tuple[FittedRun, ...]:
@@ -222,9 +223,14 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             raise ValueError(
                 f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
             )
-        value = self._value(name)
+        value, beside = self._value(name), self._added(name)
         if self._profile is not None and self._profile.preferred:
-            return self._profile.interval(name, value, self._reach(name), level)
+            low, high = self._profile.interval(name, value, self._reach(name), level)
+            if not beside:
+                return low, high
+            reach = beside * float(special.ndtri(0.5 + level / 2))
+            low = value - math.hypot(value - low, reach)
+            return max(low, floor_of(name)), value + math.hypot(high - value, reach)
         freedom = max(1, sum(one.residuals.size for one in self.runs) - len(self.free))
         reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
         low = value - reach
@@ -294,8 +300,12 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             low = max(middle - reach, floor_of(name))
             values = np.linspace(low, middle + reach, 41)
         held = np.atleast_1d(real_array("values", values))
-        found = [self._profile.statistic(name, float(value)) for value in held]
-        return held, np.sqrt(np.array(found))
+        found = np.sqrt([self._profile.statistic(name, float(value)) for value in held])
+        away, beside = held - self._value(name), self._added(name)
+        if beside:
+            # Of a parabola: its standard error away/t and this one in quadrature.
+            found *= np.abs(away) / np.maximum(np.hypot(away, beside * found), 1e-300)
+        return held, found
 
     def _value(self, name: str) -> float:
         """The fitted value of a quantity."""
@@ -303,6 +313,31 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             return self.delay_plus_lag
         known = {**self.loop.parameters, **self.details}
         return float(sum(known.get(part, 0.0) for part in name.split("+")))
+
+    def with_error_beside(self, error: float) -> DelayEstimate:
+        """The estimate where the delay has a further error that the fit does not know.
+
+        Parameters
+        ----------
+        error : float
+            Its standard deviation, s. It is independent of that of the fit, whose intervals are
+            widened by it in quadrature.
+        """
+        square = non_negative("error", error) ** 2
+        if "delay" not in self.free or not square:
+            return self
+        stderr = {
+            name: math.sqrt(one**2 + square) if holds_delay(name) else one
+            for name, one in self.stderr.items()
+        }
+        cov, place = self.cov.copy(), self.free.index("delay")
+        cov[place, place] += square
+        beside = math.hypot(self._beside, error)
+        return replace(self, stderr=stderr, cov=cov, _beside=beside)
+
+    def _added(self, name: str) -> float:
+        """The error of a quantity that the fit does not know."""
+        return self._beside if holds_delay(name) else 0.0
 
     def _reach(self, name: str) -> float:
         """About one standard error; for a quantity at its bound, the largest of the other times."""
@@ -417,6 +452,11 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             f"<DelayEstimate {self.method}: delay {stated(self.delay, error, 's')}, "
             f"adequate: {self.adequate}>"
         )
+
+
+def holds_delay(name: str) -> bool:
+    """Whether a quantity is the delay, or a sum with it."""
+    return "delay" in name.split("+")
 
 
 def _plain(noise: FlightNoise) -> dict[str, float | None]:

@@ -25,7 +25,7 @@ from deadtime.flights._study import FlightStudy
 from deadtime.links.axes import AxisReader
 from deadtime.links.clock import now
 from deadtime.links.journal import Journal
-from deadtime.links.vehicle import Vehicle, VehicleState
+from deadtime.links.vehicle import Echo, Vehicle, VehicleState
 from deadtime.loops import PV, P
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from deadtime.recordings import read_recording
@@ -52,6 +52,14 @@ class PassesMessages(Protocol):
 
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
         """Register `listener` for every message; None removes it."""
+
+
+@runtime_checkable
+class PassesEchoes(Protocol):
+    """A vehicle that passes on every echo of a command, in messages of their own."""
+
+    def listen_to_echoes(self, listener: Callable[[Echo], None] | None) -> None:
+        """Register `listener` for every echo; None removes it."""
 
 
 @runtime_checkable
@@ -253,7 +261,7 @@ async def _fly_one(
     messages = None
     if isinstance(vehicle, PassesMessages):
         messages = path.with_suffix(".messages.csv")
-        columns = ("time_s", "vehicle_time_s", "sequence", *axis.columns)
+        columns = ("time_s", "vehicle_time_s", "setpoint_time_s", "sequence", *axis.columns)
         saved = journals.enter_context(Journal(messages, columns))
         _keep_messages(vehicle, AxisReader(axis, origin), saved, begin)
     try:
@@ -262,16 +270,26 @@ async def _fly_one(
     finally:
         if isinstance(vehicle, PassesMessages):
             vehicle.listen(None)
+        if isinstance(vehicle, PassesEchoes):
+            vehicle.listen_to_echoes(None)
     return messages
 
 
 def _keep_messages(
     vehicle: PassesMessages, reader: AxisReader, journal: Journal, begin: float
 ) -> None:
-    """Save every further message."""
+    """Save every further message, and the echoes of commands with the times of their stamps."""
+    apart = isinstance(vehicle, PassesEchoes)
 
     def save(state: VehicleState) -> None:
         axis = reader.output(state), reader.rate(state), reader.setpoint(state)
-        journal.write((state.time - begin, state.vehicle_time, state.sequence, *axis))
+        stamps = state.vehicle_time, None if apart else state.vehicle_time
+        journal.write((state.time - begin, *stamps, state.sequence, *axis))
+
+    def save_echo(echo: Echo) -> None:
+        setpoint = getattr(echo, reader.axis.command, None)
+        journal.write((echo.time - begin, None, echo.vehicle_time, None, None, None, setpoint))
 
     vehicle.listen(save)
+    if isinstance(vehicle, PassesEchoes):
+        vehicle.listen_to_echoes(save_echo)

@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.flights._arrivals import error_of_mean
 from deadtime.flights._runs import FlownSteps
 from deadtime.links.axes import Axis
 from deadtime.loops import (
@@ -111,6 +112,7 @@ def fit_by_evidence(
         If no plant has an estimate; the message is that of the first.
     """
     tried: list[TriedPlant] = []
+    left_open = error_of_mean([one.effects for one in flights if one.effects is not None])
     for words, plant, free in candidates(flights[0].axis, shaping):
         if tried:
             progress(f"trying {words}")
@@ -131,6 +133,7 @@ def fit_by_evidence(
         except NotIdentifiableError as error:
             tried.append(TriedPlant(words, None, str(error)))
             continue
+        fit = fit.with_error_beside(left_open)
         tried.append(TriedPlant(words, fit))
         if fit.adequate:
             break

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime.flights._arrivals import Effects, as_they_took_effect
 from deadtime.flights._clock import VehicleClock
 from deadtime.links.axes import AXES, Axis
 from deadtime.loops import PV, P
@@ -130,29 +131,45 @@ class FlownSteps:
 
     @cached_property
     def measured(self) -> Recording:
-        """The outputs at the times at which they were measured, and the commands when sent.
+        """The outputs when they were measured, and the commands as they took effect.
 
-        Times are those of the vehicle's clock plus the mean age of the rows (see `_clock`). Where
-        there is no such clock, it is `recording`.
+        Times of outputs are those of the vehicle's clock plus the mean age of the rows (see
+        `_clock`). Where there is no such clock, it is `recording`. Commands are counted from when
+        they were sent, and on a link that scatters from when they would have been sent on one of
+        constant delay, where the vehicle reports which it follows (see `_arrivals`).
         """
-        clock, rows = self.clock, self.recording
-        if clock is None or rows.command is None:
+        clock, rows, sent = self.clock, self.recording, self.effects
+        if clock is None or sent is None:
             return rows
         time, stamp = read_columns(self.path, ("time_s", "vehicle_time_s"))
-        if time.size != len(rows):
-            return rows
         seen = clock.time(stamp)
         seen += np.mean(time - seen)
         # A message that was the newest for several samples counts once.
-        kept = np.append(True, np.diff(seen) > 0.0) & (seen >= time[0])
+        kept = np.append(True, np.diff(seen) > 0.0) & (seen >= sent.time[0])
         return Recording(
             seen[kept],
             rows.reference[kept],
             rows.output[kept],
             units=dict(rows.units),
             source=rows.source,
-            sent=(time, rows.command),
+            sent=(sent.time, sent.values),
         )
+
+    @cached_property
+    def effects(self) -> Effects | None:
+        """The commands as they took effect; None where the outputs have no times of their own."""
+        rows, clock = self.recording, self.clock
+        if clock is None or rows.command is None or self.telemetry is None:
+            return None
+        (time, _) = read_columns(self.path, ("time_s", "vehicle_time_s"))
+        if time.size != len(rows):
+            return None
+        arrival, stamp = read_columns(self.telemetry, ("time_s", "vehicle_time_s"))
+        # Without echoes the way there is taken to scatter as the way back.
+        sent = Effects(time, rows.command, float(np.std(arrival - clock.time(stamp))))
+        names = ("setpoint_time_s", self.axis.columns[2])
+        stamp, setpoint = read_columns(self.telemetry, names)
+        return as_they_took_effect(sent, clock.time(stamp), setpoint)
 
     @property
     def age(self) -> float | None:

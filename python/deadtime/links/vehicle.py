@@ -16,6 +16,26 @@ class Motion(NamedTuple):
     turn: float | None = None
 
 
+class Echo(NamedTuple):
+    """What a vehicle says that it follows.
+
+    Attributes
+    ----------
+    time : float
+        Arrival of the message, s of `deadtime.links.now`.
+    vehicle_time : float
+        Clock of the vehicle at the message, s.
+    north, east, up : float or None
+        The speeds that it follows, m/s.
+    """
+
+    time: float
+    vehicle_time: float
+    north: float | None
+    east: float | None
+    up: float | None
+
+
 @dataclass(frozen=True)
 class VehicleState:
     """The state of a vehicle from one of its messages.

@@ -21,8 +21,9 @@ SAMPLES = 20.0
 #: Largest relative difference of two clocks, and those above which it is a warning or refused.
 CLOCKS, CLOCK_WARNING, CLOCK_REFUSED = 0.05, 1e-3, 5e-3
 
-#: Share of changes of the command that may come sooner than a sample time after the last one.
-HASTE = 0.2
+#: Share of changes of the command that may come sooner than a sample time after the last one, and
+#: where each has a time of its own, as when a link that scatters has moved it.
+HASTE, HASTE_SENT = 0.2, 0.5
 
 #: A continuous loop whose rows are so many times 1/(Kp gain) apart shows no response between them,
 #: and one that lasts less than this many of them has none.
@@ -150,7 +151,7 @@ def _other_spacing(
     """Rows that are neither at the samples nor at every so many of them."""
     if columns.sent is not None:
         soon = _hasty(columns.sent, sample_time)
-        if soon > HASTE:
+        if soon > HASTE_SENT:
             told = f"commands have times of their own, and sample_time is {seconds(sample_time)}"
             yield _no_such_hold(told, soon, sample_time)
         return

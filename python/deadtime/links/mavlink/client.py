@@ -20,12 +20,12 @@ from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
 from deadtime.links.mavlink.set_points import CYCLE, HOVER, SetPoints, within
-from deadtime.links.mavlink.states import ON_GROUND, StateReader
+from deadtime.links.mavlink.states import ON_GROUND, StateReader, echo_of
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_for_messages
 from deadtime.links.mavlink.time_sync import LinkTime
 from deadtime.links.safety import Limits
 from deadtime.links.uninterrupted import note, uninterrupted
-from deadtime.links.vehicle import Motion, VehicleState
+from deadtime.links.vehicle import Echo, Motion, VehicleState
 
 #: Longest wait for the first heartbeat, s.
 FIRST_HEARTBEAT = 10.0
@@ -111,6 +111,7 @@ commanding it
         self._ids = system, component
         self._vehicle, self._key, self._simulated = vehicle, key, simulated
         self._listener: Callable[[VehicleState], None] | None = None
+        self._echo_listener: Callable[[Echo], None] | None = None
         self._parameters: Parameters | None = None
         self._autopilot: Autopilot | None = None
         self._cycle: asyncio.Task[None] | None = None
@@ -220,18 +221,24 @@ commanding it
         """
         self._listener = listener
 
+    def listen_to_echoes(self, listener: Callable[[Echo], None] | None) -> None:
+        """Register `listener` for every echo of a set point, as `listen` for states."""
+        self._echo_listener = listener
+
     def _take(self, message: Any, time: float) -> None:
         state = self._reader.take(message, time)
         if message.get_type() == "HEARTBEAT" and self._autopilot is not None:
             self._authority.heard(self._reader, self._autopilot, self._link, time)
             if self._authority.lost is not None:
                 self._set_points.give_up(self._authority.lost)
-        if state is not None and self._listener is not None:
-            try:
+        try:
+            if state is not None and self._listener is not None:
                 self._listener(state)
-            except Exception:
-                self._listener = None
-                raise
+            if message.get_type() == "POSITION_TARGET_LOCAL_NED" and self._echo_listener:
+                self._echo_listener(echo_of(message, time))
+        except Exception:
+            self._listener = self._echo_listener = None
+            raise
 
     async def parameter(self, name: str) -> float:
         """The value of a parameter of the vehicle.

@@ -7,7 +7,7 @@ from collections import deque
 from typing import Any
 
 from deadtime.links.mavlink.codec import dialect
-from deadtime.links.vehicle import VehicleState
+from deadtime.links.vehicle import Echo, VehicleState
 
 #: MAV_LANDED_STATE.
 UNKNOWN, ON_GROUND, IN_AIR = 0, 1, 2
@@ -17,6 +17,9 @@ ESTIMATED, CONSTANT = 16 | 32, 128
 
 #: Time over which lost frames are looked at, s.
 RECENT = 1.0
+
+#: A clock that is set back by more than this, s, has begun anew.
+RESTARTED = 5.0
 
 #: Longest time over which a heading is continued by its rate, s.
 OLDEST = 0.1
@@ -39,6 +42,8 @@ class StateReader:
     armed : bool or None
     landed_state : int
         MAV_LANDED_STATE.
+    echo : Echo or None
+        The newest echo of the commands.
     ready : bool
         Whether it knows its position.
     """
@@ -54,7 +59,7 @@ class StateReader:
         self._status = 0
         self._battery: float | None = None
         self._attitude: Any = None
-        self._setpoint: dict[str, float | None] = {}
+        self.echo: Echo | None = None
         self._frames = 0
         self._sequence: int | None = None
         self._gaps: deque[tuple[float, int]] = deque()
@@ -74,17 +79,19 @@ class StateReader:
             left = int(message.battery_remaining)
             self._battery = None if left < 0 else float(left)
         elif kind == "POSITION_TARGET_LOCAL_NED":
-            self._setpoint = {
-                "climb_setpoint": _finite(-message.vz),
-                "north_setpoint": _finite(message.vx),
-                "east_setpoint": _finite(message.vy),
-            }
+            self._take_echo(echo_of(message, time))
         elif kind == self.estimator:
             flags = int(message.flags)
             self.ready = flags & ESTIMATED == ESTIMATED and not flags & CONSTANT
         elif kind == "LOCAL_POSITION_NED":
             return self._complete(message, time)
         return None
+
+    def _take_echo(self, echo: Echo) -> None:
+        """Take an echo, unless a newer one has overtaken it."""
+        before = -math.inf if self.echo is None else self.echo.vehicle_time
+        if not before - RESTARTED < echo.vehicle_time < before:
+            self.echo = echo
 
     def _count(self, sequence: int, time: float) -> None:
         """Count frames and gaps; an old frame that comes late is none."""
@@ -101,7 +108,7 @@ class StateReader:
     def _complete(self, message: Any, time: float) -> VehicleState | None:
         stamp = 1e-3 * message.time_boot_ms
         before = self.newest
-        restarted = before is not None and stamp < (before.vehicle_time or 0.0) - 5.0
+        restarted = before is not None and stamp < (before.vehicle_time or 0.0) - RESTARTED
         if self.armed is None or self.landed_state == UNKNOWN:
             return None
         if before is not None and stamp <= (before.vehicle_time or 0.0) and not restarted:
@@ -125,7 +132,9 @@ class StateReader:
             east=float(message.y),
             north_speed=float(message.vx),
             east_speed=float(message.vy),
-            **self._setpoint,
+            climb_setpoint=None if self.echo is None else self.echo.up,
+            north_setpoint=None if self.echo is None else self.echo.north,
+            east_setpoint=None if self.echo is None else self.echo.east,
             battery=self._battery,
             emergency=self._emergency,
             fault="a failsafe of its own is active" if self._status == CRITICAL else None,
@@ -144,6 +153,12 @@ def _heading(attitude: Any, stamp: float) -> float:
     passed = stamp - 1e-3 * attitude.time_boot_ms
     turned = float(attitude.yaw) + float(attitude.yawspeed) * min(max(passed, 0.0), OLDEST)
     return math.remainder(turned, 2.0 * math.pi)
+
+
+def echo_of(message: Any, time: float) -> Echo:
+    """What a POSITION_TARGET_LOCAL_NED that arrived at a time, s, says."""
+    speeds = (_finite(one) for one in (message.vx, message.vy, -message.vz))
+    return Echo(time, 1e-3 * message.time_boot_ms, *speeds)
 
 
 def _finite(value: float) -> float | None:
