@@ -5,6 +5,7 @@ and obeys its own failsafes; nothing of the link under test is used.
 """
 
 import asyncio
+import os
 import random
 import struct
 
@@ -45,7 +46,9 @@ STEP, LAG = 0.01, 0.2
 class StandIn:
     """One vehicle; ``async with StandIn() as vehicle``.
 
-    `drop` decides on each message that comes in or goes out whether it is lost.
+    `drop` decides on each message that comes in or goes out whether it is lost. It sends to all
+    `grounds` but those that are `cut`, as a router does; `came` has the ground and the type of each
+    message. With `serial`, it is at the other end of this pseudo-terminal.
     """
 
     def __init__(
@@ -57,8 +60,12 @@ class StandIn:
         armed=False,
         noise=0.0,
         tcp=None,
+        serial=None,
+        grounds=(),
     ):
-        self.firmware, self.ground, self.tcp = firmware, ground, tcp
+        self.firmware, self.tcp, self.serial = firmware, tcp, serial
+        self.ground, self.grounds = ground, grounds or (ground,)
+        self.cut, self.came = set(), []
         self.server, self.stream = None, None
         self.guided, self.landing, self.other = MODES[firmware]
         self.mode, self.armed = self.other, armed
@@ -85,7 +92,9 @@ class StandIn:
     async def __aenter__(self):
         self._loop = asyncio.get_running_loop()
         self._begin = self._loop.time() - 20.0
-        if self.tcp is None:
+        if self.serial is not None:
+            self._loop.add_reader(self.serial, lambda: self.receive(os.read(self.serial, 4096)))
+        elif self.tcp is None:
             self._transport, _ = await self._loop.create_datagram_endpoint(
                 lambda: _Receiver(self), local_addr=("127.0.0.1", 0)
             )
@@ -96,7 +105,10 @@ class StandIn:
 
     async def __aexit__(self, *_):
         self._task.cancel()
-        (self.server or self._transport).close()
+        if self.serial is not None:
+            self._loop.remove_reader(self.serial)
+        else:
+            (self.server or self._transport).close()
 
     @property
     def time(self):
@@ -109,8 +121,11 @@ class StandIn:
     def send(self, message):
         if not self.drop(message):
             data = message.pack(self._mav)
-            if self.server is None:
-                self._transport.sendto(data, self.ground)
+            if self.serial is not None:
+                os.write(self.serial, data)
+            elif self.server is None:
+                for ground in set(self.grounds) - self.cut:
+                    self._transport.sendto(data, ground)
             elif self.stream is not None:
                 self.stream.write(data[:9])  # streams have no borders of frames
                 self.stream.write(data[9:])
@@ -208,8 +223,11 @@ class StandIn:
             else:
                 self.send(d.MAVLink_estimator_status_message(0, flags, *nothing))
 
-    def receive(self, data):
+    def receive(self, data, ground=None):
+        if ground in self.cut:
+            return
         for message in self._mav.parse_buffer(data) or []:
+            self.came.append((ground, message.get_type()))
             if message.get_type() == "BAD_DATA" or self.drop(message):
                 continue
             handler = getattr(self, "_take_" + message.get_type().lower(), None)
@@ -297,7 +315,7 @@ class _Receiver(asyncio.DatagramProtocol):
         self._vehicle = vehicle
 
     def datagram_received(self, data, addr):
-        self._vehicle.receive(data)
+        self._vehicle.receive(data, tuple(addr[:2]))
 
 
 class _Stream(asyncio.Protocol):

@@ -60,8 +60,9 @@ def command(
         str | None,
         typer.Option(
             help="Vehicle with ArduPilot or PX4: udp:HOST:PORT waits there for it, udpout:HOST:PORT"
-            " sends first, tcp:HOST:PORT connects.",
-            metavar="KIND:HOST:PORT",
+            " sends first, tcp:HOST:PORT connects, serial:DEVICE:BAUD is a serial port. Several"
+            " links to it have commas between them.",
+            metavar="KIND:HOST:PORT,…",
         ),
     ] = None,
     consent: Annotated[
@@ -155,7 +156,8 @@ def command(
     """Fly steps under P control, learn the delay, design PV for it, fly that; land."""
     if host is not None and link is not None:
         raise ValueError("--host is an AR.Drone, --link ArduPilot or PX4: take one")
-    elsewhere = host or (None if link is None or LinkAddress.of(link).loopback else link)
+    here = link is None or all(one.loopback for one in LinkAddress.all_of(link))
+    elsewhere = host or (None if here else link)
     if max_climb is None:
         max_climb = EMULATED_CLIMB if elsewhere is None else REAL_CLIMB
     limits = Limits(

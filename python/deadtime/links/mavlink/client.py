@@ -21,7 +21,7 @@ from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
 from deadtime.links.mavlink.set_points import CYCLE, HOVER, SetPoints, within
 from deadtime.links.mavlink.states import ON_GROUND, StateReader, echo_of
-from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_for_messages
+from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_over_all
 from deadtime.links.mavlink.time_sync import LinkTime
 from deadtime.links.safety import Limits
 from deadtime.links.uninterrupted import note, uninterrupted
@@ -54,7 +54,9 @@ class MAVLinkVehicle:
     ----------
     address : str
         ``udp:HOST:PORT`` to wait there for the vehicle, ``udpout:HOST:PORT`` to send first,
-        ``tcp:HOST:PORT`` to connect to it.
+        ``tcp:HOST:PORT`` to connect to it, ``serial:DEVICE:BAUD`` for a serial port. With commas
+        between them several links to the same vehicle: the first is used, the others stand by for
+        when it falls silent.
     limits : Limits, optional
         Limits of its flights. Height and tilt are set in the vehicle too, and put back when the
         link is closed.
@@ -97,7 +99,8 @@ commanding it
         key: bytes | None = None,
         simulated: bool = False,
     ) -> None:
-        self.address = LinkAddress.of(address)
+        self.addresses = LinkAddress.all_of(address)
+        self.address = ",".join(map(str, self.addresses))
         self.limits = Limits() if limits is None else limits
         self.take_off_height = positive("take_off_height", take_off_height)
         if not self.limits.min_height < take_off_height < self.limits.max_height:
@@ -119,11 +122,11 @@ commanding it
 
     def _new_link(self) -> None:
         """A new connection: the state of an earlier one does not count."""
-        self._link = Connection(self.address, *self._ids, self._vehicle, self._key)
-        self._link.take = self._take
+        self._link = Connection(self.addresses, *self._ids, self._vehicle, self._key)
         self._reader = StateReader()
+        self._link.take, self._link.switched = self._take, self._reader.count_anew
         self._set_points = SetPoints(self.limits)
-        self._authority = Authority(str(self.address))
+        self._authority = Authority(self.address)
         self._landing_sent = -math.inf
 
     @property
@@ -133,8 +136,8 @@ commanding it
 
     @property
     def link_time(self) -> LinkTime | None:
-        """Round trip and clock offset of the link by TIMESYNC; None before the first answer."""
-        return self._link.time_sync.link_time
+        """Round trip and clock offset of the link in use, by TIMESYNC; None before an answer."""
+        return self._link.link_time
 
     @property
     def foreign(self) -> list[str]:
@@ -191,13 +194,13 @@ commanding it
             )
         pilot = self._autopilot = autopilot_of(heartbeat)
         self._reader.estimator = pilot.estimator
-        if self._vehicle is None:
+        if self._vehicle is None or len(self.addresses) > 1:
             await asyncio.sleep(HEARTBEATS)
-            if others := link.senders.vehicles:
-                raise LinkError(
-                    f"several vehicles are on {self.address}: system {link.target[0]}, "
-                    f"{', '.join(map(str, others))}: give `vehicle`, the system of the one to fly"
-                )
+        if self._vehicle is None and (others := link.senders.vehicles):
+            raise LinkError(
+                f"several vehicles are on {self.address}: system {link.target[0]}, "
+                f"{', '.join(map(str, others))}: give `vehicle`, the system of the one to fly"
+            )
         self._authority.refuse_armed(self._reader)
         self._parameters = Parameters(link, pilot.integers_as_bits)
         if self._simulated and not await self._is_simulator(pilot):
@@ -207,7 +210,7 @@ commanding it
                 "take simulated=False, or --i-have-a-safe-area on the command line"
             )
         await pilot.set_limits(self._parameters, self.limits, self._ids[0])
-        await ask_for_messages(link, pilot)
+        await ask_over_all(link, pilot)
         self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
 
     async def _is_simulator(self, pilot: Autopilot) -> bool:

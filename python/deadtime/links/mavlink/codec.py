@@ -51,6 +51,8 @@ class Codec:
         The ids of this end.
     key : bytes, optional
         32 bytes: frames are signed, and those without a right signature refused.
+    link : int
+        Number of the link in signatures.
 
     Attributes
     ----------
@@ -78,7 +80,9 @@ class Codec:
     ([], 1)
     """
 
-    def __init__(self, system: int, component: int, key: bytes | None = None) -> None:
+    def __init__(
+        self, system: int, component: int, key: bytes | None = None, link: int = 0
+    ) -> None:
         messages = dialect()
         if messages.MAVLINK_IGNORE_CRC:
             raise LinkError(
@@ -93,6 +97,7 @@ class Codec:
         if key is not None:
             signing = self._mav.signing
             signing.secret_key, signing.sign_outgoing = key, True
+            signing.link_id = link
             signing.timestamp = int((time.time() - SIGNING_EPOCH) / SIGNING_UNIT)
             _keep_times_of_signed(self._mav)
 

@@ -1,21 +1,25 @@
-"""A link to one vehicle: frames in and out, heartbeats, TIMESYNC, requests and their answers."""
+"""Messages of one vehicle: heartbeats, TIMESYNC, requests and their answers, over its links."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from deadtime._base.errors import LinkError
-from deadtime.links.clock import now
 from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink.carrier import Carrier
+from deadtime.links.mavlink.carriers import Carriers
 from deadtime.links.mavlink.codec import Codec, dialect
 from deadtime.links.mavlink.senders import Senders
-from deadtime.links.mavlink.sockets import LinkSocket
-from deadtime.links.mavlink.time_sync import EVERY, TimeSync
+from deadtime.links.mavlink.time_sync import EVERY, LinkTime
 
 #: Time between two heartbeats, s: a vehicle that lands without them for 2 s may miss three.
 HEARTBEAT = 0.5
+
+#: Time between two looks for silent links, s.
+LOOK = 0.05
 
 #: Time for an answer before a request is repeated, s, and number of requests.
 ANSWER, TRIES = 0.7, 6
@@ -25,11 +29,12 @@ TEXTS, WARNING = 8, 4
 
 
 class Connection:
-    """Messages to and from one vehicle.
+    """Messages to and from one vehicle, over one link or several.
 
     Parameters
     ----------
-    address : LinkAddress
+    addresses : sequence of LinkAddress
+        The first is preferred at first; the others stand by.
     system, component : int
         Ids of this end.
     vehicle : int, optional
@@ -39,6 +44,8 @@ class Connection:
 
     Attributes
     ----------
+    carriers : Carriers
+        The links.
     senders : Senders
         Who has sent.
     latest : dict
@@ -47,26 +54,30 @@ class Connection:
         Newest warnings of the vehicle: time and text.
     failure : Exception or None
         An error of what is called with each message.
+    take, switched : callable
+        Called with each message and the time of its arrival, and when another link is used.
     """
 
     def __init__(
         self,
-        address: LinkAddress,
+        addresses: Sequence[LinkAddress],
         system: int,
         component: int,
         vehicle: int | None = None,
         key: bytes | None = None,
     ) -> None:
-        self.address = address
-        self.codec = Codec(system, component, key)
+        self.address = ",".join(map(str, addresses))
         self.senders = Senders((system, component), vehicle)
-        self.time_sync = TimeSync()
         self.latest: dict[str, tuple[float, Any]] = {}
         self.texts: list[tuple[float, str]] = []
         self.failure: Exception | None = None
         self.take: Callable[[Any, float], None] = lambda message, time: None
-        self._socket = LinkSocket(self._receive)
-        self._heard: float | None = None
+        self.switched: Callable[[], None] = lambda: None
+        links = [
+            Carrier(one, Codec(system, component, key, number), self.senders, self._receive)
+            for number, one in enumerate(addresses)
+        ]
+        self.carriers = Carriers(links, _warn, lambda: self.switched())
         self._waiting: list[tuple[Callable[[Any], bool], asyncio.Future[Any]]] = []
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -78,7 +89,13 @@ class Connection:
     @property
     def silent(self) -> float:
         """Time since the last message of the vehicle, s; 0 before the first."""
-        return 0.0 if self._heard is None else now() - self._heard
+        current = self.carriers.current
+        return 0.0 if current.heard is None else current.silent
+
+    @property
+    def link_time(self) -> LinkTime | None:
+        """Round trip and clock offset of the link in use; None before the first answer."""
+        return self.carriers.current.time_sync.link_time
 
     @property
     def target(self) -> tuple[int, int]:
@@ -86,71 +103,61 @@ class Connection:
         return self.senders.vehicle or 0, 1
 
     async def open(self) -> None:
-        """Open the socket, and send heartbeats from now on.
+        """Open the links, and send heartbeats from now on.
 
         Raises
         ------
         LinkError
-            If it cannot be opened.
+            If one cannot be opened.
         """
-        await self._socket.open(self.address)
+        try:
+            for one in self.carriers:
+                await one.open()
+        except BaseException:
+            self.shut()
+            raise
         loop = asyncio.get_running_loop()
         self._tasks = [
-            loop.create_task(self._every(HEARTBEAT, self._send_heartbeat)),
-            loop.create_task(self._every(EVERY, self._send_time_sync)),
+            loop.create_task(self._every(HEARTBEAT, Carrier.send_heartbeat)),
+            loop.create_task(self._every(EVERY, Carrier.send_time_sync)),
         ]
+        if len(list(self.carriers)) > 1:
+            self._tasks.append(loop.create_task(self._look()))
 
     def shut(self) -> None:
         """Close it."""
         for task in self._tasks:
             task.cancel()
         self._tasks = []
-        self._socket.close()
+        for one in self.carriers:
+            one.close()
 
-    async def _every(self, period: float, send: Callable[[], None]) -> None:
+    async def _every(self, period: float, send: Callable[[Carrier], None]) -> None:
         while True:
-            send()
+            for one in self.carriers:
+                send(one)
             await asyncio.sleep(period)
 
-    def _send_heartbeat(self) -> None:
-        d = dialect()
-        self.send(
-            d.MAVLink_heartbeat_message(
-                d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID, 0, 0, d.MAV_STATE_ACTIVE, 3
-            )
-        )
-
-    def _send_time_sync(self) -> None:
-        if self.senders.vehicle is not None:
-            stamp = self.time_sync.request(now())
-            self.send(dialect().MAVLink_timesync_message(0, stamp))
+    async def _look(self) -> None:
+        while True:
+            try:
+                self.carriers.look()
+            except Exception as error:  # a warning that is an error; the vehicle raises it later
+                self.failure = self.failure or error
+            await asyncio.sleep(LOOK)
 
     def send(self, message: Any) -> None:
-        """Send a message at once."""
-        self._socket.send(self.codec.encode(message))
+        """Send a message at once, over the link in use."""
+        self.carriers.current.send(message)
 
-    def _receive(self, data: bytes, sender: Any, whole: bool) -> None:
-        time = now()
-        known = self._socket.peer
-        if known is not None and sender != known:
-            self.senders.elsewhere += 1
-            return
-        for message in self.codec.decode(data, whole):
-            if not self.senders.is_vehicle(message):
-                continue
-            if known is None and sender is not None:
-                known = sender
-                self._socket.answer(sender)
-                self._send_heartbeat()
-            self._heard = time
+    def _receive(self, carrier: Carrier, message: Any, time: float) -> None:
+        if carrier is self.carriers.current:
             self._accept(message, time)
 
     def _accept(self, message: Any, time: float) -> None:
         kind = message.get_type()
         self.latest[kind] = time, message
-        if kind == "TIMESYNC":
-            self._take_time_sync(message, time)
-        elif kind == "STATUSTEXT" and message.severity <= WARNING:
+        if kind == "STATUSTEXT" and message.severity <= WARNING:
             self.texts = [*self.texts[1 - TEXTS :], (time, str(message.text))]
         try:
             self.take(message, time)
@@ -159,12 +166,6 @@ class Connection:
         for holds, future in self._waiting:
             if not future.done() and holds(message):
                 future.set_result(message)
-
-    def _take_time_sync(self, message: Any, time: float) -> None:
-        if message.tc1 == 0:
-            self.send(dialect().MAVLink_timesync_message(round(time * 1e9), message.ts1))
-        else:
-            self.time_sync.answered(message.ts1, message.tc1, time)
 
     async def next(self, holds: Callable[[Any], bool], timeout: float) -> Any:
         """The next message of which something holds, or None after the timeout, s."""
@@ -233,3 +234,7 @@ class Connection:
         if not texts:
             return ""
         return '; the vehicle says "' + '", "'.join(texts[-3:]) + '"'
+
+
+def _warn(what: str) -> None:
+    warnings.warn(what, RuntimeWarning, stacklevel=2)

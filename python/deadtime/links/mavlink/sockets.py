@@ -1,4 +1,4 @@
-"""The socket of a link: datagrams or a stream, to and from one peer."""
+"""The socket of a link: datagrams, a stream or a serial port, to and from one peer."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from deadtime._base.errors import LinkError
 from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink.serial_port import SerialPort
 
 #: Longest time for a connection to be accepted, s.
 CONNECTING = 5.0
@@ -27,6 +28,7 @@ class LinkSocket:
         self._receive = receive
         self._datagrams: asyncio.DatagramTransport | None = None
         self._stream: asyncio.Transport | None = None
+        self._serial: SerialPort | None = None
         self.peer: Any = None
 
     async def open(self, address: LinkAddress) -> None:
@@ -36,7 +38,14 @@ class LinkSocket:
         ------
         LinkError
             If the address cannot be used, or nothing accepts a connection there.
+        MissingExtraError
+            If it is a serial port, and pyserial is not installed.
         """
+        if address.kind == "serial":
+            self._serial = SerialPort(
+                address.host, address.port, lambda data: self._receive(data, None, False)
+            )
+            return
         loop, place = asyncio.get_running_loop(), (address.host, address.port)
         try:
             if address.kind == "tcp":
@@ -63,7 +72,9 @@ class LinkSocket:
 
     def send(self, data: bytes) -> None:
         """Send, if a peer is known."""
-        if self._stream is not None and not self._stream.is_closing():
+        if self._serial is not None:
+            self._serial.send(data)
+        elif self._stream is not None and not self._stream.is_closing():
             self._stream.write(data)
         elif self._datagrams is not None and not self._datagrams.is_closing():
             if self._connected:
@@ -73,7 +84,7 @@ class LinkSocket:
 
     def close(self) -> None:
         """Close it."""
-        for transport in (self._datagrams, self._stream):
+        for transport in (self._datagrams, self._stream, self._serial):
             if transport is not None:
                 transport.close()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 
 from deadtime._base.errors import LinkError
 from deadtime.links.clock import now
@@ -28,13 +29,29 @@ NEAR, SLOW = 0.15, 0.1
 MISSING = 1.5
 
 
-async def ask_for_messages(link: Connection, pilot: Autopilot) -> None:
-    """Ask for the messages that do not come; a vehicle forgets them while it starts."""
+async def ask_for_messages(link: Connection, pilot: Autopilot, anew: bool = False) -> None:
+    """Ask for the messages that do not come, or `anew` for all.
+
+    A vehicle forgets them while it starts.
+    """
     number = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
-    for name, (message, rate) in wanted_messages(pilot.estimator).items():
+    address = link.carriers.current.address
+    baud = address.port if address.kind == "serial" else None
+    for name, (message, rate) in wanted_messages(pilot.estimator, baud).items():
         seen = link.latest.get(name)
-        if name == "HEARTBEAT" or seen is None or now() - seen[0] > MISSING:
+        if anew or name == "HEARTBEAT" or seen is None or now() - seen[0] > MISSING:
             await link.command(number, float(message), 1e6 / rate)
+
+
+async def ask_over_all(link: Connection, pilot: Autopilot) -> None:
+    """Ask on every link on which the vehicle is heard: on each comes what was asked for there."""
+    current = link.carriers.current
+    for one in link.carriers:
+        if one is not current and one.heard is not None:
+            # Where it falls silent, it is named.
+            with link.carriers.over(one), suppress(LinkError):
+                await ask_for_messages(link, pilot, anew=True)
+    await ask_for_messages(link, pilot)
 
 
 class TakeOff:

@@ -1,0 +1,94 @@
+"""Several links to one vehicle: one is used, the others stand by.
+
+A loop has the delay of the link that it is closed over, so the vehicle is read and commanded over
+one link at a time. Set points over two would let the slower link bring back old ones. Heartbeats
+and TIMESYNC go over all. Where nothing has come over the link in use for `SILENT` seconds and
+others are heard, that with the shortest round trip takes over. It stays in use until it falls
+silent in turn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from deadtime.links.mavlink.carrier import Carrier
+
+#: Silence after which another link takes over, s: before a state is too old for a flight to go on,
+#: and ten of its messages. And that after which a link that stands by is named, s.
+SILENT, NAMED = 0.2, 2.0
+
+#: Time for the first heartbeat on the first link, before another one is taken, s.
+FIRST = 1.2
+
+
+class Carriers:
+    """The links to one vehicle, in the order in which they are preferred at first.
+
+    Parameters
+    ----------
+    all_of_them : sequence of Carrier
+    tell : callable
+        Called with what happens to a link, in words.
+    switched : callable
+        Called when another link is used.
+
+    Attributes
+    ----------
+    current : Carrier
+        The link in use.
+    """
+
+    def __init__(
+        self,
+        all_of_them: Sequence[Carrier],
+        tell: Callable[[str], None],
+        switched: Callable[[], None],
+    ) -> None:
+        self._all, self._tell, self._switched = tuple(all_of_them), tell, switched
+        self.current = self._all[0]
+        self._held = False
+
+    def __iter__(self) -> Iterator[Carrier]:
+        return iter(self._all)
+
+    def look(self) -> None:
+        """Name links that have fallen silent, and use another one if the one in use has."""
+        alive = [one for one in self._all if one.heard is not None and one.silent < SILENT]
+        patience = FIRST if self.current.heard is None else SILENT
+        if not self._held and self.current.silent > patience and alive:
+            lost, best = self.current, min(alive, key=_round_trip)
+            self._use(best)
+            lost.named = True
+            self._tell(
+                f"{lost.address}: nothing received for {lost.silent:.1f} s; the vehicle is reached "
+                f"over {best.address}"
+            )
+        for one in self._all:
+            if one in alive:
+                one.named = False
+            elif one is not self.current and one.silent > NAMED and not one.named:
+                one.named = True
+                self._tell(f"{one.address}: nothing received for {one.silent:.1f} s; it stood by")
+
+    @contextmanager
+    def over(self, carrier: Carrier) -> Iterator[None]:
+        """Use this link for a while."""
+        before, self._held = self.current, True
+        self._use(carrier)
+        try:
+            yield
+        finally:
+            self._held = False
+            self._use(before)
+
+    def _use(self, carrier: Carrier) -> None:
+        if carrier is not self.current:
+            self.current = carrier
+            self._switched()
+
+
+def _round_trip(carrier: Carrier) -> float:
+    measured = carrier.time_sync.link_time
+    return math.inf if measured is None else measured.median
