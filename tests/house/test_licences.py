@@ -16,6 +16,7 @@ NAMED = [
     *EXTRAS["cli"],
     *EXTRAS["logs"],
     *EXTRAS["adapt"],
+    *EXTRAS["mavlink"],
 ]
 
 #: LGPL: a library that a user may exchange, imported where a log is read and not passed on.

@@ -42,3 +42,39 @@ def test_a_station_that_is_killed_leaves_a_vehicle_that_hovers_then_lands(sessio
     assert 0.9 < killed["lands"] < 2.5
     assert killed["climbed"] < 0.4 * 0.75 + 0.3
     assert killed["lands"] < killed["down"] < 20.0
+
+
+@pytest.fixture(scope="module")
+def set_points():
+    return json.loads(told_by("arducopter_set_points.py", timeout=240.0).splitlines()[-1])
+
+
+def test_positions_are_flown_to_within_the_speeds_of_the_limits(set_points):
+    flown = set_points["position"]
+    assert (flown["north"], flown["east"]) == pytest.approx((2.0, -1.0), abs=0.3)
+    assert flown["height"] == pytest.approx(4.0, abs=0.3)
+    assert flown["heading"] == pytest.approx(1.0, abs=0.1)
+    assert flown["speed"] < 1.1
+    assert flown["climb"] < 1.1
+
+
+def test_attitudes_and_thrust_are_followed(set_points):
+    level, nose_down = set_points["level"], set_points["nose_down"]
+    assert level["tilt"] < 0.05
+    # A proportional controller of the thrust around what hovers.
+    assert 3.0 < min(level["heights"]) < max(level["heights"]) < 5.0
+    assert min(nose_down["pitch"]) == pytest.approx(-0.08, abs=0.02)
+    assert nose_down["heading"] == pytest.approx(0.0, abs=0.1)
+    assert nose_down["north"] > 0.5
+
+
+def test_rates_and_thrust_are_followed(set_points):
+    flown = set_points["rates"]
+    assert flown["roll"] == pytest.approx(0.1, abs=0.03)
+    assert max(map(abs, flown["pitch"])) < 0.05
+    assert 3.0 < min(flown["heights"]) < max(flown["heights"]) < 5.5
+
+
+def test_what_set_points_need_is_put_back(set_points):
+    assert set_points["held"] == [8.0, 100.0]
+    assert set_points["put_back"] == [0.0, 1000.0]

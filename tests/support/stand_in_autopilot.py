@@ -25,6 +25,10 @@ ARDUPILOT = {
     "FENCE_ALT_MAX": 100.0,
     "FENCE_ACTION": 1.0,
     "ANGLE_MAX": 3000.0,
+    "GUID_OPTIONS": 2.0,
+    "WPNAV_SPEED": 1000.0,
+    "WPNAV_SPEED_UP": 250.0,
+    "WPNAV_SPEED_DN": 8.0,
 }
 PX4 = {
     "COM_OF_LOSS_T": 1.0,
@@ -34,6 +38,9 @@ PX4 = {
     "GF_MAX_VER_DIST": 0.0,
     "GF_ACTION": 2,
     "MPC_TILTMAX_AIR": 45.0,
+    "MPC_XY_VEL_MAX": 12.0,
+    "MPC_Z_VEL_MAX_UP": 3.0,
+    "MPC_Z_VEL_MAX_DN": 1.5,
 }
 
 #: Modes: guided, landing, another one that holds.
@@ -77,6 +84,7 @@ class StandIn:
         self.ready = True
         self.drop = lambda message: False
         self.commands, self.set_points = [], []
+        self.places, self.attitudes, self.goal = [], [], None
         self.battery = 90
         self.origin = -3.0  # z of the ground
         self.status = None
@@ -158,6 +166,8 @@ class StandIn:
                 self.target = None
         elif self.mode == self.guided:
             wanted = self.told
+        if self.goal is not None:
+            self.along = tuple(g - x for g, x in zip(self.goal, self.place, strict=True))
         self.place = [x + STEP * v for x, v in zip(self.place, self.along, strict=True)]
         self.yaw += STEP * self.turn
         self.climb += STEP / LAG * (wanted - self.climb)
@@ -173,7 +183,7 @@ class StandIn:
         unheard = 0.0 if self._station is None else self.time - self._station
         ap = self.firmware == "ardupilot"
         if silent > self.parameters["GUID_TIMEOUT" if ap else "COM_OF_LOSS_T"]:
-            self.told, self.along, self.turn = 0.0, (0.0, 0.0), 0.0
+            self.told, self.along, self.turn, self.goal = 0.0, (0.0, 0.0), 0.0, None
             if not ap and self.mode == self.guided:
                 self.mode = 4 << 16 | 3 << 24  # hold
         if ap and self.parameters["FS_GCS_ENABLE"] and unheard > self.parameters["FS_GCS_TIMEOUT"]:
@@ -244,15 +254,31 @@ class StandIn:
 
     def _take_set_position_target_local_ned(self, message):
         self._streamed = self.time
-        self.set_points.append((self.time, -message.vz))
-        assert message.type_mask in (0xDC7, 0x5C7)
+        assert message.type_mask in (0xDC7, 0x5C7, 0x9F8)
         assert message.coordinate_frame == 1
+        if message.type_mask == 0x9F8:
+            self.places.append(message)
+            if self.mode == self.guided:
+                self.goal, self.told = (message.x, message.y), 0.0
+                self.target, self.yaw = self.origin - message.z, message.yaw
+            return
+        self.set_points.append((self.time, -message.vz))
         if self.mode == self.guided:
+            self.goal = None
             self.target = None  # a set point ends the take-off
             self.told = -message.vz
             self.along = (message.vx, message.vy)
             if message.type_mask == 0x5C7:
                 self.turn = message.yaw_rate
+
+    def _take_set_attitude_target(self, message):
+        """Thrust above one half climbs."""
+        self._streamed = self.time
+        assert message.type_mask in (0x07, 0x80)
+        self.attitudes.append(message)
+        if self.mode == self.guided:
+            self.target = self.goal = None
+            self.told, self.along, self.turn = message.thrust - 0.5, (0.0, 0.0), 0.0
 
     def _integer(self, name):
         return self.firmware == "px4" and isinstance(self.parameters[name], int)

@@ -66,6 +66,11 @@ class Limits:
         Largest commanded horizontal speed, m/s.
     max_yaw_rate : float
         Largest commanded turn, rad/s.
+    max_body_rate : float
+        Largest commanded rate around an axis of the vehicle, rad/s.
+    min_thrust, max_thrust : float
+        Least and largest commanded thrust, as shares of all that the motors have. Hovering takes a
+        quarter to a half.
     min_height, max_height : float
         Beyond these a flight is aborted, m. The upper one is set in the vehicle too, where it has
         such a setting.
@@ -98,6 +103,9 @@ class Limits:
     max_climb: float = 0.5
     max_speed: float = 0.5
     max_yaw_rate: float = 0.5
+    max_body_rate: float = 1.0
+    min_thrust: float = 0.15
+    max_thrust: float = 0.7
     min_height: float = 0.2
     max_height: float = 3.0
     max_angle: float = math.radians(15.0)
@@ -118,6 +126,11 @@ class Limits:
         if self.min_height >= self.max_height:
             raise ValueError(
                 f"min_height={self.min_height} is not below max_height={self.max_height}"
+            )
+        if not self.min_thrust < self.max_thrust <= 1.0:
+            raise ValueError(
+                f"min_thrust={self.min_thrust} and max_thrust={self.max_thrust}: give shares, the "
+                "least first"
             )
         if self.command_age >= self.landing_after:
             raise ValueError(

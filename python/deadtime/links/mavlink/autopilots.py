@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 from deadtime._base.errors import LinkError
 from deadtime.links.mavlink.codec import dialect
 from deadtime.links.mavlink.parameters import Parameters
+from deadtime.links.mavlink.points import Kind
 from deadtime.links.safety import Limits
 
 #: Longest time for which the vehicle follows an old set point, s.
@@ -21,6 +22,10 @@ SILENCE = 0.5
 
 #: Time without heartbeats after which ArduPilot lands, s: the least that it accepts.
 HEARTBEATS_LOST = 2.0
+
+
+#: The bit of GUID_OPTIONS by which ArduPilot takes a thrust for a thrust.
+THRUST_AS_THRUST = 8
 
 
 def _numbered(first: int, names: str) -> dict[int, str]:
@@ -45,6 +50,15 @@ class Scaled(NamedTuple):
     factor: float
 
 
+class Speed(NamedTuple):
+    """A parameter of a speed, the factor to m/s, its least value, and the limit that it keeps."""
+
+    name: str
+    factor: float
+    least: float
+    limit: str
+
+
 class Autopilot(ABC):
     """Conventions of one firmware.
 
@@ -66,6 +80,8 @@ class Autopilot(ABC):
         A parameter that its simulator has and vehicles have not.
     shaping : mapping of str to (Scaled, Scaled or None)
         The parameters that limit the change of a commanded rate, and the change of that, by axis.
+    speeds : tuple of Speed
+        The parameters that limit the speed towards a position.
     """
 
     name: ClassVar[str]
@@ -77,6 +93,19 @@ class Autopilot(ABC):
     estimator: ClassVar[str]
     simulated: ClassVar[str | None] = None
     shaping: ClassVar[Mapping[str, tuple[Scaled, Scaled | None]]] = {}
+    speeds: ClassVar[tuple[Speed, ...]] = ()
+
+    async def allow(self, parameters: Parameters, limits: Limits, kind: Kind) -> None:
+        """Set what set points of a kind need: the speeds towards a position, the sense of a thrust.
+
+        Raises
+        ------
+        LinkError
+            If it does not keep a setting.
+        """
+        for one in self.speeds if kind == "position" else ():
+            most = max(one.least, getattr(limits, one.limit) / one.factor)
+            await _at_most(parameters, most, one.name)
 
     @abstractmethod
     def mode(self, custom: int) -> tuple[float, ...]:
@@ -115,6 +144,22 @@ class ArduPilot(Autopilot):
         **{axis: (Scaled("WPNAV_ACCEL", 0.01), Scaled("PSC_JERK_XY", 1.0)) for axis in ("x", "y")},
         "yaw": (Scaled("ATC_ACCEL_Y_MAX", math.radians(0.01)), None),
     }
+
+    speeds = (
+        Speed("WPNAV_SPEED", 0.01, 20.0, "max_speed"),
+        Speed("WPNAV_SPEED_UP", 0.01, 10.0, "max_climb"),
+        Speed("WPNAV_SPEED_DN", 0.01, 10.0, "max_climb"),
+    )
+
+    async def allow(self, parameters: Parameters, limits: Limits, kind: Kind) -> None:
+        """Thrust is a thrust: without this option it is a rate of climb (GUID_OPTIONS)."""
+        await super().allow(parameters, limits, kind)
+        if kind == "position":
+            return
+        held = await parameters.read("GUID_OPTIONS")
+        if held is None:
+            raise LinkError("the vehicle does not answer for its GUID_OPTIONS")
+        await parameters.set("GUID_OPTIONS", float(int(held) | THRUST_AS_THRUST))
 
     def mode(self, custom: int) -> tuple[float, ...]:
         """As in `Autopilot`."""
@@ -175,6 +220,11 @@ class PX4(Autopilot):
     rising = (4 << 16 | 2 << 24, 4 << 16 | 3 << 24)  # AUTO.TAKEOFF, then AUTO.LOITER
     integers_as_bits = True
     estimator = "ESTIMATOR_STATUS"
+    speeds = (
+        Speed("MPC_XY_VEL_MAX", 1.0, 0.0, "max_speed"),
+        Speed("MPC_Z_VEL_MAX_UP", 1.0, 0.5, "max_climb"),
+        Speed("MPC_Z_VEL_MAX_DN", 1.0, 0.5, "max_climb"),
+    )
 
     def mode(self, custom: int) -> tuple[float, ...]:
         """As in `Autopilot`."""

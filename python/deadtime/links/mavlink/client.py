@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any, Self
 
-from deadtime._base.errors import FlightAbortedError, LinkError
+from deadtime._base.errors import LinkError
 from deadtime._base.validation import positive
 from deadtime.links.axes import AXES
 from deadtime.links.clock import now
@@ -16,16 +16,17 @@ from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.authority import Authority
 from deadtime.links.mavlink.autopilots import Autopilot, autopilot_of
 from deadtime.links.mavlink.codec import dialect
+from deadtime.links.mavlink.commanding import Commanding
 from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
-from deadtime.links.mavlink.set_points import CYCLE, HOVER, SetPoints, within
+from deadtime.links.mavlink.set_points import CYCLE, SetPoints
 from deadtime.links.mavlink.states import ON_GROUND, StateReader, echo_of
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_over_all
 from deadtime.links.mavlink.time_sync import LinkTime
 from deadtime.links.safety import Limits
 from deadtime.links.uninterrupted import note, uninterrupted
-from deadtime.links.vehicle import Echo, Motion, VehicleState
+from deadtime.links.vehicle import Echo, VehicleState
 
 #: Longest wait for the first heartbeat, s.
 FIRST_HEARTBEAT = 10.0
@@ -36,14 +37,14 @@ HEARTBEATS = 1.5
 #: Longest duration of a landing, s.
 LONGEST_LANDING = 60.0
 
-#: Silence after which the link counts as lost, in flight and while landing, s.
-LOST, LOST_LANDING = 1.0, 5.0
+#: Silence after which the link counts as lost while landing, s.
+LOST_LANDING = 5.0
 
 #: Time between two landing commands, and between landing and the command to disarm, s.
 AGAIN, DISARM_AFTER = 0.5, 3.0
 
 
-class MAVLinkVehicle:
+class MAVLinkVehicle(Commanding):
     """A link to a multicopter with ArduPilot or PX4.
 
     As an asynchronous context manager it connects on entry, and lands and closes on exit, also by
@@ -126,6 +127,7 @@ commanding it
         self._reader = StateReader()
         self._link.take, self._link.switched = self._take, self._reader.count_anew
         self._set_points = SetPoints(self.limits)
+        self._allowed = set()
         self._authority = Authority(self.address)
         self._landing_sent = -math.inf
 
@@ -154,12 +156,6 @@ commanding it
             If it is not connected.
         """
         return self._known.name
-
-    @property
-    def _known(self) -> Autopilot:
-        if self._autopilot is None:
-            raise LinkError(f"{self.address} is not connected")
-        return self._autopilot
 
     # Connecting
 
@@ -293,12 +289,6 @@ commanding it
             return None
         return found[0], found[1]
 
-    @property
-    def _held(self) -> Parameters:
-        if self._parameters is None:
-            raise LinkError(f"{self.address} is not connected")
-        return self._parameters
-
     # Flying
 
     async def take_off(self) -> None:
@@ -317,6 +307,7 @@ commanding it
         await steps.prepare(self.limits.min_battery)
         try:
             await steps.fly(self.take_off_height, self._set_points)
+            self._origin = await self.state()
         except BaseException:
             self._set_points.stop()
             self._command_landing()
@@ -338,105 +329,6 @@ commanding it
         self._check_link()
         assert reader.newest is not None
         return reader.newest
-
-    def _check_link(self) -> None:
-        if (failure := self._link.failure) is not None:
-            raise LinkError(f"the listener of {self.address} has failed: {failure}") from failure
-        self._check_flight()
-        if self._link.silent > LOST + SHOWN or (self._set_points.guarded and self._silent):
-            raise LinkError(self._unheard)
-
-    @property
-    def _silent(self) -> bool:
-        return self._link.silent > LOST
-
-    @property
-    def _unheard(self) -> str:
-        return f"nothing received from {self.address} for {self._link.silent:.1f} s"
-
-    def _check_flight(self) -> None:
-        """Raise if the flight has ended without `land`."""
-        self._age()
-        if self._set_points.expired is not None:
-            raise FlightAbortedError(self._set_points.expired)
-
-    def _age(self) -> None:
-        self._set_points.age(now())
-        if self._set_points.guarded and self._silent:
-            self._set_points.give_up(self._unheard)
-
-    def command(self, climb: float) -> float:
-        """Command a vertical speed; it is sent at once and repeated until it is too old.
-
-        Parameters
-        ----------
-        climb : float
-            m/s, up positive. Clipped to ``limits.max_climb``.
-
-        Returns
-        -------
-        float
-            The speed that was sent, m/s.
-
-        Raises
-        ------
-        ValueError
-            If `climb` is not finite.
-        LinkError
-            If the vehicle has not taken off, or if the flight has ended without `land`: without
-            commands, without messages of the vehicle, or because its mode was changed by itself or
-            by another ground station.
-        """
-        return self.command_velocity(up=climb).up
-
-    def command_velocity(
-        self, north: float = 0.0, east: float = 0.0, up: float = 0.0, turn: float | None = None
-    ) -> Motion:
-        """Command a velocity, as `command` does a vertical one.
-
-        Parameters
-        ----------
-        north, east, up : float
-            m/s. The horizontal speed is limited to ``limits.max_speed``, in its direction.
-        turn : float, optional
-            Rate of turn, rad/s, clockwise positive, clipped to ``limits.max_yaw_rate``; the heading
-            is held without it.
-
-        Returns
-        -------
-        Motion
-            What was sent.
-
-        Raises
-        ------
-        ValueError
-            If a number is not finite.
-        LinkError
-            As `command`.
-        """
-        motion = within(Motion(north, east, up, turn), self.limits)
-        if self._set_points.expired is None and not self._set_points.guarded:
-            raise LinkError(f"{self.address} is not in the air: take off before commanding it")
-        self._check_flight()
-        self._set_points.command(motion, now())
-        self._send_set_point()
-        return motion
-
-    def hover(self) -> None:
-        """Command no motion; like a command this is valid for a short time, then it lands.
-
-        Raises
-        ------
-        LinkError
-            If the flight has ended without `land`, as of `command`.
-        """
-        self._check_flight()
-        self._set_points.command(HOVER, now())
-        if self._set_points.guarded:
-            self._send_set_point()
-
-    def _send_set_point(self) -> None:
-        self._link.send(self._set_points.message(self._link.target, now()))
 
     async def _keep_sending(self) -> None:
         """Repeat set points, and land a vehicle that was given up."""

@@ -1,4 +1,4 @@
-"""Velocity set points, which expire: no old one is ever repeated.
+"""Set points, which expire: no old one is ever repeated.
 
 Where no new one comes, a set point is repeated every `REPEAT` until it is `Limits.command_age` old;
 then hovering is commanded, and after `Limits.landing_after` the flight is given up. The vehicle has
@@ -11,19 +11,13 @@ import math
 from typing import Any
 
 from deadtime._base.validation import finite
-from deadtime.links.mavlink.codec import dialect
+from deadtime.links.mavlink.point_messages import message_of
+from deadtime.links.mavlink.points import Point
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Motion
 
 #: Time between two checks of its age, and between two set points where no new one comes, s.
 CYCLE, REPEAT = 0.05, 0.1
-
-#: Velocities are followed; positions and accelerations are not given, nor the heading. Without the
-#: last bit a rate of turn is.
-VELOCITY_ONLY, NO_TURN = 0x05C7, 0x0800
-
-#: Frame of the set points: north, east, down.
-LOCAL_NED = 1
 
 
 def within(motion: Motion, limits: Limits) -> Motion:
@@ -65,13 +59,13 @@ class SetPoints:
         self.limits = limits
         self.guarded = False
         self.expired: str | None = None
-        self._motion = HOVER
+        self._point: Point = HOVER
         self._given = self._sent = 0.0
 
     def begin(self, now: float) -> None:
         """Send set points from now on, hovering first."""
         self.guarded = self.expired is None
-        self._motion, self._given = HOVER, now
+        self._point, self._given = HOVER, now
 
     def stop(self) -> None:
         """Send none any more."""
@@ -82,16 +76,16 @@ class SetPoints:
         self.expired = self.expired or reason
         self.guarded = False
 
-    def command(self, motion: Motion, now: float) -> None:
-        """Take a new motion."""
+    def command(self, point: Point, now: float) -> None:
+        """Take a new one."""
         self.age(now)
-        self._motion, self._given = motion, now
+        self._point, self._given = point, now
 
     def age(self, now: float) -> None:
         """Let the set point expire."""
         age = now - self._given
         if self.guarded and age > self.limits.command_age:
-            self._motion = HOVER
+            self._point = HOVER
         if self.guarded and age > self.limits.landing_after:
             self.give_up(f"no command for {age:.2f} s: the vehicle was commanded to land")
 
@@ -99,14 +93,7 @@ class SetPoints:
         """Whether one is to be sent."""
         return self.guarded and now - self._sent > REPEAT - 0.5 * CYCLE
 
-    def message(self, target: tuple[int, int], now: float) -> Any:
-        """The set point as a message."""
+    def message(self, target: tuple[int, int], now: float, ground: float) -> Any:
+        """The set point as a message; `ground` is the down coordinate that heights count from."""
         self._sent = now
-        zero, motion = 0.0, self._motion
-        mask, turn = VELOCITY_ONLY, motion.turn
-        if turn is None:
-            mask, turn = mask | NO_TURN, zero
-        return dialect().MAVLink_set_position_target_local_ned_message(
-            round(1e3 * now) % 2**32, *target, LOCAL_NED, mask,
-            zero, zero, zero, motion.north, motion.east, -motion.up, zero, zero, zero, zero, turn,
-        )  # fmt: skip
+        return message_of(self._point, target, now, ground)

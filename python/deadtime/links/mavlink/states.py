@@ -48,6 +48,8 @@ class StateReader:
         MAV_LANDED_STATE.
     echo : Echo or None
         The newest echo of the commands.
+    ground : float
+        Down coordinate of the ground, m, from which heights count.
     ready : bool
         Whether it knows its position.
     """
@@ -59,7 +61,7 @@ class StateReader:
         self.armed: bool | None = None
         self.landed_state = 0
         self.ready = False
-        self._ground = 0.0
+        self.ground = 0.0
         self._status = 0
         self._battery: float | None = None
         self._attitude: Any = None
@@ -122,11 +124,11 @@ class StateReader:
         if before is not None and stamp <= (before.vehicle_time or 0.0) and not restarted:
             return None  # a copy, or overtaken by a newer one
         if self.landed_state == ON_GROUND:
-            self._ground = float(message.z)
+            self.ground = float(message.z)
         turned = self._attitude
         self.newest = VehicleState(
             time=time,
-            height=self._ground - float(message.z),
+            height=self.ground - float(message.z),
             flying=bool(self.armed) and self.landed_state == IN_AIR,
             landed=self.armed is False and self.landed_state == ON_GROUND,
             sequence=self._frames,

@@ -1,0 +1,287 @@
+"""What a vehicle over MAVLink is commanded in the air: velocities, positions, attitudes, rates."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from deadtime._base.errors import FlightAbortedError, LinkError
+from deadtime.links.clock import now
+from deadtime.links.mavlink.autopilots import Autopilot
+from deadtime.links.mavlink.connection import Connection
+from deadtime.links.mavlink.parameters import Parameters
+from deadtime.links.mavlink.points import (
+    Attitude,
+    BodyRates,
+    Kind,
+    Place,
+    Point,
+    attitude_within,
+    place_within,
+    rates_within,
+)
+from deadtime.links.mavlink.set_points import HOVER, SetPoints, within
+from deadtime.links.mavlink.states import StateReader
+from deadtime.links.mavlink.take_off import SHOWN
+from deadtime.links.safety import Limits
+from deadtime.links.vehicle import Motion, VehicleState
+
+#: Silence after which the link counts as lost in flight, s.
+LOST = 1.0
+
+
+class Commanding:
+    """The commands of a vehicle in the air; `MAVLinkVehicle` connects, takes off and lands."""
+
+    address: str
+    limits: Limits
+    _link: Connection
+    _reader: StateReader
+    _set_points: SetPoints
+    _autopilot: Autopilot | None
+    _parameters: Parameters | None
+    _allowed: set[Kind]
+    _origin: VehicleState
+
+    @property
+    def _known(self) -> Autopilot:
+        if self._autopilot is None:
+            raise LinkError(f"{self.address} is not connected")
+        return self._autopilot
+
+    @property
+    def _held(self) -> Parameters:
+        if self._parameters is None:
+            raise LinkError(f"{self.address} is not connected")
+        return self._parameters
+
+    def _send_set_point(self) -> None:
+        message = self._set_points.message(self._link.target, now(), self._reader.ground)
+        self._link.send(message)
+
+    def _check_link(self) -> None:
+        if (failure := self._link.failure) is not None:
+            raise LinkError(f"the listener of {self.address} has failed: {failure}") from failure
+        self._check_flight()
+        if self._link.silent > LOST + SHOWN or (self._set_points.guarded and self._silent):
+            raise LinkError(self._unheard)
+
+    @property
+    def _silent(self) -> bool:
+        return self._link.silent > LOST
+
+    @property
+    def _unheard(self) -> str:
+        return f"nothing received from {self.address} for {self._link.silent:.1f} s"
+
+    def _check_flight(self) -> None:
+        """Raise if the flight has ended without `land`."""
+        self._age()
+        if self._set_points.expired is not None:
+            raise FlightAbortedError(self._set_points.expired)
+
+    def _age(self) -> None:
+        self._set_points.age(now())
+        if self._set_points.guarded and self._silent:
+            self._set_points.give_up(self._unheard)
+
+    def command(self, climb: float) -> float:
+        """Command a vertical speed; it is sent at once and repeated until it is too old.
+
+        Parameters
+        ----------
+        climb : float
+            m/s, up positive. Clipped to ``limits.max_climb``.
+
+        Returns
+        -------
+        float
+            The speed that was sent, m/s.
+
+        Raises
+        ------
+        ValueError
+            If `climb` is not finite.
+        LinkError
+            If the vehicle has not taken off, or if the flight has ended without `land`: without
+            commands, without messages of the vehicle, or because its mode was changed by itself or
+            by another ground station.
+        """
+        return self.command_velocity(up=climb).up
+
+    def command_velocity(
+        self, north: float = 0.0, east: float = 0.0, up: float = 0.0, turn: float | None = None
+    ) -> Motion:
+        """Command a velocity, as `command` does a vertical one.
+
+        Parameters
+        ----------
+        north, east, up : float
+            m/s. The horizontal speed is limited to ``limits.max_speed``, in its direction.
+        turn : float, optional
+            Rate of turn, rad/s, clockwise positive, clipped to ``limits.max_yaw_rate``; the heading
+            is held without it.
+
+        Returns
+        -------
+        Motion
+            What was sent.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        LinkError
+            As `command`.
+        """
+        motion = within(Motion(north, east, up, turn), self.limits)
+        self._follow(motion)
+        return motion
+
+    async def allow(self, kind: Kind) -> None:
+        """Prepare the vehicle for set points of a further kind, beside velocities.
+
+        Towards a position it flies no faster than `limits`; a thrust is a thrust to it, not a rate
+        of climb. What is set for this is put back when the link is closed.
+
+        Parameters
+        ----------
+        kind : {"position", "attitude", "rates"}
+            For `command_position`, `command_attitude` or `command_rates`.
+
+        Raises
+        ------
+        LinkError
+            If it is not connected, or does not keep a setting.
+        ValueError
+            If there is no such kind.
+        """
+        if kind not in get_args(Kind):
+            raise ValueError(f"no set points of kind {kind!r}: {', '.join(get_args(Kind))}")
+        await self._known.allow(self._held, self.limits, kind)
+        self._allowed.add(kind)
+
+    def command_position(
+        self, north: float, east: float, height: float, heading: float | None = None
+    ) -> Place:
+        """Command a position, which is valid as long as a velocity is; `allow` it first.
+
+        Parameters
+        ----------
+        north, east : float
+            m, in the frame of `VehicleState`; no further than ``limits.max_distance`` from where
+            it took off.
+        height : float
+            m, within ``limits.min_height`` and ``limits.max_height``.
+        heading : float, optional
+            rad; the present one if not given.
+
+        Returns
+        -------
+        Place
+            What was sent.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        LinkError
+            As `command`, and if it was not allowed.
+        """
+        state = self._ready("position")
+        heading = state.yaw or 0.0 if heading is None else heading
+        place = place_within(Place(north, east, height, heading), self._origin, self.limits)
+        self._follow(place)
+        return place
+
+    def command_attitude(
+        self, roll: float, pitch: float, thrust: float, heading: float | None = None
+    ) -> Attitude:
+        """Command an attitude and a thrust, which nothing but this end keeps at a height.
+
+        Parameters
+        ----------
+        roll, pitch : float
+            To the right and nose up, rad; together no more than ``limits.max_angle``.
+        thrust : float
+            Share of the largest one, within ``limits.min_thrust`` and ``limits.max_thrust``.
+        heading : float, optional
+            rad; the present one if not given.
+
+        Returns
+        -------
+        Attitude
+            What was sent.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        LinkError
+            As `command`, and if it was not allowed.
+        """
+        state = self._ready("attitude")
+        heading = state.yaw or 0.0 if heading is None else heading
+        attitude = attitude_within(Attitude(roll, pitch, heading, thrust), self.limits)
+        self._follow(attitude)
+        return attitude
+
+    def command_rates(self, roll: float, pitch: float, turn: float, thrust: float) -> BodyRates:
+        """Command rates around the axes of the vehicle, and a thrust.
+
+        Parameters
+        ----------
+        roll, pitch, turn : float
+            rad/s: to the right, nose up, clockwise. They are limited so that the tilt stays within
+            ``limits.max_angle`` while the command is valid.
+        thrust : float
+            As of `command_attitude`.
+
+        Returns
+        -------
+        BodyRates
+            What was sent.
+
+        Raises
+        ------
+        ValueError
+            If a number is not finite.
+        LinkError
+            As `command`, and if it was not allowed.
+        """
+        state = self._ready("rates")
+        rates = rates_within(BodyRates(roll, pitch, turn, thrust), state, self.limits)
+        self._follow(rates)
+        return rates
+
+    def _ready(self, kind: Kind) -> VehicleState:
+        """The newest state, where set points of a kind may be commanded."""
+        if kind not in self._allowed:
+            raise LinkError(f"{self.address}: `await allow({kind!r})` before commanding it")
+        self._check_in_air()
+        if self._reader.newest is None:
+            raise LinkError(f"{self.address}: no state of the vehicle has come")
+        return self._reader.newest
+
+    def _check_in_air(self) -> None:
+        if self._set_points.expired is None and not self._set_points.guarded:
+            raise LinkError(f"{self.address} is not in the air: take off before commanding it")
+        self._check_flight()
+
+    def _follow(self, point: Point) -> None:
+        """Send a set point at once, and repeat it until it is too old."""
+        self._check_in_air()
+        self._set_points.command(point, now())
+        self._send_set_point()
+
+    def hover(self) -> None:
+        """Command no motion; like a command this is valid for a short time, then it lands.
+
+        Raises
+        ------
+        LinkError
+            If the flight has ended without `land`, as of `command`.
+        """
+        self._check_flight()
+        self._set_points.command(HOVER, now())
+        if self._set_points.guarded:
+            self._send_set_point()

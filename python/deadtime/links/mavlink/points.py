@@ -1,0 +1,120 @@
+"""What a vehicle may be told to follow beside a velocity, within the limits of its flight."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
+
+from deadtime._base.validation import finite
+from deadtime.links.safety import Limits
+from deadtime.links.vehicle import Motion, VehicleState
+
+#: Kinds of set points that have to be allowed before they are commanded.
+Kind: TypeAlias = Literal["position", "attitude", "rates"]
+
+
+class Place(NamedTuple):
+    """A position, m: north and east as the vehicle reports them, the height; a heading, rad."""
+
+    north: float
+    east: float
+    height: float
+    heading: float
+
+
+class Attitude(NamedTuple):
+    """Roll (right), pitch (nose up) and heading, rad, and a share of the largest thrust."""
+
+    roll: float
+    pitch: float
+    heading: float
+    thrust: float
+
+
+class BodyRates(NamedTuple):
+    """Rates around the axes of the vehicle (forward, right, down), rad/s, and a share of thrust."""
+
+    roll: float
+    pitch: float
+    turn: float
+    thrust: float
+
+
+Point: TypeAlias = Motion | Place | Attitude | BodyRates
+
+P = TypeVar("P", Place, Attitude, BodyRates)
+
+
+def _checked(point: P) -> P:
+    for name, value in point._asdict().items():
+        finite(name, value)
+    return point
+
+
+def _between(low: float, value: float, high: float) -> float:
+    return max(low, min(high, value))
+
+
+def place_within(place: Place, origin: VehicleState, limits: Limits) -> Place:
+    """The nearest place within the heights, and the distance from where it took off.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    north, east, height, heading = _checked(place)
+    at = origin.north or 0.0, origin.east or 0.0
+    away = math.hypot(north - at[0], east - at[1])
+    share = min(1.0, limits.max_distance / max(away, 1e-300))
+    return Place(
+        at[0] + share * (north - at[0]),
+        at[1] + share * (east - at[1]),
+        _between(limits.min_height, height, limits.max_height),
+        math.remainder(heading, 2.0 * math.pi),
+    )
+
+
+def attitude_within(attitude: Attitude, limits: Limits) -> Attitude:
+    """The attitude with less tilt, in its direction, and a thrust that is allowed.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    roll, pitch, heading, thrust = _checked(attitude)
+    share = min(1.0, limits.max_angle / max(math.hypot(roll, pitch), 1e-300))
+    return Attitude(
+        share * roll,
+        share * pitch,
+        math.remainder(heading, 2.0 * math.pi),
+        _between(limits.min_thrust, thrust, limits.max_thrust),
+    )
+
+
+def rates_within(rates: BodyRates, state: VehicleState, limits: Limits) -> BodyRates:
+    """The nearest rates at which the tilt stays within its limit while the command is valid.
+
+    A tilt beyond the limit is brought back.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    roll, pitch, turn, thrust = _checked(rates)
+    most = limits.max_body_rate
+
+    def tilting(rate: float, angle: float) -> float:
+        low, high = (
+            (end - angle) / limits.command_age for end in (-limits.max_angle, limits.max_angle)
+        )
+        return _between(-most, _between(low, rate, high), most)
+
+    return BodyRates(
+        tilting(roll, state.roll),
+        tilting(pitch, state.pitch),
+        _between(-min(most, limits.max_yaw_rate), turn, min(most, limits.max_yaw_rate)),
+        _between(limits.min_thrust, thrust, limits.max_thrust),
+    )
