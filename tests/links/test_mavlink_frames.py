@@ -13,6 +13,7 @@ from deadtime.links.mavlink.codec import Codec, dialect
 from deadtime.links.mavlink.senders import Senders
 from deadtime.links.mavlink.states import StateReader
 from deadtime.links.mavlink.time_sync import TimeSync
+from mavlink_frames import crc, damaged
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 #: Frames whose bytes are known: a set point from 255/190, a heartbeat of PX4 from 1/1.
@@ -23,16 +24,6 @@ SET_POINT = bytes.fromhex(
 HEARTBEAT = bytes.fromhex("fd09000000010100000000000600020c810403d291")
 
 KEY = bytes(range(32))
-
-
-def crc(data, extra):
-    """CRC-16/MCRF4XX over the bytes of a frame after the first, and its CRC_EXTRA, bit by bit."""
-    value = 0xFFFF
-    for byte in (*data, extra):
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0x8408 if value & 1 else 0)
-    return value
 
 
 def flight(seed, count=40, key=None):
@@ -59,25 +50,6 @@ def flight(seed, count=40, key=None):
         frames.append(message.pack(mav))
         mav.seq = (mav.seq + 1) % 256
     return frames
-
-
-def damaged(frame, numbers):
-    """A copy with flipped, cut, or added bytes that no longer hold it."""
-    while True:
-        data = bytearray(frame)
-        for _ in range(numbers.randint(1, 3)):
-            what = numbers.random()
-            place = numbers.randrange(len(data)) if data else 0
-            if what < 0.7 and data:
-                data[place] ^= 1 << numbers.randrange(8)
-            elif what < 0.8:
-                del data[place:]
-            elif what < 0.9:
-                data[place:place] = numbers.randbytes(numbers.randint(1, 4))
-            else:
-                data[place : place + 4] = numbers.randbytes(4)
-        if frame not in data:
-            return bytes(data)
 
 
 def survives(count, seed):
