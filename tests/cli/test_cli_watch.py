@@ -8,10 +8,12 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from dataclasses import replace
 
 import deadtime as dtm
 import numpy as np
 import pytest
+from browser import check_tab, chromium
 from deadtime._cli.watch_page import WatchPage
 from deadtime._cli.watched import Columns, Row, Sent, growing, heard, recorded
 from deadtime.estimation import online
@@ -100,6 +102,36 @@ def test_a_link_is_listened_to_and_never_answered():
 def test_a_link_that_would_be_sent_to_is_refused():
     with pytest.raises(ValueError, match="give udp:HOST:PORT"):
         list(heard(LinkAddress.of("tcp:127.0.0.1:5760"), "z", 0.1))
+
+
+def test_labels_are_as_large_on_a_phone_and_nothing_is_missing():
+    rows = 0.065 * np.arange(200)
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
+    one = online(dtm.Recording(rows, rows, rows, rows), loop, noise=0.01).last
+    shown = WatchPage("a flight")
+    try:
+        for moment in (0.0, 5.0, 10.0):
+            shown.show(replace(one, time=moment, known=True))
+        with chromium() as browser:
+            tab = browser.new_page()
+            missing: list[str] = []
+            tab.on("response", lambda it: it.ok or missing.append(it.url))
+            for width in (1300, 360):
+                tab.set_viewport_size({"width": width, "height": 800})
+                tab.goto(shown.address)
+                tab.wait_for_selector("#marks text")
+                boxes = tab.evaluate(
+                    "() => [...document.querySelectorAll('#marks text')]"
+                    ".map((label) => label.getBoundingClientRect())"
+                    ".map((box) => [box.height, box.right])"
+                )
+                heights, ends = zip(*boxes, strict=True)
+                assert min(heights) >= 12.0
+                assert max(ends) <= width
+                check_tab(tab, width)
+            assert missing == []
+    finally:
+        shown.close()
 
 
 def test_the_page_is_for_this_computer_alone():

@@ -13,7 +13,8 @@ import pytest
 from deadtime._cli.vehicles import emulated_drone
 from deadtime.estimation import OnlineEstimator
 from deadtime.flights import AdaptivePlan, FlightPlan, MovingDelay
-from deadtime.flights._adaptive_control import AdaptiveControl, ScheduledControl
+from deadtime.flights._adaptive import STEP_COLUMNS, AdaptiveStudy
+from deadtime.flights._adaptive_control import AdaptiveControl, ChosenSet, ScheduledControl
 from deadtime.links import Limits, now, run
 from deadtime.tuning import SwitchingProof, adaptive_gains
 
@@ -149,6 +150,28 @@ def test_the_programme_steps_up_and_down_for_its_duration():
     assert programme.duration == 40.0
 
 
+def test_each_step_has_a_row_with_the_delay_that_was_known(schedule):
+    time = 0.1 * np.arange(400)
+    reference = 0.3 * (np.arange(400) // 100 % 2)
+    quick, slow = (
+        dtm.Recording(time, reference, np.convolve(reference, np.ones(n) / n)[:400])
+        for n in (10, 40)
+    )
+    choices = tuple(
+        ChosenSet(7.0 + t, 0.1, 0.2 + 0.01 * t, k // 150, True) for k, t in enumerate(time.tolist())
+    )
+    study = AdaptiveStudy(schedule, slow, quick, choices)
+    rows = study.rows()
+    assert [row[0] for row in rows] == ["10", "20", "30"]
+    assert [row[5] for row in rows] == ["0.10 to 0.30", "0.10 to 0.40", "0.10 to 0.50"]
+    assert [row[6] for row in rows] == [
+        f"{schedule.sets[number].delays[1]:.2f}" for number in (0, 1, 2)
+    ]
+    assert all(len(row) == len(STEP_COLUMNS) for row in rows)
+    assert float(rows[0][2]) == pytest.approx(3.8, abs=0.2)
+    assert float(rows[0][4]) == pytest.approx(0.9, abs=0.2)
+
+
 @pytest.mark.survey
 def test_the_command_flies_them_in_virtual_time(tmp_path):
     if "DEADTIME_LONG_FLIGHTS" not in os.environ:
@@ -162,6 +185,9 @@ def test_the_command_flies_them_in_virtual_time(tmp_path):
     adaptive = json.loads(done.stdout)["adaptive"]["z"]
     assert adaptive["error_adaptive"] < adaptive["error_robust"]
     assert SwitchingProof.from_json((tmp_path / "proof-z.json").read_text()).verify() >= 0.5
+    page = (tmp_path / "report.html").read_text()
+    assert "<h2>Gains that follow the delay</h2>" in page
+    assert all(f'<th scope="col">{head}</th>' in page for head in STEP_COLUMNS)
     with (tmp_path / "choices-z.csv").open() as file:
         choices = list(csv.DictReader(file))
     assert len({row["set"] for row in choices}) > 1

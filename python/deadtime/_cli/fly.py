@@ -21,6 +21,7 @@ from deadtime._cli.show import (
 from deadtime._cli.vehicles import flown_vehicle
 from deadtime.flights import (
     AdaptivePlan,
+    AdaptiveStudy,
     FlightPlan,
     FlightStudy,
     MovingDelay,
@@ -193,7 +194,7 @@ def command(
             stages(count, quiet=as_json) as begin,
         ):
             studies = fly_axes(vehicle.connect, plans, where, begin, vehicle.run, _print_note)
-            adapted = {
+            adapted: dict[str, AdaptiveStudy] = {
                 study.axis.name: fly_adaptive(
                     vehicle.connect, study, adaptive, where, begin, vehicle.run, moving
                 )
@@ -217,7 +218,7 @@ def command(
     }
     text = as_json_text("flight", result)
     (where / "result.json").write_text(text + "\n", encoding="utf-8")
-    write_flight_page(studies, page, vehicle.name)
+    write_flight_page(studies, page, vehicle.name, adapted)
     if as_json:
         print_json("flight", result)
     else:

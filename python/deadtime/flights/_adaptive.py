@@ -25,6 +25,7 @@ from deadtime.flights._fly import Connect
 from deadtime.flights._moving_delay import MovingDelay
 from deadtime.flights._plan import FlightPlan
 from deadtime.flights._plants import for_small_commands
+from deadtime.flights._runs import measures_of, settled
 from deadtime.flights._step_test import StepProgramme, fly_steps, row_columns
 from deadtime.flights._study import FlightStudy
 from deadtime.links.clock import now
@@ -44,6 +45,18 @@ BEYOND, DRIFT, LEVEL = 0.1, 0.01, 0.999
 
 #: The proof is for steps that are larger than those flown by this factor.
 SPARE = 2.0
+
+
+#: Headings of the columns of `AdaptiveStudy.rows`.
+STEP_COLUMNS = (
+    "step at / s",
+    "robust gains: overshoot / %",
+    "settled / s",
+    "gains that follow: overshoot / %",
+    "settled / s",
+    "delay at the step / s",
+    "gains for up to / s",
+)
 
 
 @dataclass(frozen=True)
@@ -116,6 +129,26 @@ class AdaptiveStudy:
             f"{1e3 * adaptive:.1f} with gains that follow the delay",
             f"time in each set: {used}",
         ]
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A row for each step, with the headings `STEP_COLUMNS`."""
+        times = np.array([one.time - self.choices[0].time for one in self.choices])
+        found: list[tuple[str, ...]] = []
+        for one, other in zip(measures_of(self.robust), measures_of(self.adaptive), strict=False):
+            place = int(np.searchsorted(times, other.step.time, side="right")) - 1
+            choice = self.choices[max(0, place)]
+            found.append(
+                (
+                    f"{one.step.time:.0f}",
+                    f"{one.overshoot:.1f}",
+                    settled(one.settling_time),
+                    f"{other.overshoot:.1f}",
+                    settled(other.settling_time),
+                    f"{choice.low:.2f} to {choice.high:.2f}",
+                    f"{self.schedule.sets[choice.number].delays[1]:.2f}",
+                )
+            )
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

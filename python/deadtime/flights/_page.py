@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from deadtime._base.digits import stated
 from deadtime._base.drawing import new_figure
 from deadtime._base.page import page, write_page
+from deadtime.flights._adaptive import STEP_COLUMNS, AdaptiveStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 from deadtime.flights._study import COLUMNS, FlightStudy
@@ -21,7 +22,10 @@ PARTS = ("what", "time", "95 % interval")
 
 
 def write_flight_page(
-    studies: FlightStudy | Sequence[FlightStudy], path: Path, vehicle: str
+    studies: FlightStudy | Sequence[FlightStudy],
+    path: Path,
+    vehicle: str,
+    adapted: Mapping[str, AdaptiveStudy] | None = None,
 ) -> Path:
     """Write the page to `path` and return it.
 
@@ -33,19 +37,24 @@ def write_flight_page(
         The file.
     vehicle : str
         Its name in words.
+    adapted : mapping of str to AdaptiveStudy, optional
+        Flights with gains that follow the delay, by axis.
     """
     several = [studies] if isinstance(studies, FlightStudy) else list(studies)
-    return write_page(render(several, vehicle), path)
+    return write_page(render(several, vehicle, adapted or {}), path)
 
 
-def render(studies: Sequence[FlightStudy], vehicle: str) -> str:
+def render(
+    studies: Sequence[FlightStudy], vehicle: str, adapted: Mapping[str, AdaptiveStudy]
+) -> str:
     """The page as text."""
     return page(
         "flights/page.html",
         title=f"Steps flown by {vehicle}",
         described=_described(studies, vehicle),
         verdict=_verdict(studies),
-        axes=[_axis(study, len(studies) > 1) for study in studies],
+        axes=[_axis(study, len(studies) > 1, adapted) for study in studies],
+        step_heads=STEP_COLUMNS,
         heads=COLUMNS,
         parts_heads=PARTS,
     )
@@ -62,9 +71,12 @@ def _verdict(studies: Sequence[FlightStudy]) -> str:
     return " ".join(sentences)
 
 
-def _axis(study: FlightStudy, several: bool) -> dict[str, Any]:
+def _axis(
+    study: FlightStudy, several: bool, adapted: Mapping[str, AdaptiveStudy]
+) -> dict[str, Any]:
     """What the page has of one axis."""
     designed, axis = study.learned.designed, study.axis
+    following = adapted.get(axis.name)
     return {
         "name": axis.name,
         "of": f" of {axis.name}, the {axis.words}" if several else "",
@@ -77,6 +89,8 @@ def _axis(study: FlightStudy, several: bool) -> dict[str, Any]:
         "telemetry": _telemetry(study),
         "gains": designed.summary(),
         "explorer": live_design(designed),
+        "following": None if following is None else "\n".join(following.lines()),
+        "steps": [] if following is None else following.rows(),
     }
 
 

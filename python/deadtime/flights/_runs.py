@@ -204,29 +204,12 @@ class FlownSteps:
     @cached_property
     def steps(self) -> list[StepMeasures]:
         """Measures of every step."""
-        steps = self.recording.steps()
-        ends = [step.index for step in steps[1:]] + [len(self.recording)]
-        return [self._measures(step, end) for step, end in zip(steps, ends, strict=True)]
+        return measures_of(self.recording)
 
-    def _measures(self, step: Step, end: int) -> StepMeasures:
-        output = self.recording.output[step.index : end]
-        beyond = (output - step.after) / step.amplitude
-        band = max(BAND, NOISES * self.noise / abs(step.amplitude))
-        outside = np.flatnonzero(np.abs(beyond) > band)
-        settling = 0.0
-        if outside.size:
-            last = step.index + int(outside[-1]) + 1
-            settling = np.nan if last >= end else float(self.recording.time[last] - step.time)
-        return StepMeasures(step, 100.0 * max(0.0, float(beyond.max())), settling)
-
-    @cached_property
+    @property
     def noise(self) -> float:
-        """Standard deviation of the output's noise: without the motion.
-
-        From its second differences, to which motion adds little but around steps, by their median.
-        """
-        bends = np.abs(np.diff(self.recording.output, 2))
-        return float(1.4826 * np.median(bends) / np.sqrt(6.0))
+        """Standard deviation of the output's noise: without the motion."""
+        return noise_of(self.recording)
 
     @property
     def overshoot(self) -> float:
@@ -254,6 +237,37 @@ class FlownSteps:
         return LoopTiming(
             float(np.median(periods)), float(periods.std()), float(periods.max()), missed
         )
+
+
+def measures_of(recording: Recording) -> list[StepMeasures]:
+    """Measures of every step of a recording."""
+    steps, noise = recording.steps(), noise_of(recording)
+    ends = [step.index for step in steps[1:]] + [len(recording)]
+    found = []
+    for step, end in zip(steps, ends, strict=True):
+        beyond = (recording.output[step.index : end] - step.after) / step.amplitude
+        band = max(BAND, NOISES * noise / abs(step.amplitude))
+        outside = np.flatnonzero(np.abs(beyond) > band)
+        settling = 0.0
+        if outside.size:
+            last = step.index + int(outside[-1]) + 1
+            settling = np.nan if last >= end else float(recording.time[last] - step.time)
+        found.append(StepMeasures(step, 100.0 * max(0.0, float(beyond.max())), settling))
+    return found
+
+
+def noise_of(recording: Recording) -> float:
+    """Standard deviation of the noise of an output: without the motion.
+
+    From its second differences, to which motion adds little but around steps, by their median.
+    """
+    bends = np.abs(np.diff(recording.output, 2))
+    return float(1.4826 * np.median(bends) / np.sqrt(6.0))
+
+
+def settled(time: float) -> str:
+    """A settling time in words."""
+    return f"{time:.2f}" if np.isfinite(time) else "not"
 
 
 def named(controller: P | PV) -> str:

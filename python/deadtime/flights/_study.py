@@ -12,7 +12,7 @@ from deadtime.estimation import DelayEstimate
 from deadtime.flights._learn import Learned
 from deadtime.flights._plan import FlightPlan
 from deadtime.flights._plants import lag_of_limits
-from deadtime.flights._runs import FlownSteps
+from deadtime.flights._runs import FlownSteps, settled
 from deadtime.links.axes import Axis
 from deadtime.loops import RateLimited
 
@@ -108,13 +108,12 @@ class FlightStudy:
         methods = [*self.learned.overshoot, *([""] * len(self.checked))]
         for flight, paper in zip(self.flights, methods, strict=True):
             delay = paper if isinstance(paper, str) else f"{paper.delay:.3f}"
-            settled = flight.settling_time
             timing = flight.timing
             found.append(
                 (
                     flight.name,
                     f"{flight.overshoot:.1f}",
-                    f"{settled:.2f}" if np.isfinite(settled) else "not",
+                    settled(flight.settling_time),
                     delay if len(delay) < 8 else "none",
                     f"{1e3 * timing.period:.1f} ± {1e3 * timing.jitter:.1f}",
                     f"{timing.missed}",
@@ -180,6 +179,6 @@ def _part(fit: DelayEstimate, name: str, words: str) -> tuple[str, str, str]:
 
 
 def _did(flight: FlownSteps) -> str:
-    settled = flight.settling_time
-    when = f"settled in {settled:.1f} s" if np.isfinite(settled) else "did not settle"
+    after = flight.settling_time
+    when = f"settled in {after:.1f} s" if np.isfinite(after) else "did not settle"
     return f"{when} with {flight.overshoot:.0f} % overshoot"
