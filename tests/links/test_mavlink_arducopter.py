@@ -78,3 +78,18 @@ def test_rates_and_thrust_are_followed(set_points):
 def test_what_set_points_need_is_put_back(set_points):
     assert set_points["held"] == [8.0, 100.0]
     assert set_points["put_back"] == [0.0, 1000.0]
+
+
+def test_a_flight_goes_on_over_the_second_of_two_links():
+    flown = json.loads(told_by("arducopter_two_links.py", timeout=240.0).splitlines()[-1])
+    assert [one.partition(";")[0] for one in flown["said"]] == [
+        "udp:127.0.0.1:14550: nothing received for 0.2 s"
+    ]
+    for place in ("first", "second"):
+        assert flown[place]["echo"] == pytest.approx(0.3)
+        assert flown[place]["climb"] == pytest.approx(0.3, abs=0.1)
+        assert flown[place]["missing"] < 20
+    # The relay on the first link adds 40 ms to each round trip.
+    assert flown["first_trip"] > flown["second_trip"] + 0.03
+    assert flown["second"]["oldest"] < 0.5
+    assert flown["landed"]
