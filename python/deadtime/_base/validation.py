@@ -15,6 +15,8 @@ from typing import Any, SupportsFloat, SupportsIndex, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_FLOAT = np.dtype(np.float64)
+
 #: A range between two numbers.
 Range: TypeAlias = tuple[float, float]
 
@@ -97,7 +99,7 @@ def unmasked(name: str, values: Any) -> Any:
 
 def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return `values` as an array of floats, or raise where they are no real numbers."""
-    if type(values) is np.ndarray and values.dtype == np.float64:
+    if type(values) is np.ndarray and (values.dtype is _FLOAT or values.dtype == _FLOAT):
         return values
     values = unmasked(name, values)
     try:

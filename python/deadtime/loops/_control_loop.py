@@ -103,10 +103,10 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
                 )
             delay = in_series + (0.0 if delay is None else non_negative("delay", delay))
         specification = LoopSpecification(own, controller, delay, sample_time, limit, delay_path)
-        put = object.__setattr__
-        put(self, "specification", specification)
-        for name in _NAMES:
-            put(self, name, getattr(specification, name))
+        given = vars(specification)
+        mine = {name: given[name] for name in _NAMES}
+        mine["specification"] = specification
+        object.__setattr__(self, "__dict__", mine)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Without what is kept for speed.

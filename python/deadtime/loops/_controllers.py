@@ -83,13 +83,17 @@ class Controller(ABC):
     __array_ufunc__ = None
 
     def __post_init__(self) -> None:
+        is_open = True
         for name in self._gains():
-            object.__setattr__(self, name, finite(name, getattr(self, name)))
-        if all(getattr(self, name) == 0.0 for name in self._gains()):
+            value = finite(name, getattr(self, name))
+            object.__setattr__(self, name, value)
+            is_open = is_open and value == 0.0
+        if is_open:
             gains = ", ".join(f"{name}=0" for name in self._gains())
             raise ValueError(f"{gains}: the loop is open, give a gain other than zero")
-        if self._filter is not None and not isinstance(self._filter, DerivativeFilter):
-            raise TypeError(f"filter={self._filter!r}: give a DerivativeFilter or None")
+        smooth = self._filter
+        if smooth is not None and not isinstance(smooth, DerivativeFilter):
+            raise TypeError(f"filter={smooth!r}: give a DerivativeFilter or None")
 
     @classmethod
     @abstractmethod
@@ -108,9 +112,9 @@ class Controller(ABC):
     @property
     def parameters(self) -> dict[str, float]:
         """The gains, and ``omega`` and ``damping`` of the filter where there is one."""
-        numbers = self.gains
-        if self._filter is not None:
-            numbers |= {"omega": self._filter.omega, "damping": self._filter.damping}
+        numbers, smooth = self.gains, self._filter
+        if smooth is not None:
+            numbers |= {"omega": smooth.omega, "damping": smooth.damping}
         return numbers
 
     def transfer_function(self) -> TransferFunction:

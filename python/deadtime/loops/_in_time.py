@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, one_dimensional
-from deadtime._deadtime import on_samples
+from deadtime._deadtime import LoopResponse, on_samples
 from deadtime.loops._characteristic import closed_loop
 from deadtime.loops._model import LoopRun, reference_jumps
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
@@ -127,36 +127,32 @@ class LoopInTime:
         times = one_dimensional("time", time)
         if times.size == 0:
             raise ValueError("time is empty: give at least one output time")
-        initial = before = finite("initial_output", initial_output)
-        if reference_before is not None:
-            before = finite("reference_before", reference_before)
-        held: float | Vector
-        past, held_from = before, None
-        if type(reference) is float and reference_time is None:
-            held = finite("reference", reference)
+        run: LoopRun | float
+        if (
+            type(reference) is type(initial_output) is type(sample_phase) is float
+            and initial_output == sample_phase == 0.0
+            and reference_before is reference_time is None
+            and type(command_history) is tuple
+            and not command_history
+        ):
+            run, past = finite("reference", reference), 0.0
         else:
-            jumps = reference_jumps(times, reference, reference_time, before)
-            # The arrays belong to the caller; the response must not change with them.
-            held, held_from = jumps.values.copy(), jumps.times.copy()
-            if held_from[0] < times[0]:
-                past = jumps.just_before(float(times[0]))
-        history = None
-        if not isinstance(command_history, tuple) or command_history:
-            history = one_dimensional("command_history", command_history).copy()
-        phase = finite("sample_phase", sample_phase)
-        state, command = loop.rest_at(initial, past)
-        run = (state, command, before, held, held_from, history, phase)
-        found = loop.native.respond(times, run, loop.output_lead)
-        response = Response._of_fresh(found, _Again(loop, found["time"], run))
+            run, past = _run_of(
+                loop, times, reference, initial_output, reference_before, reference_time,
+                command_history, sample_phase,
+            )  # fmt: skip
+        found = loop.native.respond(times, run, loop.delay_path == "measurement")
+        response = Response._of_run(_Again(loop, run, found))
         if not sensitivities:
             return response
         names, start = slope_names(loop, sensitivities), float(times[0])
+        whole = _whole(loop, run)
         slopes, input_slopes = output_and_input_slopes(
             loop,
             names,
-            (initial, past),
-            _moved(loop, response.time - start, start, phase),
-            _since_start(loop, start, LoopRun(*run)),
+            (float(initial_output), past),
+            _moved(loop, response.time - start, start, whole.sample_phase),
+            _since_start(loop, start, whole),
         )
         return replace(response, sensitivities=slopes, input_sensitivities=input_slopes)
 
@@ -233,6 +229,45 @@ class LoopInTime:
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
 
 
+def _run_of(
+    loop: LoopSpecification,
+    times: Vector,
+    reference: ArrayLike,
+    initial_output: float,
+    reference_before: float | None,
+    reference_time: ArrayLike | None,
+    command_history: ArrayLike,
+    sample_phase: float,
+) -> tuple[LoopRun, float]:
+    """Check the arguments of `simulate`: the run, and the reference just before its start."""
+    initial = before = finite("initial_output", initial_output)
+    if reference_before is not None:
+        before = finite("reference_before", reference_before)
+    held: float | Vector
+    past, held_from = before, None
+    if type(reference) is float and reference_time is None:
+        held = finite("reference", reference)
+    else:
+        jumps = reference_jumps(times, reference, reference_time, before)
+        # The arrays belong to the caller; the response must not change with them.
+        held, held_from = jumps.values.copy(), jumps.times.copy()
+        if held_from[0] < times[0]:
+            past = jumps.just_before(float(times[0]))
+    history = None
+    if not isinstance(command_history, tuple) or command_history:
+        history = one_dimensional("command_history", command_history).copy()
+    phase = finite("sample_phase", sample_phase)
+    state, command = loop.rest_at(initial, past)
+    return LoopRun(state, command, before, held, held_from, history, phase), past
+
+
+def _whole(loop: LoopSpecification, run: LoopRun | float) -> LoopRun:
+    """A run; a number is the height of a step from rest at zero."""
+    if isinstance(run, LoopRun):
+        return run
+    return LoopRun(*loop.rest_at(0.0, 0.0), reference=run)
+
+
 def _since_start(loop: LoopSpecification, start: float, run: LoopRun) -> LoopRun:
     """The run in the clock of the stepper, which is zero at the start."""
     times = np.array([start]) if run.reference_time is None else run.reference_time
@@ -247,19 +282,34 @@ def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -
     return on_samples(since, start, loop.sample_time, phase)
 
 
+class _Start(NamedTuple):
+    """What is left of a response that was copied: its parts stand in the copy."""
+
+    start: float
+
+
 class _Again:
-    """Output of a run at other times: the run is repeated for them."""
+    """A run of a loop: its response, and outputs at other times, for which it is repeated."""
 
-    __slots__ = ("loop", "run", "times")
+    __slots__ = ("found", "loop", "run")
 
-    def __init__(self, loop: LoopSpecification, times: Vector, run: tuple[Any, ...]) -> None:
-        self.loop, self.times, self.run = loop, times, run
+    def __init__(
+        self, loop: LoopSpecification, run: LoopRun | float, found: LoopResponse | _Start
+    ) -> None:
+        self.loop, self.run, self.found = loop, run, found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Again, (self.loop, self.run, _Start(cast(float, self.found.start)))
+
+    def part(self, name: str) -> Vector:
+        """One of the arrays of the response."""
+        return cast(Vector, getattr(self.found, name))
 
     def steady_state(self) -> float | None:
         """Output at rest under the last reference, None without such a rest."""
-        return self.loop.steady_state(float(np.ravel(LoopRun(*self.run).reference)[-1]))
+        return self.loop.steady_state(float(np.ravel(_whole(self.loop, self.run).reference)[-1]))
 
     def __call__(self, times: Vector) -> Vector:
-        start = float(self.times[0])
-        run = _since_start(self.loop, start, LoopRun(*self.run))
+        start = cast(float, self.found.start)
+        run = _since_start(self.loop, start, _whole(self.loop, self.run))
         return self.loop.native.outputs(times - start + self.loop.output_lead, run)

@@ -95,7 +95,8 @@ class LoopModel:
                 "has no ideal derivative: give the controller a DerivativeFilter"
             )
         n, m = len(p.B), len(c.B)
-        K, L = c.p * p.C, c.p * p.D
+        # The first state of a plant is y - D w.
+        K, L = vector([c.p, *[0.0] * (n - 1)]) if n else p.C, c.p * p.D
         if c.q != 0.0:
             K, L = K + c.q * (p.C @ p.A), L + c.q * (p.B @ p.C)
         A, B, E, C = p.A, p.B, np.zeros(n), p.C

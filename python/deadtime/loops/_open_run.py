@@ -47,5 +47,5 @@ def open_response(
     start = float(min(times[0], command_time[0]))
     clock = np.concatenate([[start], times]) if times[0] > start else times
     run = LoopRun(state, before, before, command, command_time)
-    outputs = open_loop.native(0.0).respond(clock, run, 0.0)["outputs"]
+    outputs = open_loop.native(0.0).respond(clock, run, False).outputs
     return np.asarray(outputs[clock.size - times.size :])

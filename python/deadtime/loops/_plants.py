@@ -302,16 +302,21 @@ def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
     """Observable canonical form of num/den (descending, proper); entries may be arrays."""
     a, b = _led(den), _led(num)
     lead, n = a[0], len(a) - 1
-    b = [0.0] * (n + 1 - len(b)) + b
-    direct = b[0] / lead
     poles = [c / lead for c in a[1:]]
+    if len(b) > n:
+        direct = b[0] / lead
+        drive = [gain / lead - pole * direct for gain, pole in zip(b[1:], poles, strict=True)]
+    else:
+        direct = 0.0
+        drive = [0.0] * (n - len(b)) + [gain / lead for gain in b]
     flat = [0.0] * (n * n)
-    flat[1 :: n + 1] = [1.0] * max(n - 1, 0)
     for i, pole in enumerate(poles):
         flat[i * n] = 0.0 - pole
-    drive = [gain / lead - pole * direct for gain, pole in zip(b[1:], poles, strict=True)]
+        if i:
+            flat[(i - 1) * n + i] = 1.0
     first = np.zeros(n)
-    first[:1] = 1.0
+    if n:
+        first[0] = 1.0
     return StateSpace(vector(flat).reshape(n, n), vector(drive), first, number(direct))
 
 

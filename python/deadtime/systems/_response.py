@@ -35,12 +35,19 @@ _LOST = 20.0
 #: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
 
+#: What a `KeptRun` holds.
+PARTS = frozenset(("time", "outputs", "inputs", "breaks", "reference"))
 
-class RepeatedRun(Protocol):
-    """A run that can be repeated for what it was not asked for at first."""
+
+class KeptRun(Protocol):
+    """A run that gives parts of its response when they are read."""
 
     def __call__(self, times: Vector) -> Vector:
         """Outputs at other times."""
+        ...
+
+    def part(self, name: str) -> Vector:
+        """One of `PARTS`, which nobody can write to."""
         ...
 
     def steady_state(self) -> float | None:
@@ -109,21 +116,32 @@ class Response(ReadOnlyArrays, Pictured):
         self._freeze()
 
     @classmethod
-    def _of_fresh(cls, fields: dict[str, Any], run: RepeatedRun) -> Response:
-        """Make a response of the read-only arrays of `fields`, which becomes its own dict."""
-        fields["sensitivities"] = fields["input_sensitivities"] = NONE
-        fields["_dense"] = run
+    def _of_run(cls, run: KeptRun) -> Response:
+        """Make a response whose parts are those of a run, taken from it as they are read."""
         response = object.__new__(cls)
-        object.__setattr__(response, "__dict__", fields)
+        object.__setattr__(response, "_dense", run)
         return response
 
     def __getattr__(self, name: str) -> Any:
-        """Find the steady state when it is first read: few runs are asked for it."""
+        """Find what is first read now: few runs are asked for all they have."""
         run = self.__dict__.get("_dense")
-        if name != "steady_state" or run is None:
+        if run is None:
             raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}")
-        self.__dict__[name] = run.steady_state()
-        return self.__dict__[name]
+        if name in PARTS:
+            value = run.part(name)
+        elif name == "steady_state":
+            value = run.steady_state()
+        elif name in ("sensitivities", "input_sensitivities"):
+            value = NONE
+        else:
+            raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}")
+        self.__dict__[name] = value
+        return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        for name in PARTS:
+            getattr(self, name)
+        return self.__dict__
 
     def __repr__(self) -> str:
         outputs = "1 output" if self.outputs.ndim == 1 else f"{len(self.outputs)} outputs"
@@ -247,8 +265,8 @@ class Response(ReadOnlyArrays, Pictured):
         return ax
 
 
-# Without a default in the class, a steady state that is missing in a response is found on demand.
-del Response.steady_state
+# Without a default in the class, what is missing in a response is found on demand.
+del Response.steady_state, Response.reference
 
 
 def first_duration(A: NDArray[np.float64], delay: float) -> float:

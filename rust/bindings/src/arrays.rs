@@ -4,14 +4,16 @@
 use std::borrow::Cow;
 
 use deadtime::{Error, memory};
-use numpy::ndarray::ArrayViewD;
+use numpy::ndarray::{ArrayView1, ArrayViewD};
 use numpy::npyffi::NPY_ARRAY_WRITEABLE;
 use numpy::{
     Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
     PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
+use pyo3::PyClass;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::pyclass::boolean_struct::True;
 use pyo3::types::{PyFloat, PyList};
 
 use crate::errors::to_python;
@@ -50,11 +52,32 @@ pub(crate) fn rows(matrix: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
 /// An array of the values that nobody can write to. Short ones are copied, since NumPy then frees
 /// one object instead of two.
 pub(crate) fn frozen(py: Python<'_>, values: Vec<f64>) -> Bound<'_, PyArray1<f64>> {
-    let array = if values.len() <= SHORT {
+    read_only(if values.len() <= SHORT {
         PyArray1::from_slice(py, &values)
     } else {
         values.into_pyarray(py)
+    })
+}
+
+/// An array of numbers in an object that does not change, which nobody can write to. Short ones are
+/// copied; longer ones keep the object.
+pub(crate) fn part_of<'py, T: PyClass<Frozen = True> + Sync>(
+    object: &Bound<'py, T>,
+    numbers: impl Fn(&T) -> &[f64],
+) -> Bound<'py, PyArray1<f64>> {
+    let values = numbers(object.get());
+    if values.len() <= SHORT {
+        return read_only(PyArray1::from_slice(object.py(), values));
+    }
+    // SAFETY: a frozen object does not change, and the array keeps it.
+    #[allow(unsafe_code)]
+    let array = unsafe {
+        PyArray1::borrow_from_array(&ArrayView1::from(values), object.clone().into_any())
     };
+    read_only(array)
+}
+
+fn read_only(array: Bound<'_, PyArray1<f64>>) -> Bound<'_, PyArray1<f64>> {
     // SAFETY: the array is new and nobody else has it.
     #[allow(unsafe_code)]
     unsafe {

@@ -2,18 +2,17 @@
 
 use deadtime::dde::sampled;
 use deadtime::dde::{
-    Equations, LinearLoop, RateLimits, Reference, Request, Start, Update, on_sample,
+    Equations, LinearLoop, RateLimits, Reference, Request, Response, Start, Update, on_sample,
 };
 use deadtime::frequency;
 use deadtime::stability::{HeldLoop, Specification};
 use deadtime::status::CellStatus;
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
-use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::PyFloat;
 
-use crate::arrays::{column, converted, frozen, in_order, owned};
+use crate::arrays::{column, converted, frozen, in_order, owned, part_of};
 use crate::frequency::PyMargins;
 use crate::runtime::run_here;
 
@@ -182,33 +181,44 @@ impl PyLinearLoop {
 
     /// The response at `time`, in the clock of the caller; the first of the times is the start.
     ///
-    /// Outputs are `output_lead` earlier than the measurement, in which the delay then is. Returned
-    /// are arrays of a `Response` that nobody can write to, by name; `time` is a copy.
-    fn respond<'py>(
+    /// `run` is a tuple, or the height of a step of the reference from rest at zero. Outputs are
+    /// earlier by the delay where that is in the measurement.
+    fn respond(
         &self,
-        py: Python<'py>,
-        time: Floats<'py>,
-        run: LoopRun<'py>,
-        output_lead: f64,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let start = run.start()?;
-        let times = in_order(&time)?;
-        let (reference_time, reference) = run.jumps(times.first().copied())?;
-        let request = Request {
-            time: &times,
-            output_lead,
-            reference_before: run.reference_before,
-            reference_time: &reference_time,
-            reference: &reference,
+        py: Python<'_>,
+        time: Floats<'_>,
+        run: Bound<'_, PyAny>,
+        delay_in_measurement: bool,
+    ) -> PyResult<PyLoopResponse> {
+        let time = owned(&time)?;
+        let (start, reference_before, (reference_time, reference)) =
+            if let Ok(height) = run.cast_exact::<PyFloat>() {
+                let start = Start {
+                    state: vec![0.0; self.inner.equations().states()],
+                    ..Start::default()
+                };
+                let at: Vec<f64> = time.iter().take(1).copied().collect();
+                let reference = vec![height.value(); at.len()];
+                (start, 0.0, (at, reference))
+            } else {
+                let run = run.extract::<LoopRun<'_>>()?;
+                let jumps = run.jumps(time.first().copied())?;
+                (run.start()?, run.reference_before, jumps)
+            };
+        let mut made = PyLoopResponse {
+            time,
+            output_lead: if delay_in_measurement {
+                self.inner.delay()
+            } else {
+                0.0
+            },
+            reference_before,
+            reference_time,
+            reference,
+            found: Response::default(),
         };
-        let found = run_here(py, |task| self.inner.respond(&start, &request, task))?;
-        let fields = PyDict::new(py);
-        fields.set_item(intern!(py, "time"), frozen(py, owned(&time)?))?;
-        fields.set_item(intern!(py, "outputs"), frozen(py, found.outputs))?;
-        fields.set_item(intern!(py, "inputs"), frozen(py, found.inputs))?;
-        fields.set_item(intern!(py, "breaks"), frozen(py, found.breaks))?;
-        fields.set_item(intern!(py, "reference"), frozen(py, found.reference))?;
-        Ok(fields)
+        made.found = run_here(py, |task| self.inner.respond(&start, &made.request(), task))?;
+        Ok(made)
     }
 
     /// The transition matrix of a sampled loop, limit left out.
@@ -256,6 +266,65 @@ impl PyLinearLoop {
         run_here(py, |task| {
             frequency::further_delay(HeldLoop::new(&self.inner)?, task)
         })
+    }
+}
+
+/// The response of a loop: read-only arrays of a `Response`, made when they are read.
+#[pyclass(frozen, module = "deadtime._deadtime", name = "LoopResponse")]
+pub(crate) struct PyLoopResponse {
+    time: Vec<f64>,
+    output_lead: f64,
+    reference_before: f64,
+    reference_time: Vec<f64>,
+    reference: Vec<f64>,
+    found: Response,
+}
+
+impl PyLoopResponse {
+    fn request(&self) -> Request<'_> {
+        Request {
+            time: &self.time,
+            output_lead: self.output_lead,
+            reference_before: self.reference_before,
+            reference_time: &self.reference_time,
+            reference: &self.reference,
+        }
+    }
+}
+
+#[pymethods]
+impl PyLoopResponse {
+    /// The first of the times.
+    #[getter]
+    fn start(&self) -> Option<f64> {
+        self.time.first().copied()
+    }
+
+    #[getter]
+    fn time<'py>(this: &Bound<'py, Self>) -> Vector<'py> {
+        part_of(this, |response| &response.time[..])
+    }
+
+    #[getter]
+    fn outputs<'py>(this: &Bound<'py, Self>) -> Vector<'py> {
+        part_of(this, |response| &response.found.outputs[..])
+    }
+
+    #[getter]
+    fn inputs<'py>(this: &Bound<'py, Self>) -> Vector<'py> {
+        part_of(this, |response| &response.found.inputs[..])
+    }
+
+    #[getter]
+    fn breaks<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
+        let found = converted(self.found.breaks(&self.request()))?;
+        Ok(frozen(py, found))
+    }
+
+    #[getter]
+    fn reference<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
+        let found = converted(self.request().reference_at_times())?;
+        Ok(frozen(py, found))
     }
 }
 

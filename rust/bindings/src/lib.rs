@@ -39,7 +39,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::csv::{CsvColumns, csv_columns};
     #[pymodule_export]
-    use super::dde::{PyLinearLoop, on_samples, rate_limited};
+    use super::dde::{PyLinearLoop, PyLoopResponse, on_samples, rate_limited};
     #[pymodule_export]
     use super::estimation::{
         FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, whitened_columns,

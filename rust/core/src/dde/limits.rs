@@ -32,6 +32,12 @@ pub(crate) fn slack<S: Scalar>(t: S, delay: S) -> f64 {
 /// # Errors
 /// [`Error::Argument`] with the first one that is not.
 pub(crate) fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
+    if values
+        .iter()
+        .fold(true, |all, value| all & value.is_finite())
+    {
+        return Ok(());
+    }
     match values.iter().find(|value| !value.is_finite()) {
         Some(value) => refuse!(
             "{name} holds {}: give finite numbers",

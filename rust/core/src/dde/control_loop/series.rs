@@ -151,38 +151,51 @@ impl<S: Scalar> Series<S> {
         }
     }
 
-    /// The polynomial in σ′ with σ = `offset` + `ratio` σ′.
-    pub(crate) fn shifted(&self, offset: S, ratio: S) -> Self {
-        if offset.is_nothing() {
-            return self.stretched(ratio);
-        }
-        // Repeated synthetic division by σ − offset.
-        let mut out = *self;
-        let terms = &mut out.coefficients[..=self.degree];
-        for first in 0..self.degree {
-            for j in (first..self.degree).rev() {
-                let above = terms[j + 1];
-                terms[j] += offset * above;
-            }
-        }
-        out.stretched(ratio)
+    /// Become a copy of another; only terms that are not zero are written.
+    #[inline]
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.set_degree(other.degree);
+        self.coefficients[..=other.degree].copy_from_slice(other.terms());
     }
 
-    fn stretched(&self, ratio: S) -> Self {
-        let mut out = Self::constant(S::default());
-        out.degree = self.degree;
+    /// Make room for terms up to `degree`, which the caller writes; those above become zero.
+    #[inline]
+    pub(crate) fn set_degree(&mut self, degree: usize) {
+        if self.degree > degree {
+            self.coefficients[degree + 1..=self.degree].fill(S::default());
+        }
+        self.degree = degree;
+    }
+
+    /// Become the polynomial in σ′ with σ = `offset` + `ratio` σ′.
+    #[inline]
+    pub(crate) fn shift(&mut self, offset: S, ratio: S) {
+        if !offset.is_nothing() {
+            // Repeated synthetic division by σ − offset.
+            let degree = self.degree;
+            let terms = &mut self.coefficients[..=degree];
+            for first in 0..degree {
+                for j in (first..degree).rev() {
+                    let above = terms[j + 1];
+                    terms[j] += offset * above;
+                }
+            }
+        }
+        self.stretch(ratio);
+    }
+
+    #[inline]
+    fn stretch(&mut self, ratio: S) {
         // Four powers at a time, which wait for each other a fourth as often.
         let square = ratio * ratio;
         let mut powers = [S::from(1.0), ratio, square, square * ratio];
         let fourth = square * square;
-        let chunks = self.terms().chunks(powers.len());
-        for (out, chunk) in out.coefficients.chunks_mut(powers.len()).zip(chunks) {
-            for ((out, &c), power) in out.iter_mut().zip(chunk).zip(&mut powers) {
-                *out = c * *power;
+        for chunk in self.coefficients[..=self.degree].chunks_mut(powers.len()) {
+            for (c, power) in chunk.iter_mut().zip(&mut powers) {
+                *c *= *power;
                 *power *= fourth;
             }
         }
-        out
     }
 }
 

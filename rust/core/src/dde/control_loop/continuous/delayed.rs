@@ -10,7 +10,7 @@ use crate::{Error, Task};
 use super::effort::watch;
 use super::expansion::Expansion;
 use super::impulses::Impulses;
-use super::pieces::{Order, Piece, Pieces, REPORTED, SMOOTH};
+use super::pieces::{Order, Pieces, REPORTED, SMOOTH};
 use super::saturation::{Mode, Stretch, stretches};
 use crate::dde::control_loop::series::{DEGREE, Series};
 
@@ -38,6 +38,8 @@ pub(super) fn run<S: Scalar>(
     let held = limit.map(|limit| [limit, -limit].map(Series::constant));
     let mut modes: Vec<Stretch> = Vec::new();
     let mut mode = Mode::Free;
+    let mut w = Series::constant(S::default());
+    let mut u = w;
     let mut t = S::default();
     let mut elements = 0;
     while !requested.is_done() {
@@ -79,18 +81,19 @@ pub(super) fn run<S: Scalar>(
             h = S::from(expansion.trial);
             next = t + h;
         }
-        let mut w = piece.in_local_time(t, h);
+        piece.in_local_time(t, h, &mut w);
         let part = MARGIN * expansion.expand(&equations.a, &equations.b, &forcing, &x, &w, h);
         if part < MARGIN && !is_instant {
             expansion.shorten(part);
-            w = w.shifted(S::default(), S::from(part));
+            w.shift(S::default(), S::from(part));
             h *= S::from(part);
             next = t + h;
         }
-        let mut u = expansion.command(equations, &w, r);
+        expansion.command(equations, &w, r, &mut u);
         let mut scale = h;
         if is_instant {
-            (u, scale) = (Series::constant(u.coefficients[0]), S::from(1.0));
+            u.set_degree(0);
+            scale = S::from(1.0);
         }
         if state_jumps || orders.of_output(arriving, jumps) <= REPORTED {
             requested.output_break(t)?;
@@ -130,19 +133,19 @@ pub(super) fn run<S: Scalar>(
                 requested.input_break(t + S::from(stretch.start) * h)?;
             }
             let last = stretch.end >= 1.0;
-            pieces.push(Piece {
-                start: delay + t + S::from(stretch.start) * h,
-                end: delay
-                    + if last {
-                        next
-                    } else {
-                        t + S::from(stretch.end) * h
-                    },
-                origin: t + delay,
-                scale,
-                series: *clipped(&u, stretch.mode, &held),
-                order,
-            })?;
+            let mut piece = pieces.blank();
+            piece.start = delay + t + S::from(stretch.start) * h;
+            piece.end = delay
+                + if last {
+                    next
+                } else {
+                    t + S::from(stretch.end) * h
+                };
+            piece.origin = t + delay;
+            piece.scale = scale;
+            piece.series.copy_from(clipped(&u, stretch.mode, &held));
+            piece.order = order;
+            pieces.push(piece)?;
         }
         expansion.end(S::from(1.0), &mut x);
         check_growth(&x, u.coefficients[0], next)?;

@@ -222,16 +222,25 @@ impl<S: Scalar> Expansion<S> {
     /// The series of `row` x + `gain` w + `constant`.
     pub(crate) fn combine(&self, row: &[S], gain: S, w: &Series<S>, constant: S) -> Series<S> {
         let mut out = Series::constant(constant);
-        out.degree = if gain.is_nothing() {
+        self.combine_into(row, gain, w, constant, &mut out);
+        out
+    }
+
+    /// [`Expansion::combine`] in the place of another series.
+    #[inline]
+    fn combine_into(&self, row: &[S], gain: S, w: &Series<S>, constant: S, out: &mut Series<S>) {
+        out.set_degree(if gain.is_nothing() {
             self.degree
         } else {
             self.degree.max(w.degree)
-        };
+        });
+        out.coefficients[..=out.degree].fill(S::default());
+        out.coefficients[0] = constant;
         match self.n {
-            1 => self.weigh(1, row, &mut out),
-            2 => self.weigh(2, row, &mut out),
-            3 => self.weigh(3, row, &mut out),
-            n => self.weigh(n, row, &mut out),
+            1 => self.weigh(1, row, out),
+            2 => self.weigh(2, row, out),
+            3 => self.weigh(3, row, out),
+            n => self.weigh(n, row, out),
         }
         if !gain.is_nothing() {
             for (sum, &w) in out.coefficients.iter_mut().zip(w.terms()) {
@@ -239,7 +248,6 @@ impl<S: Scalar> Expansion<S> {
             }
         }
         out.trim();
-        out
     }
 
     /// Add `row` x to `out`.
@@ -264,9 +272,15 @@ impl<S: Scalar> Expansion<S> {
             .sum()
     }
 
-    /// u on the element.
-    pub(crate) fn command(&self, equations: &Equations<S>, w: &Series<S>, r: f64) -> Series<S> {
-        self.combine(&equations.k, equations.l, w, equations.m * S::from(r))
+    /// Write u on the element.
+    pub(crate) fn command(
+        &self,
+        equations: &Equations<S>,
+        w: &Series<S>,
+        r: f64,
+        u: &mut Series<S>,
+    ) {
+        self.combine_into(&equations.k, equations.l, w, equations.m * S::from(r), u);
     }
 
     /// y on the element.
@@ -295,7 +309,8 @@ mod tests {
                 size *= 2.0 / (j + 1) as f64;
             }
             let ratio = part * (1.0 - offset);
-            let shifted = series.shifted(offset, ratio);
+            let mut shifted = series;
+            shifted.shift(offset, ratio);
             let truth = series.at(offset + ratio * sigma);
             prop_assert!((shifted.at(sigma) - truth).abs() < 2e-14);
         }

@@ -62,10 +62,11 @@ impl<S: Scalar> Piece<S> {
         }
     }
 
-    /// w over [t, t + h] as a polynomial in σ ∈ [0, 1].
-    pub(super) fn in_local_time(&self, t: S, h: S) -> Series<S> {
+    /// Write w over [t, t + h] as a polynomial in σ ∈ [0, 1].
+    pub(super) fn in_local_time(&self, t: S, h: S, local: &mut Series<S>) {
+        local.copy_from(&self.series);
         if self.series.degree == 0 {
-            return self.series;
+            return;
         }
         let offset = (t - self.origin) / self.scale;
         let offset = if offset.value().abs() <= f64::EPSILON {
@@ -73,14 +74,15 @@ impl<S: Scalar> Piece<S> {
         } else {
             offset
         };
-        self.series.shifted(offset, h / self.scale)
+        local.shift(offset, h / self.scale);
     }
 
     /// Is the other piece a continuation of this one?
     fn continues_as(&self, other: &Self) -> bool {
         let length = other.end - other.start;
-        let mine = self.in_local_time(other.start, length);
-        let theirs = other.in_local_time(other.start, length);
+        let (mut mine, mut theirs) = (self.series, other.series);
+        self.in_local_time(other.start, length, &mut mine);
+        other.in_local_time(other.start, length, &mut theirs);
         let (mut difference, mut largest) = (0.0, 0.0_f64);
         let (mut apart, mut steepest) = (0.0, 0.0_f64);
         for (&mine, &theirs) in mine.coefficients.iter().zip(&theirs.coefficients) {
@@ -99,7 +101,9 @@ pub(super) struct Pieces<S = f64> {
     /// The command before the run, in front of the queue until it has passed.
     first: Piece<S>,
     has_passed: bool,
-    queue: VecDeque<Piece<S>>,
+    queue: VecDeque<Box<Piece<S>>>,
+    /// Pieces that have passed, whose memory is used again.
+    spare: Vec<Box<Piece<S>>>,
     end: S,
     delay: S,
     /// Length of the longest of the latest pieces. Two pieces that are longer together are not
@@ -116,6 +120,7 @@ impl<S: Scalar> Pieces<S> {
             first: Piece::constant(command, delay),
             has_passed: false,
             queue: VecDeque::new(),
+            spare: Vec::new(),
             end: delay,
             delay,
             longest: 0.0,
@@ -125,7 +130,14 @@ impl<S: Scalar> Pieces<S> {
 
     pub(super) fn front(&self) -> &Piece<S> {
         let front = self.queue.front().filter(|_| self.has_passed);
-        front.unwrap_or(&self.first)
+        front.map_or(&self.first, |front| &**front)
+    }
+
+    /// A piece to fill and to [`push`](Self::push).
+    pub(super) fn blank(&mut self) -> Box<Piece<S>> {
+        self.spare
+            .pop()
+            .unwrap_or_else(|| Box::new(Piece::constant(S::default(), S::default())))
     }
 
     /// Remove what ends at `t`; returns the order of the break that is passed. The last piece
@@ -136,7 +148,7 @@ impl<S: Scalar> Pieces<S> {
             && self.queue.len() > usize::from(self.has_passed)
         {
             if self.has_passed {
-                self.queue.pop_front();
+                self.spare.extend(self.queue.pop_front());
             }
             self.has_passed = true;
             order = order.min(self.front().order);
@@ -146,31 +158,37 @@ impl<S: Scalar> Pieces<S> {
 
     /// Append a piece. A piece shorter than rounding errors is given to its neighbour, and equal
     /// constants are merged.
-    pub(super) fn push(&mut self, mut piece: Piece<S>) -> Result<(), Error> {
+    pub(super) fn push(&mut self, mut piece: Box<Piece<S>>) -> Result<(), Error> {
         self.longest = (FORGET * self.longest).max((piece.end - piece.start).value());
         piece.order = piece.order.min(self.dropped);
         let is_dust = (piece.end - self.end).value() <= slack(piece.end, self.delay)
             && !part_ways(piece.end, self.end);
-        let last = self.queue.back_mut().unwrap_or(&mut self.first);
+        let last = match self.queue.back_mut() {
+            Some(last) => &mut **last,
+            None => &mut self.first,
+        };
         let is_same = last.series.degree == 0 && last.series == piece.series;
         self.end = piece.end;
         if is_dust {
             self.dropped = piece.order;
             last.end = piece.end;
+            self.spare.push(piece);
             return Ok(());
         }
         self.dropped = SMOOTH;
         let is_faded = piece.order > REPORTED && (piece.end - last.start).value() <= self.longest;
         if is_same || (is_faded && last.continues_as(&piece)) {
             last.end = piece.end;
+            self.spare.push(piece);
             return Ok(());
         }
         if is_faded && piece.continues_as(last) {
             *last = Piece {
                 start: last.start,
                 order: last.order,
-                ..piece
+                ..*piece
             };
+            self.spare.push(piece);
             return Ok(());
         }
         if self.queue.len() >= MOST_PIECES {
