@@ -16,6 +16,8 @@ use crate::{Error, Task};
 
 /// Largest remaining error of the iteration, in tolerances.
 const LEFT: f64 = 0.02;
+/// Factor on a bound of the residual, to which the step that it asks for is compared.
+const BOUND: f64 = 4.0;
 /// Upper limit on the sweeps of one element.
 const MOST: u32 = 40;
 /// Factor on a ratio that was observed at an earlier element.
@@ -60,6 +62,8 @@ pub(super) struct Element {
     /// Tolerance of each component.
     pub(super) scale: Vec<f64>,
     residual: Vec<f64>,
+    /// Slopes at the nodes before a step, and their change with it.
+    before: Vec<f64>,
     table: Vec<f64>,
     delayed: Delayed,
     pub(super) newton: Newton,
@@ -203,6 +207,16 @@ impl Element {
                     self.newton.turn_off();
                 }
             }
+            if count == 2 && self.is_explained(problem.dim(), nodes, half) {
+                // The residual removes the rounding errors of the first step.
+                self.residual(nodes, half);
+                self.step(problem, n);
+                self.newton.age += 1;
+                return Ok(Sweeps::Converged(count));
+            }
+            if count == 1 && problem.dim() == 1 {
+                self.before.clone_from(&self.f);
+            }
             self.residual(nodes, half);
             if self.newton.is_on() && !self.newton.solve(nodes, half, &mut self.residual) {
                 return Ok(Sweeps::Stalled);
@@ -229,6 +243,24 @@ impl Element {
             last = size;
         }
         Ok(Sweeps::Stalled)
+    }
+
+    /// Are the slopes after the first step, of one component, so close to those that the Jacobian
+    /// predicts that no further step is needed but for rounding errors?
+    ///
+    /// The residual after a step δ is (h/2) B (F(Y + δ) − F(Y) − J δ).
+    fn is_explained(&mut self, dim: usize, nodes: &Nodes, half: f64) -> bool {
+        if dim != 1 || !self.newton.is_on() || self.delayed.overlaps() {
+            return false;
+        }
+        for (before, f) in self.before.iter_mut().zip(&self.f) {
+            *before = f - *before;
+        }
+        let left = self
+            .newton
+            .unexplained(&self.y, &self.residual, &self.before[1..]);
+        let scale = self.scale.first().copied().unwrap_or_default();
+        left.is_some_and(|left| BOUND * half * nodes.norm * left <= LEFT * scale)
     }
 
     /// Evaluate the Jacobian at the middle node of the last evaluation.

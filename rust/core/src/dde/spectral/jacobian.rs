@@ -19,7 +19,7 @@ use crate::{Error, Task};
 /// Number of columns in which all components move.
 const CHECKS: usize = 3;
 /// Number of components up to which every entry is kept and none is checked.
-pub(super) const FEW: usize = 8;
+const FEW: usize = 8;
 /// Differences below this share of what a row can change count as rounding errors.
 const ROUNDING: f64 = 1e-6;
 /// Share of what a row can change by which a pattern may be wrong.

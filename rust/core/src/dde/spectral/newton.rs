@@ -10,7 +10,7 @@
 
 use super::delayed::Delayed;
 use super::dense::{Factors, add_multiple};
-use super::jacobian::{ALONE, Differences, FEW, Jacobian, Point};
+use super::jacobian::{ALONE, Differences, Jacobian, Point};
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation};
 use super::products::{Rows, multiply};
@@ -31,6 +31,13 @@ const WORTH_A_LOOK: usize = 260;
 /// Relative difference of entries below which they are equal: the error of differences.
 const SAME_ENTRY: f64 = 1e-6;
 
+/// Change of the slopes that a line leaves, relative to it, up to which the right-hand side is linear
+/// in its one component.
+const LINE: f64 = 1e-6;
+
+/// Smallest step, relative to the values, from which the slope of that line is taken.
+const VISIBLE: f64 = 1e-3;
+
 /// Relative difference of lengths for which the same factors serve: sweeps correct the rest.
 const SAME_LENGTH: f64 = 1e-10;
 
@@ -47,6 +54,8 @@ pub(super) struct Newton {
     shifted: Option<Shifted>,
     /// One system for each distinct entry of the diagonal, in their order.
     single: Vec<Single>,
+    /// Key and systems of another length: elements often have two lengths in turn.
+    other: (Option<(f64, usize)>, Vec<Single>),
     known: Vec<f64>,
     /// Elements since J was evaluated.
     pub(super) age: u32,
@@ -54,6 +63,8 @@ pub(super) struct Newton {
     waits: bool,
     /// Has J been evaluated, or at least compared with a diagonal?
     looked: bool,
+    /// Is J, of one component, that of a step instead of differences?
+    is_exact: bool,
 }
 
 /// The diagonal of a Jacobian.
@@ -109,7 +120,12 @@ impl Newton {
     /// Discard the Jacobian.
     pub(super) fn turn_off(&mut self) {
         self.jacobian = None;
+        self.forget_factors();
+    }
+
+    fn forget_factors(&mut self) {
         self.key = None;
+        self.other.0 = None;
     }
 
     /// Discard the Jacobian because it was taken at arguments of another kind.
@@ -131,8 +147,7 @@ impl Newton {
             return None;
         }
         let any = costly && !self.waits && self.differences.cost(dim) <= WORTH_A_LOOK;
-        let diagonal = !self.looked && dim > FEW;
-        (any || diagonal).then_some(if any { dim } else { 0 })
+        (any || !self.looked).then_some(if any { dim } else { 0 })
     }
 
     /// The number of components up to which a new Jacobian may be another than a diagonal one.
@@ -194,7 +209,8 @@ impl Newton {
             inner: &inner.collect::<Vec<bool>>(),
         };
         self.jacobian = self.differences.jacobian(equation, &point, most, task)?;
-        self.key = None;
+        self.is_exact = false;
+        self.forget_factors();
         self.age = 0;
         let Some(jacobian) = &self.jacobian else {
             return Ok(false);
@@ -214,13 +230,50 @@ impl Newton {
         Ok(true)
     }
 
+    /// Largest slope at the nodes after a step δ of one component that J does not explain; `None` for
+    /// several components, or where that says little of the error.
+    ///
+    /// Where the slopes follow a line instead, its slope, exact to rounding, becomes J.
+    pub(super) fn unexplained(&mut self, y: &[f64], step: &[f64], change: &[f64]) -> Option<f64> {
+        let [entry] = &mut self.diagonal.as_mut()?.entries[..] else {
+            return None;
+        };
+        if entry.1 != 1 || entry.0 > 0.0 {
+            return None;
+        }
+        let beside = |slope: f64| {
+            let pairs = step.iter().zip(change);
+            pairs.fold(0.0_f64, |most, (step, change)| {
+                most.max((change - slope * step).abs())
+            })
+        };
+        let left = beside(entry.0);
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        if !self.is_exact && largest(step) > VISIBLE * largest(y) {
+            let products = step.iter().zip(change).map(|(step, change)| step * change);
+            let slope = products.sum::<f64>() / step.iter().map(|step| step * step).sum::<f64>();
+            if slope <= 0.0 && beside(slope) <= LINE * slope.abs() * largest(step) {
+                entry.0 = slope;
+                self.is_exact = true;
+                self.forget_factors();
+            }
+        }
+        Some(left)
+    }
+
     /// Replace the residual (component, node) by the step δ; `false` where the system is singular.
     pub(super) fn solve(&mut self, nodes: &Nodes, half: f64, residual: &mut [f64]) -> bool {
         let order = nodes.order;
-        let known = self.key.is_some_and(|(length, number)| {
-            number == order && (length - half).abs() <= SAME_LENGTH * half
-        });
-        if !known && !self.factorise(nodes, half) {
+        let fits = |key: Option<(f64, usize)>| {
+            key.is_some_and(|(length, number)| {
+                number == order && (length - half).abs() <= SAME_LENGTH * half
+            })
+        };
+        if !fits(self.key) && self.diagonal.is_some() {
+            std::mem::swap(&mut self.key, &mut self.other.0);
+            std::mem::swap(&mut self.single, &mut self.other.1);
+        }
+        if !fits(self.key) && !self.factorise(nodes, half) {
             return false;
         }
         if let Some(whole) = &self.whole {

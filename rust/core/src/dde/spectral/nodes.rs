@@ -43,6 +43,8 @@ pub(super) struct Nodes {
     pub(super) to_legendre: Vec<f64>,
     /// Largest |∫ π| over |π(−1)|.
     pub(super) spread: f64,
+    /// Largest sum of the moduli in a row of B.
+    pub(super) norm: f64,
 }
 
 /// The table for one of [`ORDERS`], built on first use.
@@ -87,6 +89,10 @@ impl Nodes {
             points,
             basis,
             to_coefficients: transposed(&to_coefficients, n),
+            norm: integrate
+                .chunks_exact(order)
+                .map(|row| row.iter().map(|weight| weight.abs()).sum())
+                .fold(0.0, f64::max),
             integrals: transposed(&integrate, order),
             integrate,
             legendre: legendre_values,
