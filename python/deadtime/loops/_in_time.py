@@ -301,10 +301,6 @@ class _Again:
     def __reduce__(self) -> tuple[Any, ...]:
         return _Again, (self.loop, self.run, _Start(cast(float, self.found.start)))
 
-    def part(self, name: str) -> Vector:
-        """One of the arrays of the response."""
-        return cast(Vector, getattr(self.found, name))
-
     def steady_state(self) -> float | None:
         """Output at rest under the last reference, None without such a rest."""
         return self.loop.steady_state(float(np.ravel(_whole(self.loop, self.run).reference)[-1]))

@@ -46,8 +46,9 @@ class KeptRun(Protocol):
         """Outputs at other times."""
         ...
 
-    def part(self, name: str) -> Vector:
-        """One of `PARTS`, which nobody can write to."""
+    @property
+    def found(self) -> Any:
+        """What has the `PARTS` as attributes, arrays that nobody can write to."""
         ...
 
     def steady_state(self) -> float | None:
@@ -128,7 +129,7 @@ class Response(ReadOnlyArrays, Pictured):
         if run is None:
             raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}")
         if name in PARTS:
-            value = run.part(name)
+            value = getattr(run.found, name)
         elif name == "steady_state":
             value = run.steady_state()
         elif name in ("sensitivities", "input_sensitivities"):
