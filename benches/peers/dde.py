@@ -3,8 +3,9 @@
 Every solver is run once with each of several settings, and compared with references on which two
 unrelated methods agree (`tests/reference`). For 1e-6 and for 1e-9, the fastest setting whose true
 error is smaller is timed, ours and the peer's in turn. Compilation (JiTCDDE, numba) is not
-included. A sparse network of 2000 components follows, beside its right-hand side alone; the last
-lines are sweeps: CPU time of a set. Run ``python benches/peers/dde.py [--quick]``.
+included. Single calls of one loop follow, and a sparse network of 2000 components beside its
+right-hand side alone; the last lines are sweeps: CPU time of a set. All times are CPU times. Run
+``python benches/peers/dde.py [--quick]``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 
 import deadtime as dtm
 import numpy as np
+from drivers import by_hand
 from drivers import dde as peers
 from drivers.dde import Run, Values
 from scipy.sparse import random_array
@@ -32,8 +34,10 @@ except ImportError:
 REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 DELAY, SAMPLE_TIME = 0.36, 0.065
 TARGETS = (1e-6, 1e-9)
-#: A run of so many seconds is timed once.
-LONG = 1.0
+#: A run of so many seconds is timed once, and shorter ones are repeated to fill the second time.
+LONG, ENOUGH = 1.0, 5e-3
+#: Microseconds of the same numbers in C with AVX-512, with the call from Python.
+LIMITS = {"P loop, 10 s": 0.6, "Mackey-Glass, t = 1000": 8.6}
 
 
 @dataclass
@@ -86,6 +90,11 @@ def loops() -> Iterable[Problem]:
     ]
     if peers.ddeint is not None:
         problem.peers["ddeint"] = [peers.by_ddeint(fun, start, DELAY, n) for n in (301, 1001, 3001)]
+    if by_hand.njit is not None:
+        by_numba = lambda y, z: 1.31 * (1.0 - z)  # noqa: E731
+        problem.peers["numba RK4"] = [
+            by_hand.rk4(by_numba, 0.0, DELAY, n) for n in (6, 9, 12, 18, 24, 36)
+        ]
     if peers.jitcdde is not None:
         y, t = peers.jitcdde.y, peers.jitcdde.t
         compiled = peers.Jitcdde([1.31 * (1 - y(0, t - DELAY))], start, DELAY)
@@ -153,6 +162,21 @@ def mackey_glass() -> Problem:
             out[0] = 0.2 * late / (1.0 + fourth * fourth * square) - 0.1 * carray(y, 1)[0]
 
         problem.ours["compiled"] = solve(compiled_slope, 0.5, 17.0, ladder(7, 12), vectorized=False)
+    if by_hand.njit is not None:
+
+        def source(z: float) -> float:
+            square = z * z
+            fourth = square * square
+            return 0.2 * z / (1.0 + fourth * fourth * square)
+
+        production = by_hand.njit(source)
+        slope = lambda y, z: production(z) - 0.1 * y  # noqa: E731
+        problem.peers["numba RK4"] = [
+            by_hand.rk4(slope, 0.5, 17.0, 17 * n) for n in (6, 10, 16, 20, 25, 30, 40)
+        ]
+        problem.peers["numba spectral"] = [
+            by_hand.spectral(source, 0.1, 0.5, 17.0, n) for n in (24, 32, 40, 44, 48, 56)
+        ]
     start = np.array([0.5])
     problem.peers["scipy steps"] = [
         peers.scipy_steps(fun, start, 17.0, tol) for tol in ladder(7, 11)
@@ -196,9 +220,16 @@ def network() -> Problem:
 
 
 def seconds(call: Callable[..., object], *arguments: Any) -> float:
-    start = time.perf_counter()
-    call(*arguments)
-    return time.perf_counter() - start
+    """CPU time of a call, the mean of as many as fill `ENOUGH`."""
+    count = 1
+    while True:
+        start = time.process_time()
+        for _ in range(count):
+            call(*arguments)
+        took = time.process_time() - start
+        if took >= ENOUGH:
+            return took / count
+        count *= 4
 
 
 def tried(problem: Problem, runs: list[Run]) -> list[tuple[float, float, Run]]:
@@ -208,9 +239,9 @@ def tried(problem: Problem, runs: list[Run]) -> list[tuple[float, float, Run]]:
     """
     found = []
     for run in runs:
-        start = time.perf_counter()
+        start = time.process_time()
         value = run(problem.times)
-        took = time.perf_counter() - start
+        took = time.process_time() - start
         error = float(np.abs(value - problem.truth).max())
         found.append((took if took > LONG else seconds(run, problem.times), error, run))
         if error <= min(TARGETS):
@@ -238,12 +269,14 @@ def compare(problem: Problem, rounds: int) -> None:
                 other = min(reached, key=lambda t: t[0])
                 a, b = [], []
                 for _ in range(rounds if other[0] <= LONG else 1):
-                    a.append(min(seconds(best[2], problem.times) for _ in range(3)))
+                    a.append(seconds(best[2], problem.times))
                     b.append(seconds(other[2], problem.times))
-                mine_s, other_s = statistics.median(a), statistics.median(b)
+                mine_s, other_s = min(a), min(b)
+                limit = LIMITS.get(problem.name)
                 print(
-                    f"{row}{1e6 * mine_s:12.1f}{1e6 * other_s:14.1f}{other_s / mine_s:10.0f}"
+                    f"{row}{1e6 * mine_s:12.1f}{1e6 * other_s:14.1f}{other_s / mine_s:10.2f}"
                     f"{best[1]:10.0e}{other[1]:9.0e}"
+                    + ("" if limit is None else f"  {1e6 * mine_s / limit:.1f} x C")
                 )
 
 
@@ -343,6 +376,38 @@ def sweeps(sets: int, rounds: int) -> None:
         print(line)
 
 
+def single_calls(rounds: int) -> None:
+    """The P loop at 101 times: one call, one of a loop made anew, and a loop written by hand."""
+    times = np.linspace(0.0, 10.0, 101)
+    parts = (dtm.Integrator(), dtm.P(1.31))
+    loop = dtm.ControlLoop(*parts, delay=DELAY)
+
+    def anew() -> Values:
+        made = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=DELAY)
+        return made.simulate(times).outputs
+
+    calls = {
+        "one call, outputs read": lambda: loop.simulate(times).outputs,
+        "with commands, breaks and reference": lambda: vars_of(loop.simulate(times)),
+        "with the loop made anew": anew,
+    }
+    if by_hand.njit is not None:
+        by_numba = by_hand.rk4(lambda y, z: 1.31 * (1.0 - z), 0.0, DELAY, 18)
+        calls["numba RK4, 18 steps a delay"] = lambda: by_numba(times)
+    best = dict.fromkeys(calls, np.inf)
+    for _ in range(rounds):
+        for name, call in calls.items():
+            best[name] = min(best[name], seconds(call))
+    limit = LIMITS["P loop, 10 s"]
+    for name, took in best.items():
+        print(f"P loop, 101 times, {name}: {1e6 * took:.2f} us, {1e6 * took / limit:.1f} x C")
+
+
+def vars_of(found: dtm.Response) -> tuple[Values, ...]:
+    """All that a response of a loop holds."""
+    return found.outputs, found.inputs, found.breaks, found.reference
+
+
 def sparse_network(components: int, rounds: int) -> None:
     """A network with five inputs each: CPU time beside that of its right-hand side alone."""
     rng = np.random.default_rng(1)
@@ -394,6 +459,7 @@ def main() -> None:
             for runs in (*problem.ours.values(), *problem.peers.values()):
                 runs[:] = runs[-3:-2] or runs[:1]
         compare(problem, 1 if quick else 7)
+    single_calls(2 if quick else 20)
     sparse_network(2000, 2 if quick else 8)
     sweeps(1000 if quick else 100_000, 1 if quick else 3)
 
