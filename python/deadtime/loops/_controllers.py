@@ -228,15 +228,15 @@ class Controller(ABC):
             after = len(drive) - before - len(block)
             rows += [[0.0] * before + line + [0.0] * after for line in block]
         return ControllerEquations(
-            A=matrix(rows),
-            B=vector(drive),
-            E=vector(along),
-            C=vector(row),
-            p=p,
-            q=q,
-            M=terms.proportional + through,
-            impulse=-on_error * q,
-            update=update,
+            matrix(rows),
+            vector(drive),
+            vector(along),
+            vector(row),
+            p,
+            q,
+            terms.proportional + through,
+            -on_error * q,
+            update,
         )
 
     def _rest(

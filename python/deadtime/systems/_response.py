@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from operator import attrgetter, methodcaller
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -122,22 +123,6 @@ class Response(ReadOnlyArrays, Pictured):
         response = object.__new__(cls)
         object.__setattr__(response, "_dense", run)
         return response
-
-    def __getattr__(self, name: str) -> Any:
-        """Find what is first read now: few runs are asked for all they have."""
-        run = self.__dict__.get("_dense")
-        if run is None:
-            raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}")
-        if name in PARTS:
-            value = getattr(run.found, name)
-        elif name == "steady_state":
-            value = run.steady_state()
-        elif name in ("sensitivities", "input_sensitivities"):
-            value = NONE
-        else:
-            raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}")
-        self.__dict__[name] = value
-        return value
 
     def __getstate__(self) -> dict[str, Any]:
         for name in PARTS:
@@ -266,8 +251,27 @@ class Response(ReadOnlyArrays, Pictured):
         return ax
 
 
-# Without a default in the class, what is missing in a response is found on demand.
-del Response.steady_state, Response.reference
+class _Later:
+    """What a response lacks is found when it is first read: few runs are asked for all."""
+
+    __slots__ = ("find", "name")
+
+    def __init__(self, name: str, find: Callable[[KeptRun], Any]) -> None:
+        self.name, self.find = name, find
+
+    def __get__(self, response: Response | None, owner: type[Response]) -> Any:
+        run = None if response is None else response.__dict__.get("_dense")
+        if run is None:
+            raise AttributeError(f"a {owner.__name__} has no attribute {self.name!r}")
+        value = response.__dict__[self.name] = self.find(run)
+        return value
+
+
+for _name in PARTS:
+    setattr(Response, _name, _Later(_name, attrgetter(f"found.{_name}")))
+for _name in ("sensitivities", "input_sensitivities"):
+    setattr(Response, _name, _Later(_name, lambda run: NONE))
+setattr(Response, "steady_state", _Later("steady_state", methodcaller("steady_state")))  # noqa: B010
 
 
 def first_duration(A: NDArray[np.float64], delay: float) -> float:
