@@ -30,9 +30,6 @@ const NODES: (f64, f64) = (4.0, 1.4);
 const UNCOUPLED: (f64, f64) = (8.0, 1.6);
 /// Number of components up to which a node costs much less than a call from Python.
 const LIGHT: usize = 64;
-/// Number of components up to which it costs less than its share of what an element costs, and the
-/// digits of the tolerance from which on.
-const LIGHTEST: (usize, f64) = (2, 9.0);
 
 /// Verdict about an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,16 +108,14 @@ pub(super) fn preferred(rtol: f64, costly: bool) -> usize {
     order_for(wanted.ceil() as usize, COUPLED)
 }
 
-/// The same where the components are uncoupled, so that nodes cost less: as many as serve elements
-/// as long as delays often are, unless the work for nodes exceeds that of calls and elements.
+/// The same where the components are uncoupled, so that nodes cost less: for costly calls as many
+/// as serve elements as long as delays often are, unless the work for nodes exceeds that of calls.
 pub(super) fn preferred_uncoupled(rtol: f64, costly: bool, dim: usize) -> usize {
-    let digits = -rtol.log10();
-    let is_light = dim <= LIGHTEST.0 && digits >= LIGHTEST.1;
-    if is_light || (costly && dim <= LIGHT) {
-        LARGEST
-    } else if !costly {
-        let wanted = UNCOUPLED.0 + UNCOUPLED.1 * digits;
+    if !costly {
+        let wanted = UNCOUPLED.0 - UNCOUPLED.1 * rtol.log10();
         order_for(wanted.ceil() as usize, LARGEST)
+    } else if dim <= LIGHT {
+        LARGEST
     } else {
         preferred(rtol, costly)
     }
