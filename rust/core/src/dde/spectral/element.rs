@@ -211,6 +211,7 @@ impl Element {
                 // The residual removes the rounding errors of the first step.
                 self.residual(nodes, half);
                 self.step(problem, n);
+                self.seen = Some((self.size(n - 1) / last, first));
                 self.newton.age += 1;
                 return Ok(Sweeps::Converged(count));
             }
