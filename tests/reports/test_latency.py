@@ -108,7 +108,7 @@ def test_summary_dict_and_page(found, tmp_path):
     assert frames == 1
     assert page.count("<svg") == 1 + len(found.estimated)
     assert "src=" not in page
-    assert "<link" not in page
+    assert page.count("<link") == page.count('<link rel="icon" href="data:,">')
     assert found.plot().axes[0].get_xlabel().endswith("[ms]")
     assert "roll rate, actuator to response" in found._repr_html_()
 
