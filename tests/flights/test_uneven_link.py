@@ -139,3 +139,22 @@ def test_intervals_are_widened_in_quadrature(tmp_path):
     assert wider.cov[place, place] == pytest.approx(fit.cov[place, place] + 1e-4)
     again = wider.with_error_beside(0.01)
     assert again.stderr["delay"] == pytest.approx(math.hypot(fit.stderr["delay"], 0.01 * 2**0.5))
+
+
+def test_reports_of_equal_commands_are_told_apart():
+    # Of a height in steps of 1 mm: at rest a few values come again and again.
+    random = np.random.default_rng(5)
+    time = SAMPLE * np.arange(200)
+    motion = 0.7 * np.exp(-np.maximum(time - 6.5, 0.0)) * (time > 6.5)
+    values = 1e-3 * np.round(1e3 * (motion + 0.002 * random.standard_normal(time.size)))
+    report = 0.005 * np.arange(2700)
+    setpoint = values[np.clip(np.searchsorted(time + 0.26, report) - 1, 0, None)]
+    found = as_they_took_effect(Effects(time, values), report, setpoint)
+    changed = np.append(True, np.diff(values) != 0.0)
+    sent = time[changed]
+    # Within the time between two reports.
+    assert found.time.size > 0.9 * sent.size
+    nearest = np.min(np.abs(found.time[:, None] - sent), axis=1)
+    assert np.all(nearest < 0.006)
+    places = np.argmin(np.abs(found.time[:, None] - sent), axis=1)
+    assert np.array_equal(found.values, values[changed][places])

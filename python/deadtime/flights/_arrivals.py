@@ -5,9 +5,11 @@ by its first command, so that an estimate from the times at which commands were 
 delays of few commands, and misses their mean by about their scatter, whatever its interval.
 
 The vehicle stamps the setpoints that it reports. Command k took effect at a_k, between the stamp of
-the report that first has its value and the stamp before; the middle is taken. A command that no
-report has was lost, or replaced at once: a_k is then when the next one took effect. With the mean m
-of a_k - t_k over all commands, sent at t_k, an estimate from the times
+the report that first has its value and the stamp before; the middle is taken. Where outputs are
+rounded, several reports have the value of a command: the one is meant whose a_k - t_k is next to
+the median of those of the commands that one report has. A command that no report has was lost, or
+replaced at once: a_k is then when the next one took effect. With the mean m of a_k - t_k over all
+commands, sent at t_k, an estimate from the times
 
     t_k + (a_k - t_k - m)
 
@@ -40,6 +42,10 @@ SAME = 5e-7
 
 #: Longest time from a command to its effect, s, and the least share of commands that is found.
 LONGEST, FOUND = 2.0, 0.5
+
+#: Fewest commands whose value is reported once: they tell which of several reports is meant, one at
+#: most so many of their median deviations from their median.
+FEWEST, FARTHEST = 10, 6.0
 
 
 class Effects(NamedTuple):
@@ -89,9 +95,16 @@ def as_they_took_effect(sent: Effects, report: Array, setpoint: Array) -> Effect
     late = middle - time[:, None]
     fits = np.abs(setpoint[new] - values[:, None]) <= SAME * np.abs(values)[:, None]
     fits &= (late > -between) & (late < LONGEST)
-    found, place = fits.any(axis=1), fits.argmax(axis=1)
-    if np.mean(found) < FOUND:
+    found, alone = fits.any(axis=1), fits.sum(axis=1) == 1
+    if np.mean(found) < FOUND or np.sum(alone) < FEWEST:
         return sent
+    known = late[alone][fits[alone]]
+    usual = float(np.median(known))
+    away = np.where(fits, np.abs(late - usual), np.inf)
+    place = away.argmin(axis=1)
+    # The report of one whose value comes again may be missing.
+    reach = FARTHEST * float(np.median(np.abs(known - usual))) + 2.0 * float(np.median(between))
+    found &= alone | (away.min(axis=1) <= reach)
     # A lost command waits for the next one that is found.
     effect = np.where(found, middle[place], np.inf)
     effect = np.minimum.accumulate(effect[::-1])[::-1]
