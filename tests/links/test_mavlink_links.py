@@ -119,6 +119,37 @@ def test_a_first_link_that_is_silent_from_the_beginning():
         run(connected())
 
 
+def test_links_to_two_vehicles_of_one_id_are_refused():
+    async def connect():
+        async with StandIn(ground=FIRST), StandIn(ground=SECOND) as other:
+            other._begin -= 7.0
+            await MAVLinkVehicle(BOTH, LIMITS).connect()
+
+    with pytest.raises(LinkError, match=r"another vehicle answers over .*14551 than over .*14550"):
+        run(connect())
+
+
+def test_another_vehicle_does_not_take_over():
+    async def flight():
+        async with StandIn(ground=FIRST) as vehicle, StandIn(ground=SECOND) as other:
+            other._begin -= 7.0
+            other.cut = {SECOND}
+            link = MAVLinkVehicle(BOTH, LIMITS)
+            await link.connect()
+            await link.take_off()
+            other.cut = set()
+            await told(link, 0.1, 1.0)
+            vehicle.cut = {FIRST}
+            with pytest.raises(FlightAbortedError, match="nothing received"):
+                await told(link, 0.1, 3.0)
+            assert not other.set_points
+            with pytest.raises(LinkError, match="lands by its own failsafe"):
+                await link.close()
+
+    with pytest.warns(RuntimeWarning, match=r"14551: nothing received for .* it stood by"):
+        run(flight())
+
+
 def test_a_silent_link_that_stands_by_is_named_once():
     async def connected():
         async with (

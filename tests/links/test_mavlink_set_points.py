@@ -94,14 +94,14 @@ def test_the_tilt_of_a_longer_attitude_keeps_its_direction():
 
 def test_rates_do_not_tilt_beyond_the_limit_while_they_are_valid():
     most, age = LIMITS.max_angle, LIMITS.command_age
-    for angle, rate in itertools.product(np.linspace(-most, most, 9), np.linspace(-5.0, 5.0, 11)):
-        found = rates_within(BodyRates(rate, rate, 0.0, 0.5), state(angle, angle), LIMITS)
-        for one in (found.roll, found.pitch):
-            assert abs(angle + age * one) <= most * (1 + 1e-12)
-    # A tilt beyond is brought back.
-    found = rates_within(BodyRates(1.0, -1.0, 0.0, 0.5), state(most + 0.1, -most - 0.1), LIMITS)
-    assert found.roll == pytest.approx(-0.1 / age)
-    assert found.pitch == pytest.approx(0.1 / age)
+    angles, rates = np.linspace(-most, most, 9), np.linspace(-5.0, 5.0, 11)
+    for roll, pitch, along, up in itertools.product(angles, angles, rates, rates):
+        found = rates_within(BodyRates(along, up, 0.0, 0.5), state(roll, pitch), LIMITS)
+        tilt = math.hypot(roll + age * found.roll, pitch + age * found.pitch)
+        # One beyond is brought back.
+        assert tilt <= max(most, math.hypot(roll, pitch) - 1e-3) * (1 + 1e-12)
+    found = rates_within(BodyRates(0.0, -1.0, 0.0, 0.5), state(0.0, -most - 0.1), LIMITS)
+    assert (found.roll, found.pitch) == pytest.approx((0.0, 0.1 / age))
 
 
 def read(point, ground=-2.0):
@@ -202,6 +202,21 @@ def test_a_flight_to_a_place(firmware):
     else:
         assert held["MPC_XY_VEL_MAX"] == 0.5
         assert (held["MPC_Z_VEL_MAX_UP"], held["MPC_Z_VEL_MAX_DN"]) == (1.0, 1.0)
+
+
+def test_without_a_known_heading_one_has_to_be_given():
+    async def flight():
+        async with StandIn() as vehicle:
+            vehicle.drop = lambda message: message.get_type() == "ATTITUDE"
+            async with MAVLinkVehicle(ADDRESS, LIMITS) as link:
+                await link.allow("position")
+                await link.take_off()
+                assert (await link.state()).yaw is None
+                with pytest.raises(LinkError, match="no heading: give one"):
+                    link.command_position(0.0, 0.0, 1.0)
+                assert link.command_position(0.0, 0.0, 1.0, heading=0.2).heading == 0.2
+
+    run(flight())
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)

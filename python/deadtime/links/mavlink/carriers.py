@@ -5,6 +5,9 @@ one link at a time. Set points over two would let the slower link bring back old
 and TIMESYNC go over all. Where nothing has come over the link in use for `SILENT` seconds and
 others are heard, that with the shortest round trip takes over. It stays in use until it falls
 silent in turn.
+
+System ids tell vehicles apart, and most have the id 1. Where the clock over a link is another one
+than over the link in use, another vehicle is at its end: it never takes over.
 """
 
 from __future__ import annotations
@@ -18,6 +21,9 @@ from deadtime.links.mavlink.carrier import Carrier
 #: Silence after which another link takes over, s: before a state is too old for a flight to go on,
 #: and ten of its messages. And that after which a link that stands by is named, s.
 SILENT, NAMED = 0.2, 2.0
+
+#: Difference of two clocks beyond what their round trips leave open, s: they are of two vehicles.
+APART = 0.05
 
 #: Time for the first heartbeat on the first link, before another one is taken, s.
 FIRST = 1.2
@@ -53,9 +59,18 @@ class Carriers:
     def __iter__(self) -> Iterator[Carrier]:
         return iter(self._all)
 
+    @property
+    def other_vehicles(self) -> list[Carrier]:
+        """Links over which another vehicle answers than over the one in use."""
+        return [one for one in self._all if not _same_clock(one, self.current)]
+
     def look(self) -> None:
         """Name links that have fallen silent, and use another one if the one in use has."""
-        alive = [one for one in self._all if one.heard is not None and one.silent < SILENT]
+        alive = [
+            one
+            for one in self._all
+            if one.heard is not None and one.silent < SILENT and _same_clock(one, self.current)
+        ]
         patience = FIRST if self.current.heard is None else SILENT
         if not self._held and self.current.silent > patience and alive:
             lost, best = self.current, min(alive, key=_round_trip)
@@ -87,6 +102,14 @@ class Carriers:
         if carrier is not self.current:
             self.current = carrier
             self._switched()
+
+
+def _same_clock(one: Carrier, other: Carrier) -> bool:
+    """Whether the vehicle at both may be the same one."""
+    some, others = one.time_sync.link_time, other.time_sync.link_time
+    if some is None or others is None:
+        return True
+    return abs(some.offset - others.offset) <= 0.5 * (some.least + others.least) + APART
 
 
 def _round_trip(carrier: Carrier) -> float:

@@ -166,7 +166,7 @@ commanding it
         ------
         LinkError
             If it does not answer, is armed already, is no simulator where `simulated` asks for
-            one, or does not keep a setting.
+            one, or does not keep a setting; if another one answers over another link.
         """
         if self._link.is_open:
             raise LinkError(f"{self.address} is connected already")
@@ -196,6 +196,12 @@ commanding it
             raise LinkError(
                 f"several vehicles are on {self.address}: system {link.target[0]}, "
                 f"{', '.join(map(str, others))}: give `vehicle`, the system of the one to fly"
+            )
+        if strangers := link.carriers.other_vehicles:
+            raise LinkError(
+                f"another vehicle answers over {strangers[0].address} than over "
+                f"{link.carriers.current.address}: its clock is another one; give links to one "
+                "vehicle"
             )
         self._authority.refuse_armed(self._reader)
         self._parameters = Parameters(link, pilot.integers_as_bits)

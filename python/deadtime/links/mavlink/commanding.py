@@ -185,10 +185,9 @@ class Commanding:
         ValueError
             If a number is not finite.
         LinkError
-            As `command`, and if it was not allowed.
+            As `command`, if it was not allowed, and if no heading is known.
         """
-        state = self._ready("position")
-        heading = state.yaw or 0.0 if heading is None else heading
+        heading = self._heading(self._ready("position"), heading)
         place = place_within(Place(north, east, height, heading), self._origin, self.limits)
         self._follow(place)
         return place
@@ -217,10 +216,9 @@ class Commanding:
         ValueError
             If a number is not finite.
         LinkError
-            As `command`, and if it was not allowed.
+            As `command`, if it was not allowed, and if no heading is known.
         """
-        state = self._ready("attitude")
-        heading = state.yaw or 0.0 if heading is None else heading
+        heading = self._heading(self._ready("attitude"), heading)
         attitude = attitude_within(Attitude(roll, pitch, heading, thrust), self.limits)
         self._follow(attitude)
         return attitude
@@ -261,6 +259,13 @@ class Commanding:
         if self._reader.newest is None:
             raise LinkError(f"{self.address}: no state of the vehicle has come")
         return self._reader.newest
+
+    def _heading(self, state: VehicleState, given: float | None) -> float:
+        """The heading that was given, or else the present one."""
+        heading = state.yaw if given is None else given
+        if heading is None:
+            raise LinkError(f"{self.address}: the vehicle reports no heading: give one")
+        return heading
 
     def _check_in_air(self) -> None:
         if self._set_points.expired is None and not self._set_points.guarded:

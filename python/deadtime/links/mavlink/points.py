@@ -42,6 +42,9 @@ class BodyRates(NamedTuple):
 
 Point: TypeAlias = Motion | Place | Attitude | BodyRates
 
+#: Numbers whose squares are finite.
+HUGE = 1e150
+
 P = TypeVar("P", Place, Attitude, BodyRates)
 
 
@@ -55,6 +58,13 @@ def _between(low: float, value: float, high: float) -> float:
     return max(low, min(high, value))
 
 
+def _shortened(x: float, y: float, most: float) -> tuple[float, float]:
+    """The vector, no longer than this, in its direction."""
+    x, y = _between(-HUGE, x, HUGE), _between(-HUGE, y, HUGE)
+    share = min(1.0, most / max(math.hypot(x, y), 1e-300))
+    return share * x, share * y
+
+
 def place_within(place: Place, origin: VehicleState, limits: Limits) -> Place:
     """The nearest place within the heights, and the distance from where it took off.
 
@@ -65,11 +75,10 @@ def place_within(place: Place, origin: VehicleState, limits: Limits) -> Place:
     """
     north, east, height, heading = _checked(place)
     at = origin.north or 0.0, origin.east or 0.0
-    away = math.hypot(north - at[0], east - at[1])
-    share = min(1.0, limits.max_distance / max(away, 1e-300))
+    away = _shortened(north - at[0], east - at[1], limits.max_distance)
     return Place(
-        at[0] + share * (north - at[0]),
-        at[1] + share * (east - at[1]),
+        at[0] + away[0],
+        at[1] + away[1],
         _between(limits.min_height, height, limits.max_height),
         math.remainder(heading, 2.0 * math.pi),
     )
@@ -84,19 +93,18 @@ def attitude_within(attitude: Attitude, limits: Limits) -> Attitude:
         If a number is not finite.
     """
     roll, pitch, heading, thrust = _checked(attitude)
-    share = min(1.0, limits.max_angle / max(math.hypot(roll, pitch), 1e-300))
     return Attitude(
-        share * roll,
-        share * pitch,
+        *_shortened(roll, pitch, limits.max_angle),
         math.remainder(heading, 2.0 * math.pi),
         _between(limits.min_thrust, thrust, limits.max_thrust),
     )
 
 
 def rates_within(rates: BodyRates, state: VehicleState, limits: Limits) -> BodyRates:
-    """The nearest rates at which the tilt stays within its limit while the command is valid.
+    """Rates at which the tilt stays within its limit while the command is valid.
 
-    A tilt beyond the limit is brought back.
+    Roll and pitch together are no faster than ``limits.max_body_rate``. A tilt beyond the limit is
+    brought back.
 
     Raises
     ------
@@ -104,17 +112,13 @@ def rates_within(rates: BodyRates, state: VehicleState, limits: Limits) -> BodyR
         If a number is not finite.
     """
     roll, pitch, turn, thrust = _checked(rates)
-    most = limits.max_body_rate
-
-    def tilting(rate: float, angle: float) -> float:
-        low, high = (
-            (end - angle) / limits.command_age for end in (-limits.max_angle, limits.max_angle)
-        )
-        return _between(-most, _between(low, rate, high), most)
-
+    most, age = limits.max_body_rate, limits.command_age
+    roll, pitch = _shortened(roll, pitch, most)
+    aim = _shortened(state.roll + age * roll, state.pitch + age * pitch, limits.max_angle)
+    roll, pitch = _shortened((aim[0] - state.roll) / age, (aim[1] - state.pitch) / age, most)
     return BodyRates(
-        tilting(roll, state.roll),
-        tilting(pitch, state.pitch),
+        roll,
+        pitch,
         _between(-min(most, limits.max_yaw_rate), turn, min(most, limits.max_yaw_rate)),
         _between(limits.min_thrust, thrust, limits.max_thrust),
     )
