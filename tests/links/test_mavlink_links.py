@@ -13,7 +13,7 @@ from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
 from deadtime.links.mavlink import LinkAddress, MAVLinkVehicle
 from deadtime.links.mavlink.states import wanted_messages
-from stand_in_autopilot import StandIn
+from stand_in_autopilot import StandIn, told
 
 FIRST, SECOND = ("127.0.0.1", 14550), ("127.0.0.1", 14551)
 BOTH = "udp:127.0.0.1:14550,udp:127.0.0.1:14551"
@@ -31,16 +31,6 @@ def test_addresses_of_serial_ports_and_of_several_links():
             LinkAddress.all_of(wrong)
     with pytest.raises(ValueError, match="each link once"):
         LinkAddress.all_of("udp:14550,udp:127.0.0.1:14550")
-
-
-async def told(link, speed, seconds):
-    """Command one speed as a controller does; the states that came."""
-    states = []
-    for _ in range(round(seconds / 0.065)):
-        states.append(await link.state())
-        link.command(speed)
-        await asyncio.sleep(0.065)
-    return states
 
 
 def commanded(vehicle, since=0):

@@ -1,4 +1,4 @@
-"""Random control loops."""
+"""Control loops: random ones, and that of the held integrator."""
 
 from __future__ import annotations
 
@@ -7,6 +7,16 @@ import numpy as np
 from hypothesis import strategies as st
 
 INTEGRATOR = dtm.Integrator()
+
+#: Time between two samples, s.
+TS = 0.065
+
+
+def held_loop(Kp=1.31, delay=0.36, lag=0.0, gain=1.0, sample_time=TS, limit=1.0):
+    """An integrator, with or without a lag, under P control with hold and limit."""
+    plant = dtm.Integrator(gain, lag)
+    return dtm.ControlLoop(plant, dtm.P(Kp), delay=delay, sample_time=sample_time, limit=limit)
+
 
 plants = st.one_of(
     st.builds(dtm.Integrator, gain=st.floats(0.3, 2.0), lag=st.sampled_from([0.0, 0.1, 0.35])),

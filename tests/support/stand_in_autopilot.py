@@ -353,3 +353,13 @@ class _Stream(asyncio.Protocol):
 
     def data_received(self, data):
         self._vehicle.receive(data)
+
+
+async def told(link, speed, seconds):
+    """Command one speed as a controller does; the states that came."""
+    states = []
+    for _ in range(round(seconds / 0.065)):
+        states.append(await link.state())
+        link.command(speed)
+        await asyncio.sleep(0.065)
+    return states

@@ -1,0 +1,206 @@
+"""Pilots, other ground stations and other vehicles on the link, in virtual time."""
+
+import asyncio
+
+import pytest
+
+pytest.importorskip("pymavlink", reason="pymavlink is the codec")
+
+from deadtime import FlightAbortedError, LinkError
+from deadtime.links import Limits, run
+from deadtime.links.mavlink import MAVLinkVehicle
+from pymavlink.dialects.v20 import ardupilotmega as d
+from stand_in_autopilot import StandIn, told
+
+ADDRESS = "udp:127.0.0.1:14550"
+LIMITS = Limits(max_climb=1.0)
+FIRMWARES = ["ardupilot", "px4"]
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_vehicle_that_is_armed_is_not_taken_over(firmware):
+    async def armed_before():
+        async with StandIn(firmware, armed=True) as vehicle:
+            with pytest.raises(LinkError, match="armed already"):
+                await MAVLinkVehicle(ADDRESS, LIMITS).connect()
+            assert not vehicle.commands
+            assert vehicle.armed
+
+    async def armed_later():
+        async with StandIn(firmware) as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            vehicle.armed = True
+            await asyncio.sleep(0.5)
+            with pytest.raises(LinkError, match="armed already"):
+                await link.take_off()
+            assert d.MAV_CMD_COMPONENT_ARM_DISARM not in [number for number, _ in vehicle.commands]
+
+    run(armed_before())
+    run(armed_later())
+
+
+def test_what_somebody_else_disarmed_is_not_armed_again():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            vehicle.armed = True
+            await asyncio.sleep(1.5)
+            vehicle.armed = False
+            await asyncio.sleep(0.5)
+            with pytest.raises(LinkError, match="disarmed, and not from here"):
+                await link.take_off()
+            assert not vehicle.armed
+
+    run(flight())
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("mode", ["landing", "other"])
+def test_another_ground_station_takes_over(firmware, mode):
+    """It is obeyed at once: no further set point, no landing command of ours, parameters back."""
+
+    async def flight():
+        async with StandIn(firmware) as vehicle:
+            before = dict(vehicle.parameters)
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            await told(link, 0.2, 1.0)
+            station = d.MAVLink(None, 254, 190)
+            hello = d.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station)
+            vehicle._transport.sendto(hello, vehicle.ground)
+            vehicle.change_mode(getattr(vehicle, mode))
+            changed = vehicle.time
+            del vehicle.commands[:]
+            with pytest.raises(FlightAbortedError, match="system 254, component 190") as caught:
+                await told(link, 0.2, 3.0)
+            assert "no set points are sent any more" in str(caught.value)
+            assert vehicle.time - changed < 0.4
+            last = vehicle.set_points[-1][0]
+            if mode == "landing":
+                await link.close()
+                assert vehicle.height == 0.0
+            else:
+                with pytest.raises(LinkError, match="was not commanded to land"):
+                    await link.close()
+                assert vehicle.mode == vehicle.other
+                assert vehicle.armed
+            assert vehicle.set_points[-1][0] == last
+            assert not vehicle.commands
+            assert vehicle.parameters == before
+
+    run(flight())
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_pilot_who_interrupts_the_take_off_is_obeyed(firmware):
+    async def flight():
+        async with StandIn(firmware) as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            rising = asyncio.create_task(link.take_off())
+            while vehicle.height < 0.3:
+                await asyncio.sleep(0.05)
+            vehicle.change_mode(vehicle.other)
+            del vehicle.commands[:]
+            with pytest.raises(FlightAbortedError, match="not commanded from here"):
+                await rising
+            with pytest.raises(LinkError, match="not commanded to land"):
+                await link.close()
+            assert vehicle.mode == vehicle.other
+            assert not vehicle.commands
+
+    run(flight())
+
+
+def test_a_program_that_ends_without_closing_lands_the_vehicle():
+    async def program():
+        link = MAVLinkVehicle(ADDRESS, LIMITS)
+        await link.connect()
+        await link.take_off()
+        link.command(0.1)
+
+    async def flight():
+        async with StandIn() as vehicle:
+            before = set(asyncio.all_tasks())
+            await program()
+            for task in set(asyncio.all_tasks()) - before:  # as `asyncio.run` does at its end
+                task.cancel()
+            await asyncio.sleep(0.3)
+            assert vehicle.mode == vehicle.landing
+            await asyncio.sleep(5.0)
+            assert not vehicle.armed
+
+    run(flight())
+
+
+def test_a_pilot_who_interrupts_the_landing_is_obeyed():
+    async def flight():
+        async with StandIn() as vehicle:
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            landing = asyncio.create_task(link.land())
+            await asyncio.sleep(0.8)
+            assert vehicle.mode == vehicle.landing
+            vehicle.change_mode(vehicle.other)
+            with pytest.raises(LinkError, match="went to LOITER"):
+                await landing
+            await asyncio.sleep(1.0)
+            assert vehicle.mode == vehicle.other
+            link._shut()
+            await asyncio.sleep(0.1)
+            assert vehicle.mode == vehicle.other
+
+    run(flight())
+
+
+def test_others_on_the_link_are_ignored_and_named():
+    """Another component of the vehicle, another vehicle, and a datagram from another address."""
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS, vehicle=1) as link:
+            other = d.MAVLink(None, 7, 1)
+            camera = d.MAVLink(None, 1, 100)
+            away = d.MAVLink_local_position_ned_message(10**9, 0, 0, -500, 0, 0, 0)
+            armed = d.MAVLink_heartbeat_message(2, 3, 128, 4, 4, 3)
+            for message in (away, armed):
+                vehicle._transport.sendto(message.pack(other), vehicle.ground)
+                vehicle._transport.sendto(message.pack(camera), vehicle.ground)
+            async with StandIn() as elsewhere:
+                elsewhere.send(away)
+                await asyncio.sleep(0.1)
+            state = await link.state()
+            assert state.height == 0.0
+            assert state.landed
+            assert link.foreign == [
+                "another vehicle, system 7, component 1 (2 frames)",
+                "another component, system 1, component 100 (2 frames)",
+            ]
+            assert link._link.senders.elsewhere >= 1
+
+    run(flight())
+
+
+def test_of_several_vehicles_one_has_to_be_named():
+    async def connected(**options):
+        async with StandIn() as vehicle:
+            other = d.MAVLink(None, 7, 1)
+            hello = d.MAVLink_heartbeat_message(2, 3, 0, 4, 3, 3).pack(other)
+            task = asyncio.create_task(MAVLinkVehicle(ADDRESS, LIMITS, **options).connect())
+            await asyncio.sleep(0.05)
+            vehicle._transport.sendto(hello, vehicle.ground)
+            await task
+
+    with pytest.raises(LinkError, match="several vehicles"):
+        run(connected())
+
+
+def test_a_vehicle_that_follows_another_station_is_refused():
+    async def connected():
+        async with StandIn() as vehicle:
+            vehicle.parameters["SYSID_MYGCS"] = 200.0
+            before = dict(vehicle.parameters)
+            with pytest.raises(LinkError, match="system 200"):
+                await MAVLinkVehicle(ADDRESS, LIMITS).connect()
+            assert vehicle.parameters == before
+
+    run(connected())
