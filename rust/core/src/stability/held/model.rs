@@ -33,10 +33,12 @@ const ROUGHNESS: f64 = 1e-25;
 /// Share of the largest entry of M that is added to the modulus of each.
 const SPREAD: f64 = 1e-4;
 
-/// Largest norm of A times a step for which the series is summed without doubling, and its number of
-/// terms: 0.5²⁷/27! < 1e-36.
+/// Largest norm of A times a step for which the series is summed without doubling, and the size,
+/// relative to the first term, of those that are left out, as the 27th with this norm is: 0.5²⁶/27! =
+/// 1.4e-36.
 const REACH: f64 = 0.5;
-const TERMS: u32 = 27;
+const LEFT_OUT: f64 = 2e-36;
+const MOST_TERMS: u32 = 27;
 
 /// Upper limit on the doublings.
 const MOST_DOUBLINGS: i32 = 1000;
@@ -257,7 +259,12 @@ impl Step {
         let mut power = identity(n);
         let mut gamma: Matrix = b.iter().map(|g| DoubleDouble::product(*g, step)).collect();
         let mut term = gamma.clone();
-        for j in 1..=TERMS {
+        let mut size = 1.0;
+        for j in 1..=MOST_TERMS {
+            if size < LEFT_OUT {
+                break;
+            }
+            size *= norm * step / f64::from(j + 1);
             let scaled =
                 |entry: &DoubleDouble, divisor: u32| (*entry * step).over(f64::from(divisor));
             power = times(&a, &power, n)
