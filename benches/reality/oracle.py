@@ -247,8 +247,11 @@ class Shape:
             return np.array([math.log(one.white), special.logit(one.correlation)])
         return np.log([one.air]) if one.air else np.empty(0)
 
-    def at(self, logs: Array) -> Array:
-        one = self.condition
+    def at(self, logs: Array, lag: float | None = None) -> Array:
+        """V, where the air passes through the true lag or this one."""
+        one, run = self.condition, self.run
+        if lag is not None:
+            run = replace(run, vehicle=replace(run.vehicle, lags=(lag,)))
         if one.gust is not None:
             deviation, time = np.exp(logs)
             one = replace(one, gust=(float(deviation), float(time)))
@@ -259,21 +262,26 @@ class Shape:
         elif one.air:
             one = replace(one, air=float(np.exp(logs[0])))
         seen = self.run.logged & ~self.run.outlying
-        return covariance(one, self.run)[np.ix_(seen, seen)]
+        return covariance(one, run)[np.ix_(seen, seen)]
 
-    def objective(self, logs: Array, left: Array) -> tuple[float, Array]:
-        """-2 ln L of residuals of an unknown size, less the numbers of the mean; its whitener."""
-        whitener, log_det = whitener_of(self.at(logs))
-        slopes = whitener @ self.J
+    def objective(self, V: Array, left: Array, columns: Array | None = None) -> float:
+        """-2 ln L of residuals of an unknown size, less what the columns explain of them.
+
+        The numbers of the mean are taken out of the likelihood.
+        """
+        whitener, log_det = whitener_of(V)
+        white, slopes = whitener @ left, whitener @ self.J
+        if columns is not None:
+            design = whitener @ columns
+            white = white - design @ linalg.lstsq(design, white)[0]
         rows, count = self.J.shape
-        square = float(np.sum((whitener @ left) ** 2))
         log_det += float(np.linalg.slogdet(slopes.T @ slopes)[1])
-        return (rows - count) * math.log(square) + log_det, whitener
+        return (rows - count) * math.log(float(np.sum(white**2))) + log_det
 
 
 def fit_with_noise(shape: Shape, mean: Mean, width: float, held: Mapping[str, float]) -> Fit:
-    """Mean and noise in turn: each has little effect on the other."""
-    logs, left = shape.start, None
+    """Mean and noise in turn: each has little effect on the other, unless air passes a lag."""
+    logs = shape.start
     fit = Fit(math.inf, {})
     for _ in range(TURNS):
         whitener = whitener_of(shape.at(logs))[0]
@@ -281,12 +289,74 @@ def fit_with_noise(shape: Shape, mean: Mean, width: float, held: Mapping[str, fl
         point = {name: np.array([value]) for name, value in fit.values.items()}
         left = mean.measured - mean.at(point)[0]
         if logs.size:
-            with np.errstate(all="ignore"):
-                logs = optimize.minimize(
-                    lambda x, left=left: shape.objective(x, left)[0],
-                    logs,
-                    method="Nelder-Mead",
-                    options={"xatol": 0.02, "fatol": 0.01},
-                ).x
-        fit = Fit(shape.objective(logs, left)[0], fit.values)
+            logs = searched(lambda x, left=left: shape.objective(shape.at(x), left), logs).x
+        fit = Fit(shape.objective(shape.at(logs), left), fit.values)
+    if "lag" in mean.names and logs.size:
+        short = {"lag": 2.0 * SHORTEST, "delay": fit.values["delay"] + fit.values["lag"]}
+        starts = (fit.values, fit.values | short)
+        return min(
+            (fit_together(shape, mean, start, logs, width, held) for start in starts),
+            key=lambda one: one.objective,
+        )
     return fit
+
+
+def fit_together(
+    shape: Shape,
+    mean: Mean,
+    start: Mapping[str, float],
+    logs: Array,
+    width: float,
+    held: Mapping[str, float],
+) -> Fit:
+    """Mean and noise at once: the air shows the lag that it passes."""
+    count = logs.size
+    has_delay = "delay" not in held
+    gain = held.get("gain")
+
+    def times(x: Array) -> tuple[float, float]:
+        delay = x[count] * width if has_delay else held["delay"]
+        return delay, held["sum"] - delay if "sum" in held else math.exp(x[-1])
+
+    def moved(x: Array, gain: float) -> Array:
+        delay, lag = times(x)
+        one = {"delay": delay, "lag": lag, "gain": gain, "level": 0.0}
+        return mean.at({name: np.array([value]) for name, value in one.items()})[0]
+
+    def linear(x: Array) -> tuple[Array, Array]:
+        """What gain and level have to explain, and their columns."""
+        path = moved(x, 1.0 if gain is None else gain)
+        ones = np.ones((path.size, 1))
+        if gain is None:
+            return mean.measured, np.column_stack([path, ones])
+        return mean.measured - path, ones
+
+    def cost(x: Array) -> float:
+        delay, lag = times(x)
+        if delay < 0.0 or lag < SHORTEST:
+            return math.inf
+        return shape.objective(shape.at(x[:count], lag), *linear(x))
+
+    first = [*logs, *[start["delay"] / width] * has_delay]
+    first += [math.log(start["lag"])] if "sum" not in held else []
+    found = searched(cost, np.array(first))
+    x = found.x
+    delay, lag = times(x)
+    left, columns = linear(x)
+    whitener = whitener_of(shape.at(x[:count], lag))[0]
+    slopes = linalg.lstsq(whitener @ columns, whitener @ left)[0]
+    gain_there = float(slopes[0]) if gain is None else gain
+    values = {"delay": delay, "lag": lag, "gain": gain_there, "level": float(slopes[-1])}
+    return Fit(float(found.fun), values)
+
+
+def searched(cost: Callable[[Array], float], start: Array) -> optimize.OptimizeResult:
+    """The minimum by Nelder and Mead's method."""
+    simplex = start + np.vstack([np.zeros(start.size), 0.5 * np.eye(start.size)])
+    with np.errstate(all="ignore"):
+        return optimize.minimize(
+            cost,
+            start,
+            method="Nelder-Mead",
+            options={"xatol": 0.02, "fatol": 0.01, "initial_simplex": simplex},
+        )

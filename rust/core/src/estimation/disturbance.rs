@@ -50,8 +50,35 @@ pub(super) struct Joint {
     /// G Gᵀ.
     pub(super) noise: Vec<f64>,
     pub(super) c: Vec<f64>,
-    /// Covariance at the first row: the plant's own states are at rest.
+    /// Covariance at the first row: stationary where it is known, see [`settle`].
     pub(super) start: Vec<f64>,
+}
+
+/// The stationary covariance of these states, air and then lags: the air has moved them before the
+/// first row. What follows them is at rest, an integrator for example, whose output the offset shifts.
+///
+/// Each state depends on those before it alone, so that A P + P Aᵀ + G Gᵀ = 0 has one entry of P at a
+/// time.
+fn settle(a: &[f64], noise: &[f64], start: &mut [f64], order: &[usize]) {
+    let n = start.len().isqrt();
+    // A lag that is negative has no stationary state.
+    if order.iter().any(|i| a[i * n + i] >= 0.0) {
+        return;
+    }
+    for (count, &i) in order.iter().enumerate() {
+        for (others, &j) in order[..=count].iter().enumerate() {
+            let of_i: f64 = order[..count]
+                .iter()
+                .map(|k| a[i * n + k] * start[k * n + j])
+                .sum();
+            let of_j: f64 = order[..others]
+                .iter()
+                .map(|k| a[j * n + k] * start[k * n + i])
+                .sum();
+            let value = -(of_i + of_j + noise[i * n + j]) / (a[i * n + i] + a[j * n + j]);
+            (start[i * n + j], start[j * n + i]) = (value, value);
+        }
+    }
 }
 
 impl Joint {
@@ -88,6 +115,57 @@ impl Joint {
             start[index * n + index] = variance;
             c.push(direct);
         }
+        let airs = disturbances.iter().zip(states..n);
+        let airs = airs.filter(|(one, _)| one.entry == Entry::Input);
+        let order: Vec<usize> = airs.map(|(_, i)| i).chain(0..plant.lags).collect();
+        settle(&a, &noise, &mut start, &order);
         Ok(Self { a, noise, c, start })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plant::Plant;
+    use super::*;
+
+    fn air_of(deviation: f64) -> Disturbance {
+        Disturbance {
+            entry: Entry::Input,
+            time_constant: 0.3,
+            deviation,
+        }
+    }
+
+    #[test]
+    fn air_has_moved_the_lags_before_the_first_row() {
+        let plant = Plant::new(&[1.0], &[1.0, 0.0]).unwrap();
+        for (lags, zero) in [(&[0.2][..], 0.0), (&[0.2, 0.1], 0.0), (&[0.2, 0.1], 0.05)] {
+            let joint = Joint::new(&plant.space(lags, zero), &[air_of(0.7)]).unwrap();
+            let n = joint.c.len();
+            let integrator = lags.len();
+            for i in (0..n).filter(|i| *i != integrator) {
+                for j in (0..n).filter(|j| *j != integrator) {
+                    let half = |i: usize, j: usize| -> f64 {
+                        let terms = (0..n).map(|k| joint.a[i * n + k] * joint.start[k * n + j]);
+                        terms.sum()
+                    };
+                    let change = half(i, j) + half(j, i) + joint.noise[i * n + j];
+                    assert!(change.abs() < 1e-14, "{lags:?} {i} {j} {change}");
+                }
+                assert_eq!(joint.start[integrator * n + i], 0.0);
+            }
+        }
+        // Of one lag T behind air of time constant τ, the variance is τ/(τ + T) of that of the air.
+        let joint = Joint::new(&plant.space(&[0.2], 0.0), &[air_of(0.7)]).unwrap();
+        assert!((joint.start[0] - 0.49 * 0.3 / 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn lags_that_the_air_does_not_pass_are_at_rest() {
+        let plant = Plant::new(&[1.0], &[1.0, 0.0]).unwrap();
+        let behind = plant.with_air_behind_lags(true).space(&[0.2, 0.1], 0.0);
+        let joint = Joint::new(&behind, &[air_of(0.7)]).unwrap();
+        let moved = joint.start.iter().filter(|entry| **entry != 0.0);
+        assert_eq!(moved.count(), 1);
     }
 }

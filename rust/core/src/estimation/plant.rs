@@ -23,6 +23,8 @@ pub(super) struct PlantSpace {
     pub(super) air: Vec<f64>,
     /// The direct part of air.
     pub(super) air_direct: f64,
+    /// Number of the lags, which are the first states: each depends on those before it.
+    pub(super) lags: usize,
 }
 
 /// The given part of a plant, of unit gain: num(s)/den(s), proper.
@@ -154,6 +156,7 @@ impl Plant {
             d: last * direct,
             air,
             air_direct,
+            lags: count,
         }
     }
 }
