@@ -27,6 +27,9 @@ pub(super) trait Run<S: Simd> {
     /// The loops whose response exceeds all limits before its end.
     fn lost(&self) -> Mask<S>;
 
+    /// The loops that this method cannot simulate, as it turned out.
+    fn unfit(&self) -> Mask<S>;
+
     /// Are all poles of the loops without their limits within `radius` of zero?
     fn decay(&self, radius: Real<S>) -> Decay<S>;
 }
@@ -69,15 +72,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
     /// Are the runs of all loops over?
     #[inline(always)]
     fn ends(&self) -> bool {
-        let now = self.time(self.number);
-        let plants = &self.loops.plants;
-        !if self.is_closed {
-            // Rounding errors do not part the last sample from the end.
-            let rounding = (plants.end + plants.sample_time) * (32.0 * f64::EPSILON);
-            now.le(plants.end + rounding).any()
-        } else {
-            now.lt(self.loops.plants.end).any()
-        }
+        self.loops.plants.are_over(self.number, self.is_closed)
     }
 
     /// See [`Run::advance`].
@@ -98,24 +93,24 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             longer(&mut trace.states, SAMPLES * P, zero);
             longer(&mut trace.bulges, SAMPLES, zero.lanes());
         }
-        trace.chunks.clear();
-        (trace.first, trace.samples, trace.begin) = (self.number, 0, self.output);
-        trace.count = zero;
-        trace.is_cut = zero.lt(0.0);
+        trace.restart(self.number, self.output);
         while trace.samples < SAMPLES && !self.ends() {
             let is_whole = self.time(self.number + CHUNK).le(loops.end);
             if (!is_whole).any() {
-                self.chunk::<true>(trace);
+                self.chunk::<true, false>(trace);
+            } else if loops.is_plain() {
+                self.chunk::<false, true>(trace);
             } else {
-                self.chunk::<false>(trace);
+                self.chunk::<false, false>(trace);
             }
         }
         true
     }
 
-    /// Advance by [`CHUNK`] samples; if `ENDS`, some run ends within them.
+    /// Advance by [`CHUNK`] samples; if `ENDS`, some run ends within them. `PLAIN` is known of the
+    /// loops at compile time.
     #[inline(always)]
-    fn chunk<const ENDS: bool>(&mut self, trace: &mut Trace<S>) {
+    fn chunk<const ENDS: bool, const PLAIN: bool>(&mut self, trace: &mut Trace<S>) {
         let feedback = self.loops;
         let loops = &feedback.plants;
         let mut summary = Summary {
@@ -174,14 +169,14 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             else {
                 break;
             };
-            let is_hidden = loops.hides && number <= loops.samples;
+            let is_hidden = !PLAIN && loops.hides && number <= loops.samples;
             let mut begin = now;
             for (corner, place) in loops.corners.iter().zip(places) {
                 let mut forced = corner.before * before;
                 if corner.is_after {
                     forced = corner.after.mul_add(after, forced);
                 }
-                if loops.is_pushed {
+                if !PLAIN && loops.is_pushed {
                     forced = forced + corner.constant;
                 }
                 output = row(&corner.states, &first(&x), forced);
@@ -200,10 +195,10 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             }
             x = feedback.step.apply(&x, before, after);
             output = x[0];
-            if !loops.is_first {
+            if !PLAIN && !loops.is_first {
                 output = row(&loops.c, &first(&x), loops.zero);
             }
-            if loops.is_direct {
+            if !PLAIN && loops.is_direct {
                 output = loops.d.mul_add(after, output);
             }
             if is_hidden && number < loops.samples {
@@ -235,7 +230,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
 
 /// Are all states, and `u`, within all limits?
 #[inline(always)]
-fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
+pub(super) fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
     let mut sound = u.abs().le(DIVERGED);
     for x in x {
         sound = sound & x.abs().le(DIVERGED);
@@ -244,17 +239,23 @@ fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
 }
 
 /// Corners of runs that end.
-struct Ends<S: Simd> {
-    count: Real<S>,
-    is_cut: Mask<S>,
-    inside: Real<S>,
-    run_end: Real<S>,
+pub(super) struct Ends<S: Simd> {
+    pub(super) count: Real<S>,
+    pub(super) is_cut: Mask<S>,
+    pub(super) inside: Real<S>,
+    pub(super) run_end: Real<S>,
 }
 
 impl<S: Simd> Ends<S> {
     /// The output at the end of a part between two times.
     #[inline(always)]
-    fn corner(&mut self, summary: &mut Summary<S>, output: Real<S>, begin: Real<S>, end: Real<S>) {
+    pub(super) fn corner(
+        &mut self,
+        summary: &mut Summary<S>,
+        output: Real<S>,
+        begin: Real<S>,
+        end: Real<S>,
+    ) {
         let running = begin.lt(self.run_end);
         let inside = running & end.le(self.run_end);
         self.count = inside.select(self.count + 1.0, self.count);
@@ -297,6 +298,10 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
         self.lost
     }
 
+    fn unfit(&self) -> Mask<S> {
+        self.loops.plants.no_lane
+    }
+
     fn decay(&self, radius: Real<S>) -> Decay<S> {
         let loops = self.loops;
         outlined(radius.simd(), Within { loops, radius })
@@ -319,7 +324,7 @@ impl<S: Simd, const N: usize, const P: usize> Outlined for Advance<'_, '_, S, N,
 }
 
 /// Bring `numbers` to at least `length`.
-fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
+pub(super) fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
     if numbers.len() < length {
         numbers.resize(length, zero);
     }
