@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use deadtime::dde::ensemble::{self, Outcome, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
 use deadtime::dde::{Criteria, Metrics};
+use deadtime::stability::abscissae;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray1,
 };
@@ -146,7 +147,7 @@ pub(crate) fn sweep_abscissae<'py>(
     let numbers = sets.numbers()?;
     let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
     let sets = sets.read(&entries)?;
-    let found = run(py, threads, None, |task| ensemble::abscissae(&sets, task))?;
+    let found = run(py, threads, None, |task| abscissae(&sets, task))?;
     Ok(found.into_pyarray(py))
 }
 

@@ -18,24 +18,15 @@ use super::block::{Block, Number};
 use super::decay::Decay;
 use super::loops::{Part, Plants};
 use super::piece::LONG;
-use super::trace::{CHUNK, Summary, Trace};
+use super::trace::{CHUNK, Summary, Trace, delays};
 use super::transition::{Map, row};
 use super::walk::{Ends, Run, is_sound, longer};
-
-/// Parts in a trace, if a chunk has no more: enough for most runs, and few enough for the cache of a
-/// core.
-const PARTS: usize = 128;
 
 /// Upper bounds on σ − σ^j for j from 2 on: σ^j c stays within c times this of its chord.
 const CHORDS: [f64; LONG - 1] = [
     0.25, 0.385, 0.4725, 0.535, 0.5824, 0.6198, 0.6502, 0.6755, 0.6969, 0.7153, 0.7314, 0.7455,
     0.758, 0.7692, 0.7793, 0.7885, 0.7968, 0.8045, 0.8115,
 ];
-
-/// Samples in a trace whose samples have so many parts: whole chunks.
-pub(super) fn samples(parts: usize) -> usize {
-    (PARTS / parts).next_multiple_of(CHUNK).max(CHUNK)
-}
 
 /// Loops in lanes. A sample is one delay.
 pub(super) struct Delayed<S: Simd, const N: usize> {
@@ -133,7 +124,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             return false;
         }
         trace.restart(self.number, self.output);
-        let most = samples(trace.per_sample);
+        let most = delays(trace.per_sample);
         while trace.samples < most && !self.is_over() {
             self.chunk(trace);
         }

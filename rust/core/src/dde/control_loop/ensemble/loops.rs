@@ -265,12 +265,6 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         }
     }
 
-    /// Is the output the first state, moved by the command alone?
-    #[inline(always)]
-    pub(super) fn is_plain(&self) -> bool {
-        self.is_first && !self.is_direct && !self.is_pushed && !self.hides
-    }
-
     /// The time after which a loop reacts to its own output.
     #[inline(always)]
     pub(super) fn wait(&self) -> Real<S> {

@@ -20,7 +20,6 @@ mod loops;
 mod measured;
 mod metrics;
 mod piece;
-mod poles;
 mod responses;
 mod rounds;
 mod search;
@@ -37,6 +36,5 @@ mod walk;
 #[cfg(test)]
 mod tests;
 
-pub use poles::abscissae;
 pub use sets::{Outcome, Sets};
 pub use sweep::{metrics, responses};

@@ -13,14 +13,17 @@ use crate::memory::push;
 
 use super::piece::{LONG, SHORT};
 use super::sets::{Sets, of};
-use super::trace::SAMPLES;
-use super::{delayed, transition};
+use super::trace::{SAMPLES, delays};
+use super::transition;
 
 /// Most states of a loop in a block.
 pub(super) const MOST_STATES: usize = 4;
 
 /// Loops with more samples than this run one by one, so that they can be cancelled.
 const MOST_SAMPLES: f64 = 1e6;
+
+/// The same for the parts of all delays of a continuous loop, each of which takes longer.
+const MOST_ELEMENTS: f64 = 1e5;
 
 /// Most parts of one half of a sample.
 const MOST_PARTS: f64 = 64.0;
@@ -72,7 +75,7 @@ impl Shape {
     pub(super) fn columns(&self) -> usize {
         if self.is_continuous {
             let parts = usize::from(self.late);
-            (delayed::samples(parts) + 1) * parts * (LONG + 1)
+            (delays(parts) + 1) * parts * (LONG + 1)
         } else {
             self.samples as usize + SAMPLES
         }
@@ -244,7 +247,7 @@ fn continuous(row: &Row<'_>, span: f64) -> Option<Shape> {
     let reach = rate * row.delay;
     let (longest, degree) = if reach <= SLOW { FINE } else { COARSE };
     let parts = (reach / longest).ceil().max(1.0);
-    let fits = parts <= MOST_PARTS && parts * (span / row.delay + 1.0) < MOST_SAMPLES;
+    let fits = parts <= MOST_PARTS && parts * (span / row.delay + 1.0) < MOST_ELEMENTS;
     fits.then_some(Shape {
         is_continuous: true,
         samples: 0,

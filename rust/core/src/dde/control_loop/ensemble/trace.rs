@@ -9,6 +9,15 @@ pub(super) const CHUNK: usize = 4;
 /// Most samples in a trace: enough for most runs, and few enough for the cache of a core.
 pub(super) const SAMPLES: usize = 256;
 
+/// Parts in a trace of continuous loops, if a chunk has no more: enough for most runs, and few
+/// enough for the cache of a core.
+const PARTS: usize = 128;
+
+/// Delays in a trace of continuous loops, each of which has so many parts: whole chunks.
+pub(super) fn delays(parts: usize) -> usize {
+    (PARTS / parts).next_multiple_of(CHUNK).max(CHUNK)
+}
+
 /// Greatest and least output at the corners of a chunk and at the corner before it.
 #[derive(Clone, Copy)]
 pub(super) struct Summary<S: Simd> {

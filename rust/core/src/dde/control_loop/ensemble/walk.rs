@@ -97,20 +97,17 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         while trace.samples < SAMPLES && !self.ends() {
             let is_whole = self.time(self.number + CHUNK).le(loops.end);
             if (!is_whole).any() {
-                self.chunk::<true, false>(trace);
-            } else if loops.is_plain() {
-                self.chunk::<false, true>(trace);
+                self.chunk::<true>(trace);
             } else {
-                self.chunk::<false, false>(trace);
+                self.chunk::<false>(trace);
             }
         }
         true
     }
 
-    /// Advance by [`CHUNK`] samples; if `ENDS`, some run ends within them. `PLAIN` is known of the
-    /// loops at compile time.
+    /// Advance by [`CHUNK`] samples; if `ENDS`, some run ends within them.
     #[inline(always)]
-    fn chunk<const ENDS: bool, const PLAIN: bool>(&mut self, trace: &mut Trace<S>) {
+    fn chunk<const ENDS: bool>(&mut self, trace: &mut Trace<S>) {
         let feedback = self.loops;
         let loops = &feedback.plants;
         let mut summary = Summary {
@@ -126,7 +123,16 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         };
         let is_late = loops.parts.first().is_some_and(|part| part.is_after);
         let (mut x, mut output, mut number) = (self.x, self.output, self.number);
-        let (mut lost, lowest) = (self.lost, -loops.limit);
+        let mut lost = self.lost;
+        // Copies of few numbers stay in registers while the trace is written; more are read faster
+        // where they are.
+        let copies = (feedback.k, feedback.step);
+        let (k, step) = if N == 1 {
+            (&copies.0, &copies.1)
+        } else {
+            (&feedback.k, &feedback.step)
+        };
+        let (limit, lowest) = (loops.limit, -loops.limit);
         let first_sample = trace.samples;
         for sample in first_sample..first_sample + CHUNK {
             let now = loops.sample_time * number as f64;
@@ -134,11 +140,11 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 break;
             };
             let before = commands.first().copied().unwrap_or(loops.zero);
-            let u = row(&feedback.k, &x, feedback.l.mul_add(before, loops.command));
+            let u = row(k, &x, feedback.l.mul_add(before, loops.command));
             if ENDS {
                 lost = lost | (now.lt(loops.end) & !is_sound(&x, u));
             }
-            let w = u.min(loops.limit).max(lowest);
+            let w = u.min(limit).max(lowest);
             if let Some(place) = commands.last_mut() {
                 *place = w;
             }
@@ -169,14 +175,14 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             else {
                 break;
             };
-            let is_hidden = !PLAIN && loops.hides && number <= loops.samples;
+            let is_hidden = loops.hides && number <= loops.samples;
             let mut begin = now;
             for (corner, place) in loops.corners.iter().zip(places) {
                 let mut forced = corner.before * before;
                 if corner.is_after {
                     forced = corner.after.mul_add(after, forced);
                 }
-                if !PLAIN && loops.is_pushed {
+                if loops.is_pushed {
                     forced = forced + corner.constant;
                 }
                 output = row(&corner.states, &first(&x), forced);
@@ -193,12 +199,12 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                     summary.least = summary.least.min(output);
                 }
             }
-            x = feedback.step.apply(&x, before, after);
+            x = step.apply(&x, before, after);
             output = x[0];
-            if !PLAIN && !loops.is_first {
+            if !loops.is_first {
                 output = row(&loops.c, &first(&x), loops.zero);
             }
-            if !PLAIN && loops.is_direct {
+            if loops.is_direct {
                 output = loops.d.mul_add(after, output);
             }
             if is_hidden && number < loops.samples {

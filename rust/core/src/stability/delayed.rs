@@ -3,14 +3,13 @@
 //! The poles are the zeros of a(s) − (L a(s) + K adj(s − A) B) e^(−s T), where a(s) = det(s − A) and
 //! the adjugate follow from the recursion of Faddeev and LeVerrier (Gantmacher 1959).
 
-use crate::dde::control_loop::row::Row;
+use crate::dde::ensemble::Sets;
+use crate::dde::{Equations, LinearLoop};
 use crate::lambertw::dde_root;
 use crate::memory::in_parallel;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::spectral_abscissa;
 use crate::{Error, Task};
-
-use super::sets::Sets;
 
 /// The largest real part of a pole of each loop, 1/s; NaN where it is not found.
 pub fn abscissae(sets: &Sets<'_>, task: &Task) -> Result<Vec<f64>, Error> {
@@ -21,8 +20,10 @@ pub fn abscissae(sets: &Sets<'_>, task: &Task) -> Result<Vec<f64>, Error> {
         || (),
         |(), set| {
             task.check()?;
-            let numbers = sets.row(set);
-            match abscissa(&Row::new(sets.states(), &numbers)?, task) {
+            let Some(plant) = sets.loop_of(set)? else {
+                return Ok(f64::NAN);
+            };
+            match abscissa(&plant, task) {
                 Err(error) if error.ends_all() => Err(error),
                 found => Ok(found.unwrap_or(f64::NAN)),
             }
@@ -30,23 +31,24 @@ pub fn abscissae(sets: &Sets<'_>, task: &Task) -> Result<Vec<f64>, Error> {
     )
 }
 
-fn abscissa(row: &Row<'_>, task: &Task) -> Result<f64, Error> {
-    if let (&[a], &[b], &[k]) = (row.a, row.b, row.k)
-        && row.l == 0.0
-        && row.delay > 0.0
+fn abscissa(plant: &LinearLoop, task: &Task) -> Result<f64, Error> {
+    let (equations, delay) = (plant.equations(), plant.delay());
+    if let ([a], [b], [k]) = (&*equations.a, &*equations.b, &*equations.k)
+        && equations.l == 0.0
+        && delay > 0.0
         && b * k != 0.0
     {
-        return Ok(dde_root(a, b * k, row.delay, 0).re);
+        return Ok(dde_root(*a, b * k, delay, 0).re);
     }
-    let (open, feedback) = polynomials(row);
+    let (open, feedback) = polynomials(equations);
     let feedback = feedback.into_iter().map(|c| -c).collect();
-    let function = QuasiPolynomial::new(vec![open, feedback], vec![0.0, row.delay])?;
+    let function = QuasiPolynomial::new(vec![open, feedback], vec![0.0, delay])?;
     spectral_abscissa(&function, true, task)
 }
 
 /// Coefficients of a(s) and of L a(s) + K adj(s − A) B, ascending.
-fn polynomials(row: &Row<'_>) -> (Vec<f64>, Vec<f64>) {
-    let n = row.b.len();
+fn polynomials(equations: &Equations) -> (Vec<f64>, Vec<f64>) {
+    let n = equations.b.len();
     let mut open = vec![0.0; n + 1];
     let mut feedback = vec![0.0; n + 1];
     // Coefficient of s^(n−j) of the adjugate.
@@ -57,19 +59,22 @@ fn polynomials(row: &Row<'_>) -> (Vec<f64>, Vec<f64>) {
         for i in 0..n {
             adjugate[i * n + i] += coefficient;
         }
-        let column = |i: usize| -> f64 { (0..n).map(|k| adjugate[i * n + k] * row.b[k]).sum() };
-        feedback[n - j] = (0..n).map(|i| row.k[i] * column(i)).sum();
+        let column =
+            |i: usize| -> f64 { (0..n).map(|k| adjugate[i * n + k] * equations.b[k]).sum() };
+        feedback[n - j] = (0..n).map(|i| equations.k[i] * column(i)).sum();
         let old = adjugate.clone();
         for (place, entry) in adjugate.iter_mut().enumerate() {
             let (i, k) = (place / n, place % n);
-            *entry = (0..n).map(|m| row.a[i * n + m] * old[m * n + k]).sum();
+            *entry = (0..n)
+                .map(|m| equations.a[i * n + m] * old[m * n + k])
+                .sum();
         }
         let trace: f64 = (0..n).map(|i| adjugate[i * n + i]).sum();
         coefficient = -trace / j as f64;
     }
     open[0] = coefficient;
     for (sum, c) in feedback.iter_mut().zip(&open) {
-        *sum += row.l * c;
+        *sum += equations.l * c;
     }
     (open, feedback)
 }
