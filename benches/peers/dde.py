@@ -286,7 +286,7 @@ CEILINGS = {"P": 0.138, "P, lag": 0.158}
 
 
 def swept() -> dict[str, tuple[dtm.ControlLoop, tuple[float, float]]]:
-    """Loops of up to four states with a hold and a limit, and the range of their gain."""
+    """Loops of up to four states, with a hold and a limit or continuous, and gains for them."""
     held = {"delay": DELAY, "limit": 1.0, "sample_time": SAMPLE_TIME}
     smooth = dtm.DerivativeFilter(38.0)
     lagging = dtm.Integrator(1.0, 0.2)
@@ -306,6 +306,15 @@ def swept() -> dict[str, tuple[dtm.ControlLoop, tuple[float, float]]]:
             (0.5, 2.0),
         ),
         "continuous P": (dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=DELAY), (0.5, 2.0)),
+        "continuous PI": (
+            dtm.ControlLoop(dtm.Integrator(), dtm.PI(1.3, 0.1), delay=DELAY),
+            (0.5, 2.0),
+        ),
+        "continuous P, lag": (dtm.ControlLoop(lagging, dtm.P(1.3), delay=DELAY), (0.5, 2.0)),
+        "continuous P, limit": (
+            dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=DELAY, limit=1.0),
+            (0.5, 2.0),
+        ),
     }
 
 

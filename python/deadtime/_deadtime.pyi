@@ -692,11 +692,6 @@ class _LoopSets(Protocol):
     def is_ahead(self) -> bool: ...
 
 @final
-class SweepMetrics:
-    metrics: Final[dict[str, _Reals]]
-    status: Final[NDArray[np.uint8]]
-
-@final
 class SweepResponses:
     outputs: Final[_Reals]
     status: Final[NDArray[np.uint8]]
@@ -704,6 +699,8 @@ class SweepResponses:
 def sweep_metrics(
     sets: _LoopSets,
     *,
+    columns: Sequence[_Reals],
+    status: NDArray[np.uint8],
     steady_state: float | _Reals,
     slowest_time: float | _Reals,
     span: float,
@@ -711,7 +708,8 @@ def sweep_metrics(
     rise: _Pair,
     threads: int | None = None,
     progress: _Progress = None,
-) -> SweepMetrics: ...
+) -> None: ...
+def sweep_abscissae(sets: _LoopSets, *, threads: int | None = None) -> _Reals: ...
 def sweep_responses(
     sets: _LoopSets,
     time: _Reals,

@@ -39,6 +39,7 @@ ORDER = {
         "boxes",
         "map",
         "held",
+        "delayed",
     ],
     "frequency": [
         "two_sided",

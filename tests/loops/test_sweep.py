@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from deadtime.loops._model import rest_of
+from deadtime.loops._sweep import _Sets
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loops import loops
@@ -247,7 +248,9 @@ def bits(found):
     return {name: column.tobytes() for name, column in found.metrics.items()}
 
 
-@pytest.mark.parametrize("loop", [LOOPS[0], LOOPS[5], LOOPS[6], LOOPS[11], LOOPS[16]], ids=range(5))
+@pytest.mark.parametrize(
+    "loop", [LOOPS[i] for i in (0, 5, 6, 11, 14, 16, 17)], ids=(0, 5, 6, 11, 14, 16, 17)
+)
 def test_a_set_has_its_own_bits(loop):
     values = random_values(loop, 50, seed=3)
     whole = dtm.sweep(loop, values, 6.0, threads=1)
@@ -264,7 +267,10 @@ loop = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.3, 0.2, dtm.DerivativeFilter(8
                        sample_time=0.065, limit=0.9)
 found = dtm.sweep(loop, {"Kp": np.linspace(0.5, 2.5, 40), "delay": np.linspace(0.1, 0.5, 40)}, 9.0)
 outputs = dtm.sweep(loop, {"delay": np.linspace(0.1, 0.5, 9)}, [0.0, 1.0, 3.3], responses=True)
-print([c.tobytes().hex() for c in found.metrics.values()], outputs.outputs.tobytes().hex())
+loop = loop.replace(sample_time=None, limit=None)
+smooth = dtm.sweep(loop, {"Kp": np.linspace(0.5, 2.5, 40), "delay": np.linspace(0.1, 0.5, 40)}, 9.0)
+columns = [*found.metrics.values(), *smooth.metrics.values(), smooth.status, outputs.outputs]
+print([c.tobytes().hex() for c in columns])
 """
 
 
@@ -278,6 +284,14 @@ def test_instruction_sets_agree_to_the_bit():
         ).stdout
 
     assert run("plain") == run("avx2") == run("avx512")
+
+
+@pytest.mark.parametrize("loop", LOOPS[14:], ids=range(14, len(LOOPS)))
+def test_the_poles_of_many_loops_are_those_of_each(loop):
+    values = random_values(loop, 5)
+    rates = _Sets(loop, values, (5,), 1.0, 0.02, (0.1, 0.9), 1).rates()
+    alone = [-single(loop, values, i).spectral_abscissa() for i in range(5)]
+    np.testing.assert_allclose(rates, alone, rtol=1e-9)
 
 
 @settings(max_examples=60, deadline=None)

@@ -16,33 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.errors import DeadtimeError
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._stability import sampled_grid
 
 Vector = NDArray[np.float64]
 
 #: Time for which a response must have been in its band to count as settled, in slowest time
 #: constants of the closed loop: more misjudge fewer responses, and take longer simulations.
 TIME_CONSTANTS = 3.0
-
-
-def abscissae(loop: ControlLoop, numbers: Mapping[str, Any], threads: int | None) -> Vector:
-    """Spectral abscissa in 1/s of each set without its limit; NaN if it cannot be found."""
-    count = max(np.size(value) for value in numbers.values())
-    moving = {name: value for name, value in numbers.items() if name != "limit"}
-    if loop.is_sampled:
-        return sampled_grid(loop.plant, loop.controller, moving, threads=threads).abscissa
-    columns = {name: np.broadcast_to(value, count).tolist() for name, value in moving.items()}
-    found = np.full(count, np.nan)
-    for i in range(count):
-        try:
-            found[i] = loop.specification.abscissa_at(
-                {name: column[i] for name, column in columns.items()}
-            )
-        except (DeadtimeError, ValueError):
-            continue
-    return found
 
 
 def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Vector:

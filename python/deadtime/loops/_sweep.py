@@ -28,19 +28,21 @@ from deadtime._base.validation import (
     real_array,
     thread_number,
 )
-from deadtime._deadtime import sweep_metrics, sweep_responses
+from deadtime._deadtime import sweep_abscissae, sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._entries import Each
 from deadtime.loops._model import refuse_discretised, rest_of
-from deadtime.loops._settled import TIME_CONSTANTS, abscissae, slowest_times
+from deadtime.loops._settled import TIME_CONSTANTS, slowest_times
+from deadtime.loops._stability import sampled_grid
 from deadtime.systems._response import first_duration
 
 Vector = NDArray[np.float64]
 
 _Places: TypeAlias = slice | NDArray[np.intp]
 
-#: Number of sets that are built and simulated together: more take more memory, fewer more calls.
-_BLOCK = 1 << 15
+#: Number of sets that are built and simulated together: more leave the caches, fewer take more
+#: calls.
+_BLOCK = 1 << 13
 
 # Sets that have not settled are simulated again over a longer time. The simulation times are the
 # first one times powers of 2^(1/_PER_DOUBLING), so that sets with the same time run together: a
@@ -62,7 +64,7 @@ _STEP_ROUNDING = 1e-6
 # itself nor a test of the poles shows whether it stays there.
 _DOUBTFUL = 4
 
-#: Metrics of a step response.
+#: Metrics of a step response, in the order of the native part.
 _METRICS = (
     "rise_time",
     "settling_time",
@@ -244,9 +246,10 @@ def sweep(
     to a twentieth of the band and neither plant nor controller has a slow pole or zero. This is
     evidence, not a proof; `design` proves the stability of its result.
 
-    Sampled loops with up to four states are computed with SIMD instructions, several sets at once;
-    the others one at a time on each thread. The result for a set does not depend on the other sets,
-    on the number of threads or on the machine's instruction set.
+    Loops with up to four states are computed with SIMD instructions, several sets at once, if they
+    are sampled, or have a delay and a command that stays within its limit; the others one at a time
+    on each thread. The result for a set does not depend on the other sets, on the number of threads
+    or on the machine's instruction set.
 
     Examples
     --------
@@ -350,8 +353,13 @@ class _Sets:
         metrics = {name: np.empty(count) for name in _METRICS}
         status = np.empty(count, dtype=np.uint8)
         for place, numbers, sets, report in self.blocks(progress):
-            part = sweep_metrics(
+            # Views of the results where `place` is a slice, else copies.
+            columns = [values[place] for values in metrics.values()]
+            outcomes = status[place]
+            sweep_metrics(
                 sets,
+                columns=columns,
+                status=outcomes,
                 steady_state=_steady(self.loop, numbers, self.amplitude),
                 slowest_time=slowest_times(self.loop, numbers),
                 span=span,
@@ -360,9 +368,10 @@ class _Sets:
                 threads=self.threads,
                 progress=report,
             )
-            status[place] = part.status
-            for name, values in part.metrics.items():
-                metrics[name][place] = values
+            if not isinstance(place, slice):
+                status[place] = outcomes
+                for values, column in zip(metrics.values(), columns, strict=True):
+                    values[place] = column
         shaped = {name: values.reshape(self.shape) for name, values in metrics.items()}
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), shaped)
 
@@ -432,10 +441,17 @@ class _Sets:
         return replace(found, time=times, metrics=shaped, status=status)
 
     def rates(self) -> Vector:
-        """Decay rate of the slowest root of each set, 1/s."""
-        numbers = self.loop.parameters | dict(self.arrays)
-        rates = -abscissae(self.loop, numbers, self.threads)
-        return np.asarray(np.broadcast_to(rates, self.shape))
+        """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""
+        loop = self.loop
+        if loop.is_sampled:
+            numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
+            numbers.pop("limit", None)
+            cells = sampled_grid(loop.plant, loop.controller, numbers, threads=self.threads)
+            return -cells.abscissa
+        found = np.empty(self.shape)
+        for place, _, sets, _ in self.blocks(None):
+            found[place] = sweep_abscissae(sets, threads=self.threads)
+        return -found
 
 
 def _is_open(status: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -71,7 +71,7 @@ mod _deadtime {
     use super::stability::{MapBoundary, MapCells, PyFamily};
     #[pymodule_export]
     use super::sweeps::{
-        LoopSensitivities, SweepMetrics, SweepResponses, loop_sensitivities, sweep_metrics,
+        LoopSensitivities, SweepResponses, loop_sensitivities, sweep_abscissae, sweep_metrics,
         sweep_responses,
     };
     #[pymodule_export]

@@ -2,12 +2,14 @@
 
 use std::borrow::Cow;
 
-use deadtime::dde::ensemble::{self, Sets};
+use deadtime::dde::ensemble::{self, Outcome, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
 use deadtime::dde::{Criteria, Metrics};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
+use deadtime::stability::abscissae;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray1,
+};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::arrays::{column, converted, in_order};
 use crate::dde::LoopRun;
@@ -15,20 +17,22 @@ use crate::runtime::{run, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-type Metric = fn(&Metrics) -> f64;
+type Columns<'py> = Vec<PyReadwriteArray1<'py, f64>>;
 
-/// The metrics of a response by the names that Python shows.
-const METRICS: [(&str, Metric); 9] = [
-    ("rise_time", |metrics| metrics.rise_time),
-    ("settling_time", |metrics| metrics.settling_time),
-    ("peak_time", |metrics| metrics.peak_time),
-    ("overshoot", |metrics| metrics.overshoot),
-    ("undershoot", |metrics| metrics.undershoot),
-    ("settling_min", |metrics| metrics.settling_min),
-    ("settling_max", |metrics| metrics.settling_max),
-    ("peak", |metrics| metrics.peak),
-    ("steady_state", |metrics| metrics.steady_state),
-];
+/// The metrics of a response in the order of the columns that they are written to.
+fn in_columns(metrics: &Metrics) -> [f64; 9] {
+    [
+        metrics.rise_time,
+        metrics.settling_time,
+        metrics.peak_time,
+        metrics.overshoot,
+        metrics.undershoot,
+        metrics.settling_min,
+        metrics.settling_max,
+        metrics.peak,
+        metrics.steady_state,
+    ]
+}
 
 /// Loops of one structure, and the step of their reference.
 #[derive(FromPyObject)]
@@ -74,13 +78,6 @@ impl LoopSets<'_> {
     }
 }
 
-/// The metrics of step responses from rest, and what became of each loop.
-#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
-pub(crate) struct SweepMetrics {
-    metrics: Py<PyDict>,
-    status: Py<PyArray1<u8>>,
-}
-
 /// Step responses from rest, a row a loop, and what became of each.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 pub(crate) struct SweepResponses {
@@ -95,9 +92,10 @@ pub(crate) struct LoopSensitivities {
     inputs: Py<PyArray2<f64>>,
 }
 
-/// Measure step responses of `span` seconds.
+/// Measure step responses of `span` seconds. Metrics and status are written to `columns` and
+/// `status`, one element for each loop.
 #[pyfunction]
-#[pyo3(signature = (sets, *, steady_state, slowest_time, span, settling, rise, threads=None, progress=None))]
+#[pyo3(signature = (sets, *, columns, status, steady_state, slowest_time, span, settling, rise, threads=None, progress=None))]
 #[expect(
     clippy::too_many_arguments,
     reason = "keywords with the names of the public function"
@@ -105,6 +103,8 @@ pub(crate) struct LoopSensitivities {
 pub(crate) fn sweep_metrics<'py>(
     py: Python<'py>,
     sets: LoopSets<'py>,
+    mut columns: Columns<'py>,
+    mut status: PyReadwriteArray1<'py, u8>,
     steady_state: Entry<'py>,
     slowest_time: Entry<'py>,
     span: f64,
@@ -112,25 +112,43 @@ pub(crate) fn sweep_metrics<'py>(
     rise: (f64, f64),
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<SweepMetrics> {
+) -> PyResult<()> {
     let (numbers, steady) = (sets.numbers()?, steady_state.numbers()?);
     let slowest = slowest_time.numbers()?;
     let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
     let sets = sets.read(&entries)?;
     let criteria = Criteria { rise, settling };
-    let found = run(py, threads, progress.as_ref(), |task| {
-        ensemble::metrics(&sets, (&steady, &slowest), span, &criteria, task)
-    })?;
-    let metrics = PyDict::new(py);
-    for (name, metric) in METRICS {
-        let values = column(&found, |(metrics, _)| metric(metrics))?;
-        metrics.set_item(name, values.into_pyarray(py))?;
-    }
-    let status = column(&found, |(_, outcome)| *outcome as u8)?;
-    Ok(SweepMetrics {
-        metrics: metrics.unbind(),
-        status: status.into_pyarray(py).unbind(),
+    let columns = columns.iter_mut().map(|column| column.as_slice_mut());
+    let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
+    let status = status.as_slice_mut()?;
+    run(py, threads, progress.as_ref(), |task| {
+        let keep = |set: usize, metrics: &Metrics, outcome: Outcome| {
+            for (column, metric) in columns.iter_mut().zip(in_columns(metrics)) {
+                if let Some(place) = column.get_mut(set) {
+                    *place = metric;
+                }
+            }
+            if let Some(place) = status.get_mut(set) {
+                *place = outcome as u8;
+            }
+        };
+        ensemble::metrics(&sets, (&steady, &slowest), span, &criteria, task, keep)
     })
+}
+
+/// Spectral abscissae of continuous loops without their limits, 1/s; NaN where none is found.
+#[pyfunction]
+#[pyo3(signature = (sets, *, threads=None))]
+pub(crate) fn sweep_abscissae<'py>(
+    py: Python<'py>,
+    sets: LoopSets<'py>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let numbers = sets.numbers()?;
+    let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
+    let sets = sets.read(&entries)?;
+    let found = run(py, threads, None, |task| abscissae(&sets, task))?;
+    Ok(found.into_pyarray(py))
 }
 
 /// Step responses at times after the start.

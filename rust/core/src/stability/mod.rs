@@ -5,12 +5,14 @@
 //! * `crossings` finds where roots cross the edge of the specification as one gain varies,
 //!   `branches` follows roots along a row.
 //! * `boxes` proves statements about all points of a box of parameters.
+//! * `delayed` finds the spectral abscissae of many continuous loops.
 //! * `map` covers two parameters: counts, boundaries, spectral abscissa, robust maps.
 
 mod boxes;
 mod branches;
 mod cell;
 mod crossings;
+mod delayed;
 mod family;
 mod held;
 mod hold;
@@ -21,6 +23,7 @@ pub use boxes::{Boxes, Limits, Node, Radius, largest_stable_box, proved_boxes, s
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub(crate) use crossings::radius_of_members;
 pub use crossings::{Crossing, crossings_along};
+pub use delayed::abscissae;
 pub use family::{Affine, Family, Term};
 pub use held::{HeldLoop, HeldNumbers, LoopRows, held_boundaries, held_crossings, held_map};
 pub use map::{

@@ -4,12 +4,16 @@ use crate::simd::{Real, Simd};
 
 use super::sets::{Sets, of};
 use super::shape::Shape;
+use super::transition::Matrix;
 
 /// Number of loops in a block: two vectors of the widest instruction set.
 pub(super) const SETS: usize = 16;
 
 /// One number for each loop of a block.
 pub(super) type Column = [f64; SETS];
+
+/// Sets of one shape, by their indices.
+pub(super) type Members<'a> = (Shape, &'a [usize]);
 
 /// Loops of one shape.
 #[derive(Debug)]
@@ -35,14 +39,14 @@ pub(super) enum Number {
 
 impl Block {
     /// A block of at most [`SETS`] loops of one shape; the last loop fills the unused columns.
-    pub(super) fn new(sets: &Sets<'_>, members: &[(Shape, usize)]) -> Option<Self> {
-        let &(shape, last) = members.last()?;
+    pub(super) fn new(sets: &Sets<'_>, (shape, members): Members<'_>) -> Option<Self> {
+        let &last = members.last()?;
         let entries = sets.entries().iter();
         let columns = entries.map(|entry| match entry {
             [shared] => [*shared; SETS],
             each => {
                 let mut column = [of(each, last); SETS];
-                for (place, &(_, set)) in column.iter_mut().zip(members) {
+                for (place, &set) in column.iter_mut().zip(members) {
                     *place = of(each, set);
                 }
                 column
@@ -79,6 +83,16 @@ impl Block {
             *entry = self.load(simd, place + i, pair);
         }
         column
+    }
+
+    /// A of the loops, `N` states each.
+    #[inline(always)]
+    pub(super) fn matrix<S: Simd, const N: usize>(&self, simd: S, pair: usize) -> Matrix<S, N> {
+        let mut a = [[Real::splat(simd, 0.0); N]; N];
+        for (i, row) in a.iter_mut().enumerate() {
+            *row = self.column(simd, i * N, pair);
+        }
+        a
     }
 
     /// A number of the rows.

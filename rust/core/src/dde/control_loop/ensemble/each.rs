@@ -88,12 +88,11 @@ pub(super) fn judged(metrics: Metrics, stays_settled: bool) -> (Metrics, Outcome
 /// The loop and the time by which its output is read ahead; none where the numbers are not those of
 /// a loop.
 fn loop_of(sets: &Sets<'_>, set: usize) -> Result<Option<(LinearLoop, f64)>, Error> {
-    let row = sets.row(set);
-    let row = Row::new(sets.states(), &row)?;
-    Ok(row
-        .checked()
-        .ok()
-        .map(|plant| (plant, sets.ahead(row.delay))))
+    let found = sets.loop_of(set)?;
+    Ok(found.map(|plant| {
+        let ahead = sets.ahead(plant.delay());
+        (plant, ahead)
+    }))
 }
 
 fn run(

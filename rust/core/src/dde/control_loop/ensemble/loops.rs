@@ -49,8 +49,11 @@ pub(super) struct Loops<S: Simd, const N: usize, const P: usize> {
 /// Their plants, and what is the same for any controller.
 pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) samples: usize,
+    /// Are the loops continuous, so that a sample is one delay?
+    pub(super) is_continuous: bool,
     pub(super) is_curved: bool,
-    pub(super) is_long: bool,
+    /// Degree of the polynomials of the output.
+    pub(super) degree: usize,
     /// Is the output before the first arrival of a command hidden, and jumps there? It is if it is
     /// read ahead by the delay.
     pub(super) hides: bool,
@@ -63,6 +66,7 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     /// M r.
     pub(super) command: Real<S>,
     pub(super) limit: Real<S>,
+    pub(super) is_limited: bool,
     pub(super) sample_time: Real<S>,
     /// Time by which the output is read ahead.
     pub(super) ahead: Real<S>,
@@ -92,12 +96,7 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
     #[inline(always)]
     pub(super) fn new(simd: S, block: &Block, pair: usize, span: f64) -> Self {
         let zero = Real::splat(simd, 0.0);
-        let mut full = [[zero; N]; N];
-        for (i, row) in full.iter_mut().enumerate() {
-            for (j, entry) in row.iter_mut().enumerate() {
-                *entry = block.load(simd, i * N + j, pair);
-            }
-        }
+        let full = block.matrix(simd, pair);
         let drive = block.column(simd, N * N, pair);
         let push = block.column(simd, N * N + N, pair);
         let push = scaled(&push, zero.constant(block.amplitude));
@@ -112,33 +111,7 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             let early = early.larger(zero).smaller(sample_time);
             (sample_time - early, early)
         };
-        let ahead = if block.is_ahead { delay } else { zero };
-        let mut plants = Plants {
-            samples: shape.samples as usize,
-            is_curved: shape.is_curved,
-            is_long: shape.is_long,
-            hides: shape.jumps && block.is_ahead,
-            a: leading(&full, zero),
-            b: first(&drive, zero),
-            e: first(&push, zero),
-            c: first(&block.column::<S, N>(simd, N * N + 3 * N, pair), zero),
-            d: block.number(simd, Number::D, pair),
-            command: block.number(simd, Number::M, pair) * block.amplitude,
-            limit: block.number(simd, Number::Limit, pair),
-            sample_time,
-            ahead,
-            end: ahead + span,
-            parts: Vec::with_capacity(shape.corners()),
-            corners: Vec::with_capacity(shape.corners()),
-            first_output: zero,
-            zero,
-            no_lane: zero.lt(0.0),
-            is_direct: shape.jumps,
-            is_first: shape.is_first,
-            is_pushed: shape.is_pushed,
-            bulge: [zero; P],
-            bulge_of_jump: zero,
-        };
+        let mut plants = Plants::new::<N>(simd, block, pair, (sample_time, span));
         let mut step = Map::nothing(zero);
         let mut offset = zero;
         for (parts, length, is_after) in [(shape.early, early, false), (shape.late, late, true)] {
@@ -230,6 +203,78 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
 }
 
 impl<S: Simd, const P: usize> Plants<S, P> {
+    /// The plants of loops with `N` states, without the parts of their samples. A sample takes
+    /// `sample_time`; the output is read for `span` seconds.
+    #[inline(always)]
+    pub(super) fn new<const N: usize>(
+        simd: S,
+        block: &Block,
+        pair: usize,
+        (sample_time, span): (Real<S>, f64),
+    ) -> Self {
+        let zero = Real::splat(simd, 0.0);
+        let shape = block.shape;
+        let push = block.column::<S, N>(simd, N * N + N, pair);
+        let limit = block.number(simd, Number::Limit, pair);
+        let ahead = if block.is_ahead {
+            block.number(simd, Number::Delay, pair)
+        } else {
+            zero
+        };
+        Self {
+            samples: shape.samples as usize,
+            is_continuous: shape.is_continuous,
+            is_curved: shape.is_curved,
+            degree: usize::from(shape.degree),
+            hides: shape.jumps && block.is_ahead,
+            a: leading(&block.matrix::<S, N>(simd, pair), zero),
+            b: first(&block.column::<S, N>(simd, N * N, pair), zero),
+            e: first(&scaled(&push, zero.constant(block.amplitude)), zero),
+            c: first(&block.column::<S, N>(simd, N * N + 3 * N, pair), zero),
+            d: block.number(simd, Number::D, pair),
+            command: block.number(simd, Number::M, pair) * block.amplitude,
+            limit,
+            is_limited: limit.lt(f64::INFINITY).any(),
+            sample_time,
+            ahead,
+            end: ahead + span,
+            parts: Vec::with_capacity(shape.corners()),
+            corners: Vec::with_capacity(shape.corners()),
+            first_output: zero,
+            zero,
+            no_lane: zero.lt(0.0),
+            is_direct: shape.jumps,
+            is_first: shape.is_first,
+            is_pushed: shape.is_pushed,
+            bulge: [zero; P],
+            bulge_of_jump: zero,
+        }
+    }
+
+    /// Are the runs of all loops over before sample `number`? `is_closed` runs include a sample at
+    /// their end.
+    #[inline(always)]
+    pub(super) fn are_over(&self, number: usize, is_closed: bool) -> bool {
+        let now = self.sample_time * number as f64;
+        !if is_closed {
+            // Rounding errors do not part the last sample from the end.
+            let rounding = (self.end + self.sample_time) * (32.0 * f64::EPSILON);
+            now.le(self.end + rounding).any()
+        } else {
+            now.lt(self.end).any()
+        }
+    }
+
+    /// The time after which a loop reacts to its own output.
+    #[inline(always)]
+    pub(super) fn wait(&self) -> Real<S> {
+        if self.is_continuous {
+            self.sample_time
+        } else {
+            self.sample_time * (self.samples + 2) as f64
+        }
+    }
+
     /// The output at the end of a part other than the last one.
     #[inline(always)]
     fn corner(&self, place: usize) -> Corner<S, P> {

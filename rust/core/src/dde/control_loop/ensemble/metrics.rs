@@ -8,7 +8,7 @@ use super::loops::Plants;
 use super::measured::Measured;
 use super::rounds::measure;
 use super::sets::{Outcome, of as number};
-use super::through::{Job, Member};
+use super::through::Job;
 use super::trace::{Trace, of};
 use super::view::View;
 use super::walk::Run;
@@ -31,16 +31,16 @@ impl Job for MetricsJob<'_> {
         &self,
         loops: &Plants<S, P>,
         run: &mut dyn Run<S>,
-        members: &[Member],
+        members: &[usize],
         trace: &mut Trace<S>,
-        found: &mut Vec<Self::Found>,
+        found: &mut Vec<Option<Self::Found>>,
     ) {
         let zero = loops.d.constant(0.0);
         let mut steady = zero;
         for (lane, place) in steady.numbers_mut().iter_mut().enumerate() {
             *place = members
                 .get(lane)
-                .map_or(0.0, |&(_, set)| number(self.steady, set));
+                .map_or(0.0, |&set| number(self.steady, set));
         }
         run.begin(trace, false);
         let mut runs = run.advance(trace);
@@ -77,12 +77,17 @@ impl Job for MetricsJob<'_> {
             }
         }
         let lost = run.lost().select(1.0, zero);
+        let unfit = run.unfit().select(1.0, zero);
         let begin = found.len();
         let mut radius = zero;
         let mut is_doubtful = false;
         for (lane, measured) in lanes.into_iter().enumerate() {
+            if of(&unfit, lane) > 0.0 {
+                found.push(None);
+                continue;
+            }
             if of(&lost, lane) > 0.0 {
-                found.push((Metrics::UNKNOWN, Outcome::Diverged));
+                found.push(Some((Metrics::UNKNOWN, Outcome::Diverged)));
                 continue;
             }
             let ahead = of(&loops.ahead, lane);
@@ -94,29 +99,32 @@ impl Job for MetricsJob<'_> {
             record.risen = (since(record.risen.0, ahead), since(record.risen.1, ahead));
             record.inside_since = since(record.inside_since, ahead);
             record.unsettled_until -= ahead;
-            let sample_time = of(&loops.sample_time, lane);
-            let stays = record.stays_settled(self.span, sample_time * (loops.samples + 2) as f64);
+            let stays = record.stays_settled(self.span, of(&loops.wait(), lane));
             let (metrics, mut outcome) = judged(record.metrics(&levels), stays);
             let inside = self.span - metrics.settling_time;
             let slowest = members
                 .get(lane)
-                .map_or(0.0, |&(_, set)| number(self.slowest, set));
+                .map_or(0.0, |&set| number(self.slowest, set));
             if outcome == Outcome::Ok && TIME_CONSTANTS * slowest > inside {
                 outcome = Outcome::Doubtful;
             }
             if outcome == Outcome::Doubtful && inside > 0.0 {
                 is_doubtful = true;
+                let sample_time = of(&loops.sample_time, lane);
                 radius.numbers_mut()[lane] = libm::exp(-TIME_CONSTANTS * sample_time / inside);
             }
-            found.push((metrics, outcome));
+            found.push(Some((metrics, outcome)));
         }
         if !is_doubtful {
             return;
         }
         let decay = run.decay(radius);
         let (yes, no) = (decay.yes.select(1.0, zero), decay.no.select(1.0, zero));
-        for (lane, (_, outcome)) in found.iter_mut().skip(begin).enumerate() {
-            if *outcome == Outcome::Doubtful && of(&radius, lane) > 0.0 {
+        for (lane, found) in found.iter_mut().skip(begin).enumerate() {
+            if let Some((_, outcome)) = found
+                && *outcome == Outcome::Doubtful
+                && of(&radius, lane) > 0.0
+            {
                 if of(&yes, lane) > 0.0 {
                     *outcome = Outcome::Ok;
                 } else if of(&no, lane) > 0.0 {

@@ -4,7 +4,7 @@ use crate::simd::{Real, Simd};
 
 use super::loops::Plants;
 use super::sets::Outcome;
-use super::through::{Job, Member};
+use super::through::Job;
 use super::trace::{Trace, of};
 use super::view::View;
 use super::walk::Run;
@@ -22,9 +22,9 @@ impl Job for ResponsesJob<'_> {
         &self,
         loops: &Plants<S, P>,
         run: &mut dyn Run<S>,
-        members: &[Member],
+        members: &[usize],
         trace: &mut Trace<S>,
-        found: &mut Vec<Self::Found>,
+        found: &mut Vec<Option<Self::Found>>,
     ) {
         let zero = loops.d.constant(0.0);
         let mut outputs: Vec<Vec<f64>> = members
@@ -32,21 +32,21 @@ impl Job for ResponsesJob<'_> {
             .map(|_| Vec::with_capacity(self.times.len()))
             .collect();
         run.begin(trace, true);
-        let mut parts = vec![0_usize; zero.numbers().len()];
+        let mut parts = vec![None; zero.numbers().len()];
         let mut runs = true;
         while runs {
             runs = run.advance(trace);
             let view = View { loops, trace };
             loop {
                 let (mut sigma, mut is_due) = (zero, false);
-                let mut due = vec![false; outputs.len()];
+                parts.fill(None);
                 for (lane, done) in outputs.iter().enumerate() {
                     let Some(&time) = self.times.get(done.len()) else {
                         continue;
                     };
                     let time = time + of(&loops.ahead, lane);
                     if let Some((part, share)) = view.find(lane, time) {
-                        (parts[lane], due[lane], is_due) = (part, true, true);
+                        (parts[lane], is_due) = (Some(part), true);
                         sigma.numbers_mut()[lane] = share;
                     }
                 }
@@ -55,18 +55,21 @@ impl Job for ResponsesJob<'_> {
                 }
                 let values = self.values(&view, &parts, sigma);
                 for (lane, outputs) in outputs.iter_mut().enumerate() {
-                    if due[lane] {
+                    if parts[lane].is_some() {
                         outputs.push(of(&values, lane));
                     }
                 }
             }
         }
         let lost = run.lost().select(1.0, zero);
+        let unfit = run.unfit().select(1.0, zero);
         found.extend(outputs.into_iter().enumerate().map(|(lane, outputs)| {
-            if of(&lost, lane) > 0.0 {
-                (Vec::new(), Outcome::Diverged)
+            if of(&unfit, lane) > 0.0 {
+                None
+            } else if of(&lost, lane) > 0.0 {
+                Some((Vec::new(), Outcome::Diverged))
             } else {
-                (outputs, Outcome::Ok)
+                Some((outputs, Outcome::Ok))
             }
         }));
     }
@@ -78,7 +81,7 @@ impl ResponsesJob<'_> {
     fn values<S: Simd, const P: usize>(
         &self,
         view: &View<'_, S, P>,
-        parts: &[usize],
+        parts: &[Option<usize>],
         sigma: Real<S>,
     ) -> Real<S> {
         if view.loops.is_curved {
@@ -86,6 +89,9 @@ impl ResponsesJob<'_> {
         }
         let (mut first, mut last) = (sigma, sigma);
         for (lane, &part) in parts.iter().enumerate() {
+            let Some(part) = part else {
+                continue;
+            };
             first.numbers_mut()[lane] = view.trace.output(lane, part);
             last.numbers_mut()[lane] = view.trace.output(lane, part + 1);
         }

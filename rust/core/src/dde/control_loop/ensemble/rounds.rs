@@ -30,7 +30,7 @@ pub(super) fn measure<S: Simd, const P: usize>(view: &View<'_, S, P>, lanes: &mu
         };
         one.corners(measured);
     }
-    let mut parts = [0_usize; SETS];
+    let mut parts = [None; SETS];
     let mut wanted: [Option<Wanted>; SETS] = [None; SETS];
     let mut level = zero;
     loop {
@@ -44,15 +44,15 @@ pub(super) fn measure<S: Simd, const P: usize>(view: &View<'_, S, P>, lanes: &mu
                 lane,
             };
             let next = one.next(measured);
-            parts[lane] = next.map_or(0, |(part, _)| part);
+            parts[lane] = next.map(|(part, _)| part);
             wanted[lane] = next.map(|(_, wanted)| wanted);
-            if let Some((_, found)) = next {
+            if let Some((part, found)) = next {
                 any = true;
                 is_open.numbers_mut()[lane] = 1.0;
                 if let Wanted::Crossing(at) = found {
                     crosses.numbers_mut()[lane] = 1.0;
                     level.numbers_mut()[lane] = at;
-                    high.numbers_mut()[lane] = one.until(parts[lane]);
+                    high.numbers_mut()[lane] = one.until(part);
                 }
             }
         }
@@ -74,13 +74,13 @@ pub(super) fn measure<S: Simd, const P: usize>(view: &View<'_, S, P>, lanes: &mu
             sigma,
         };
         for (lane, measured) in lanes.iter_mut().enumerate() {
-            if let Some(wanted) = wanted[lane] {
+            if let (Some(part), Some(wanted)) = (parts[lane], wanted[lane]) {
                 let one = One {
                     view,
                     spots: &spots,
                     lane,
                 };
-                one.accept(measured, parts[lane], wanted, &found);
+                one.accept(measured, part, wanted, &found);
             }
         }
     }

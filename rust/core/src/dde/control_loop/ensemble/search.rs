@@ -75,6 +75,15 @@ impl<S: Simd, const P: usize> One<'_, S, P> {
         chunk * per_chunk..((chunk + 1) * per_chunk).min(self.parts())
     }
 
+    /// A bound below the outputs of a chunk, times the sign of the step.
+    fn worst(&self, chunk: usize, sign: f64) -> f64 {
+        let Some(chunk) = self.view.trace.chunks.get(chunk) else {
+            return f64::NEG_INFINITY;
+        };
+        let (most, least) = (of(&chunk.most, self.lane), of(&chunk.least, self.lane));
+        (sign * most).min(sign * least) - of(&chunk.bulge, self.lane)
+    }
+
     /// Time of a part at σ.
     fn time_in(&self, part: usize, sigma: f64) -> f64 {
         let begin = self.time(part);
@@ -199,8 +208,15 @@ impl<S: Simd, const P: usize> One<'_, S, P> {
                 Stage::Dip => {
                     let sign = measured.levels.sign;
                     let end = last_of(&self.spots.may_dip);
+                    let per_chunk = self.view.per_chunk();
                     while measured.at < end {
                         let part = measured.at;
+                        if part.is_multiple_of(per_chunk)
+                            && self.worst(part / per_chunk, sign) >= measured.dip
+                        {
+                            measured.at += per_chunk;
+                            continue;
+                        }
                         measured.at += 1;
                         let (one, other) = (sign * self.y(part), sign * self.y(part + 1));
                         let bulge = self.bulge(part);

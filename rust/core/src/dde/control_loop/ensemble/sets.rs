@@ -1,7 +1,8 @@
 //! Loops of one structure, one set of numbers for each.
 
 use crate::Error;
-use crate::dde::control_loop::row::width;
+use crate::dde::control_loop::linear_loop::LinearLoop;
+use crate::dde::control_loop::row::{Row, width};
 
 /// Outcome of one set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -70,7 +71,7 @@ impl<'a> Sets<'a> {
     }
 
     /// Number of sets.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.count
     }
 
@@ -87,6 +88,12 @@ impl<'a> Sets<'a> {
     /// The numbers of a set.
     pub(super) fn row(&self, set: usize) -> Vec<f64> {
         self.entries.iter().map(|entry| of(entry, set)).collect()
+    }
+
+    /// The loop of a set; none where its numbers are not those of one.
+    pub(crate) fn loop_of(&self, set: usize) -> Result<Option<LinearLoop>, Error> {
+        let row = self.row(set);
+        Ok(Row::new(self.states, &row)?.checked().ok())
     }
 
     /// Time by which the output of a loop with `delay` is read ahead of the simulation.

@@ -4,12 +4,16 @@
 //! is a short Taylor series. Loops whose delays hold the same number of whole samples and whose
 //! samples have the same parts share a block.
 
+use std::collections::BTreeMap;
+
 use crate::Error;
 use crate::dde::control_loop::row::Row;
 use crate::dde::control_loop::sampled::Timing;
-use crate::memory::{push, reserved};
+use crate::memory::push;
 
+use super::piece::{LONG, SHORT};
 use super::sets::{Sets, of};
+use super::trace::{SAMPLES, delays};
 use super::transition;
 
 /// Most states of a loop in a block.
@@ -18,11 +22,27 @@ pub(super) const MOST_STATES: usize = 4;
 /// Loops with more samples than this run one by one, so that they can be cancelled.
 const MOST_SAMPLES: f64 = 1e6;
 
+/// The same for the parts of all delays of a continuous loop, each of which takes longer.
+const MOST_ELEMENTS: f64 = 1e5;
+
 /// Most parts of one half of a sample.
 const MOST_PARTS: f64 = 64.0;
 
 /// Largest rate of the plant times the length of a part for the shorter series.
 const SHORT_REACH: f64 = 0.25;
+
+/// Largest direct gain from the delayed command to the command of a continuous loop in a block: the
+/// rate of its signals grows beyond all bounds towards 1.
+const MOST_DIRECT: f64 = 0.75;
+
+/// Rate of a continuous loop times its delay up to which its parts are [`FINE`].
+const SLOW: f64 = 1.0;
+
+/// Longest parts of a continuous loop, times its rate, and a degree beyond which terms are below
+/// 1e-17. On short parts, extrema and crossings are isolated in lanes almost always; where the
+/// fastest rate is far above that of the output, long parts cost less.
+const FINE: (f64, usize) = (0.35, 13);
+const COARSE: (f64, usize) = (1.0, LONG);
 
 /// What memory is requested for, in errors.
 const SWEEP: &str = "the sweep";
@@ -30,6 +50,8 @@ const SWEEP: &str = "the sweep";
 /// The parts of a sample, and how the output behaves on them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Shape {
+    /// Are the loops continuous? A sample is then one delay.
+    pub(super) is_continuous: bool,
     /// Whole samples in the delay.
     pub(super) samples: u32,
     /// Parts from a sample to the arrival of a command; 0 where it arrives at the sample.
@@ -40,8 +62,8 @@ pub(super) struct Shape {
     pub(super) jumps: bool,
     /// Is the output not a line on every part (c A ≠ 0 or c E ≠ 0)?
     pub(super) is_curved: bool,
-    /// Does the series of a part need more terms?
-    pub(super) is_long: bool,
+    /// Degree of the polynomials of a part.
+    pub(super) degree: u8,
     /// Is the output the first state, but for D?
     pub(super) is_first: bool,
     /// Does the reference reach the plant other than through the command?
@@ -49,6 +71,16 @@ pub(super) struct Shape {
 }
 
 impl Shape {
+    /// Columns of a trace that grow with the loop.
+    pub(super) fn columns(&self) -> usize {
+        if self.is_continuous {
+            let parts = usize::from(self.late);
+            (delays(parts) + 1) * parts * (LONG + 1)
+        } else {
+            self.samples as usize + SAMPLES
+        }
+    }
+
     /// Outputs in the trace of one sample.
     pub(super) fn corners(&self) -> usize {
         usize::from(self.early) + usize::from(self.jumps) + usize::from(self.late)
@@ -129,11 +161,14 @@ impl<'a> Shapes<'a> {
         let (last, finite) = self.row.split_last()?;
         let fits = finite.iter().all(|number| number.is_finite())
             && *last > 0.0
-            && (1..=MOST_STATES).contains(&row.b.len())
-            && row.delay >= 0.0
+            && (1..=MOST_STATES).contains(&row.b.len());
+        if fits && !row.is_sampled() {
+            return continuous(&row, span);
+        }
+        let is_timed = row.delay >= 0.0
             && row.sample_time > 0.0
             && (span + row.delay) / row.sample_time < MOST_SAMPLES;
-        if !fits {
+        if !fits || !is_timed {
             return None;
         }
         let plant = self.shared.unwrap_or_else(|| plant_of(&row, self.plant));
@@ -153,31 +188,103 @@ impl<'a> Shapes<'a> {
         }
         let longest = (timing.early / early.max(1.0)).max(timing.late / late);
         Some(Shape {
+            is_continuous: false,
             samples: u32::try_from(timing.samples).ok()?,
             early: early as u8,
             late: late as u8,
             jumps: row.d != 0.0,
             is_curved: plant.is_curved,
-            is_long: plant.is_curved && plant.rate * longest > SHORT_REACH,
+            degree: if plant.is_curved && plant.rate * longest > SHORT_REACH {
+                LONG
+            } else {
+                SHORT
+            } as u8,
             is_first: plant.is_first,
             is_pushed: plant.is_pushed,
         })
     }
 
-    /// The sets that run in blocks, in the order of their shapes, and those that run alone.
+    /// The sets that run in blocks, by their shapes, and those that run alone.
     #[expect(clippy::type_complexity, reason = "two lists")]
-    pub(super) fn sorted(mut self, span: f64) -> Result<(Vec<(Shape, usize)>, Vec<usize>), Error> {
-        let mut alike = reserved(SWEEP, self.sets.len())?;
+    pub(super) fn sorted(
+        mut self,
+        span: f64,
+    ) -> Result<(Vec<(Shape, Vec<usize>)>, Vec<usize>), Error> {
+        let mut alike: Vec<(Shape, Vec<usize>)> = Vec::new();
+        let mut places = BTreeMap::new();
+        let mut latest = None;
         let mut alone = Vec::new();
         for set in 0..self.sets.len() {
-            match self.of(set, span) {
-                Some(shape) => alike.push((shape, set)),
-                None => push(SWEEP, &mut alone, set)?,
+            let Some(shape) = self.of(set, span) else {
+                push(SWEEP, &mut alone, set)?;
+                continue;
+            };
+            let place = match latest {
+                Some((same, place)) if same == shape => place,
+                _ => *places.entry(shape).or_insert(alike.len()),
+            };
+            latest = Some((shape, place));
+            if place == alike.len() {
+                push(SWEEP, &mut alike, (shape, Vec::new()))?;
+            }
+            if let Some((_, sets)) = alike.get_mut(place) {
+                push(SWEEP, sets, set)?;
             }
         }
-        alike.sort_unstable();
         Ok((alike, alone))
     }
+}
+
+/// The shape of a continuous loop: its delay is cut into parts on which all signals are short Taylor
+/// series, as long as nothing jumps but the reference and the command.
+fn continuous(row: &Row<'_>, span: f64) -> Option<Shape> {
+    let is_simple =
+        row.delay > 0.0 && row.d == 0.0 && row.impulse == 0.0 && row.l.abs() <= MOST_DIRECT;
+    if !is_simple {
+        return None;
+    }
+    let rate = rate_of(row);
+    let reach = rate * row.delay;
+    let (longest, degree) = if reach <= SLOW { FINE } else { COARSE };
+    let parts = (reach / longest).ceil().max(1.0);
+    let fits = parts <= MOST_PARTS && parts * (span / row.delay + 1.0) < MOST_ELEMENTS;
+    fits.then_some(Shape {
+        is_continuous: true,
+        samples: 0,
+        early: 0,
+        late: parts as u8,
+        jumps: false,
+        is_curved: true,
+        degree: degree as u8,
+        is_first: false,
+        is_pushed: false,
+    })
+}
+
+/// Bound on the growth of the derivatives of the states, 1/s: |x⁽ʲ⁾| ≤ Mʲ |x| with the earlier |x|
+/// among them, where M = |A| + |B K|/(1 − |L|). The root of ‖M⁴‖ does not depend much on the units
+/// of the states.
+fn rate_of(row: &Row<'_>) -> f64 {
+    let n = row.b.len();
+    let mut m = [[0.0; MOST_STATES]; MOST_STATES];
+    for (i, line) in m.iter_mut().enumerate().take(n) {
+        for (j, entry) in line.iter_mut().enumerate().take(n) {
+            *entry = row.a[i * n + j].abs() + (row.b[i] * row.k[j]).abs() / (1.0 - row.l.abs());
+        }
+    }
+    if n == 1 {
+        return m[0][0];
+    }
+    for _ in 0..2 {
+        let old = m;
+        for (i, line) in m.iter_mut().enumerate().take(n) {
+            for (j, entry) in line.iter_mut().enumerate().take(n) {
+                *entry = (0..n).map(|k| old[i][k] * old[k][j]).sum();
+            }
+        }
+    }
+    let norm = |j: usize| m.iter().map(|line| line[j]).sum::<f64>();
+    (0..n).map(norm).fold(0.0, f64::max).sqrt().sqrt()
 }
 
 fn plant_of(row: &Row<'_>, p: usize) -> Plant {

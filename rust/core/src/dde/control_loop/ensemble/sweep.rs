@@ -2,27 +2,29 @@
 
 use rayon::prelude::*;
 
-use super::block::{Column, SETS};
+use super::block::{Column, Members, SETS};
 use super::each;
 use super::metrics::MetricsJob;
 use super::responses::ResponsesJob;
 use super::sets::{Outcome, Sets, of};
 use super::shape::{Shapes, plant_states};
-use super::through::{Job, Member, through};
-use super::trace::SAMPLES;
+use super::through::{Job, through};
 use crate::dde::control_loop::metrics::{Criteria, Metrics};
-use crate::memory::{filled, reserved, room};
+use crate::memory::{filled, push, reserved, room};
 use crate::{Error, Task};
 
 /// What memory is requested for, in errors.
 const SWEEP: &str = "the sweep";
 
-/// Results held before they are written to their places: enough to keep all threads busy.
-const AT_ONCE: usize = 1 << 14;
+/// Results held for each thread before they are written to their places: enough to keep it busy,
+/// and few enough for its cache.
+const AT_ONCE: usize = 1 << 11;
 
-/// Blocks in one task of a thread: few enough to share small sweeps, and enough to make the trace
-/// of a task seldom.
-const BLOCKS: usize = 8;
+/// Tasks for each thread, so that all threads end at about the same time.
+const TASKS: usize = 4;
+
+/// Most blocks in one task: more make the trace of a task less often, and take longer to cancel.
+const BLOCKS: usize = 32;
 
 /// Upper limit on the values of responses held at a time (bounds memory to a share of the result).
 const VALUES_AT_ONCE: usize = 1 << 22;
@@ -38,27 +40,33 @@ impl Sets<'_> {
         alone: impl Fn(usize) -> Result<J::Found, Error> + Sync,
         mut keep: impl FnMut(usize, J::Found),
     ) -> Result<(), Error> {
-        let (alike, left) = Shapes::new(self)?.sorted(span)?;
+        let (alike, mut left) = Shapes::new(self)?.sorted(span)?;
         let plant = plant_states(self);
-        let mut blocks: Vec<&[Member]> = reserved(SWEEP, alike.len())?;
-        let groups = alike.chunk_by(|one, other| one.0 == other.0);
-        blocks.extend(groups.flat_map(|group| group.chunks(SETS)));
+        let count = alike.iter().map(|(_, sets)| sets.len().div_ceil(SETS));
+        let mut blocks: Vec<Members<'_>> = reserved(SWEEP, count.sum())?;
+        for (shape, sets) in &alike {
+            blocks.extend(sets.chunks(SETS).map(|members| (*shape, members)));
+        }
         for group in blocks.chunks(at_once.div_ceil(SETS)) {
-            let work = |blocks: &[&[Member]]| {
+            let work = |blocks: &[Members<'_>]| {
                 task.check()?;
-                let longest = blocks.iter().flat_map(|block| block.first());
-                let samples = longest.map(|(shape, _)| shape.samples).max();
-                room::<Column>(SWEEP, samples.unwrap_or(0) as usize + SAMPLES)?;
+                let columns = blocks.iter().map(|(shape, _)| shape.columns()).max();
+                room::<Column>(SWEEP, columns.unwrap_or(0))?;
                 let found = through(self, plant, blocks, span, job);
-                task.advance(found.len() as u64);
+                task.advance(found.iter().flatten().count() as u64);
                 Ok(found)
             };
-            let found: Result<Vec<_>, Error> = group.par_chunks(BLOCKS).map(work).collect();
-            let members = group.iter().copied().flatten();
+            let tasks = TASKS * rayon::current_num_threads();
+            let share = group.len().div_ceil(tasks).clamp(1, BLOCKS);
+            let found: Result<Vec<_>, Error> = group.par_chunks(share).map(work).collect();
+            let members = group.iter().flat_map(|(_, sets)| sets.iter());
             let found = found?.into_iter().flatten();
-            members
-                .zip(found)
-                .for_each(|((_, set), found)| keep(*set, found));
+            for (set, found) in members.zip(found) {
+                match found {
+                    Some(found) => keep(*set, found),
+                    None => push(SWEEP, &mut left, *set)?,
+                }
+            }
         }
         for group in left.chunks(at_once) {
             let work = |set: &usize| {
@@ -77,7 +85,8 @@ impl Sets<'_> {
     }
 }
 
-/// Metrics of every response from its start to `span` seconds after it.
+/// Measure every response from its start to `span` seconds after it; `keep` receives the metrics of
+/// each set, in any order.
 ///
 /// `steady` holds the steady state of each set, or one for all, NaN where its last output is to
 /// count as that; `slowest` the slowest time constant of its plant and controller.
@@ -87,8 +96,8 @@ pub fn metrics(
     span: f64,
     criteria: &Criteria,
     task: &Task,
-) -> Result<Vec<(Metrics, Outcome)>, Error> {
-    let mut found = filled(SWEEP, (Metrics::UNKNOWN, Outcome::Refused), sets.len())?;
+    mut keep: impl FnMut(usize, &Metrics, Outcome),
+) -> Result<(), Error> {
     let job = MetricsJob {
         steady,
         slowest,
@@ -96,20 +105,15 @@ pub fn metrics(
         criteria: *criteria,
     };
     sets.each(
-        (span, AT_ONCE),
+        (span, AT_ONCE * rayon::current_num_threads()),
         task,
         &job,
         |set| {
             let numbers = (of(steady, set), of(slowest, set));
             each::metrics(sets, set, numbers, span, criteria, task)
         },
-        |set, result| {
-            if let Some(place) = found.get_mut(set) {
-                *place = result;
-            }
-        },
-    )?;
-    Ok(found)
+        |set, (metrics, outcome)| keep(set, &metrics, outcome),
+    )
 }
 
 /// Outputs of every response at `times` after its start (increasing, ≥ 0, s), one row for each set.
@@ -124,7 +128,10 @@ pub fn responses(
     let mut outcomes = filled(SWEEP, Outcome::Refused, sets.len())?;
     let span = times.last().copied().unwrap_or(0.0);
     sets.each(
-        (span, (VALUES_AT_ONCE / length.max(1)).clamp(1, AT_ONCE)),
+        (
+            span,
+            (VALUES_AT_ONCE / length.max(1)).clamp(1, AT_ONCE * rayon::current_num_threads()),
+        ),
         task,
         &ResponsesJob { times },
         |set| each::response(sets, set, times, task),

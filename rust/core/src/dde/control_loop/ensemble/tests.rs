@@ -96,6 +96,26 @@ fn columns(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// Metrics and outcomes of all sets.
+fn all_metrics(
+    sets: &Sets<'_>,
+    numbers: (&[f64], &[f64]),
+    span: f64,
+) -> Result<Vec<(Metrics, Outcome)>, crate::Error> {
+    let mut found = vec![(Metrics::UNKNOWN, Outcome::Refused); sets.len()];
+    metrics(
+        sets,
+        numbers,
+        span,
+        &CRITERIA,
+        &Task::new(),
+        |set, metrics, outcome| {
+            found[set] = (*metrics, outcome);
+        },
+    )?;
+    Ok(found)
+}
+
 /// Metrics of a set by the code for single loops.
 fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Metrics {
     let numbers = (f64::NAN, 0.0);
@@ -139,6 +159,7 @@ fn agree(found: Metrics, truth: Metrics, other: Metrics) -> bool {
     })
 }
 
+/// Sets of one structure, sampled or continuous, with a limit.
 fn loops() -> impl Strategy<Value = (Vec<Vec<f64>>, bool, f64)> {
     let numbers = (
         0.3..2.0,
@@ -149,10 +170,16 @@ fn loops() -> impl Strategy<Value = (Vec<Vec<f64>>, bool, f64)> {
         any::<bool>(),
     );
     (
-        (0..6_usize, 0..3_usize, any::<bool>(), 0.5..12.0_f64),
+        (
+            0..6_usize,
+            0..3_usize,
+            any::<bool>(),
+            any::<bool>(),
+            0.5..12.0_f64,
+        ),
         prop::collection::vec(numbers, 1..20),
     )
-        .prop_map(|((kind, law, is_ahead, span), sets)| {
+        .prop_map(|((kind, law, is_ahead, is_continuous, span), sets)| {
             let rows = sets
                 .into_iter()
                 .map(|(kp, lag, delay, sample_time, bound, is_whole)| {
@@ -160,6 +187,7 @@ fn loops() -> impl Strategy<Value = (Vec<Vec<f64>>, bool, f64)> {
                     let controller = controller(law, kp, 0.4);
                     let whole = f64::floor(delay / sample_time) * sample_time;
                     let delay = if is_whole { whole } else { delay };
+                    let sample_time = if is_continuous { 0.0 } else { sample_time };
                     row(&plant, &controller, delay, sample_time, bound)
                 })
                 .collect();
@@ -185,7 +213,7 @@ fn unlike(rows: &[Vec<f64>], is_ahead: bool, span: f64) -> Option<String> {
         (Err(error), _) | (_, Err(error)) => return Some(error.to_string()),
     };
     let numbers: (&[f64], &[f64]) = (&[f64::NAN], &[0.0]);
-    let found = match metrics(&sets, numbers, span, &CRITERIA, &Task::new()) {
+    let found = match all_metrics(&sets, numbers, span) {
         Ok(found) => found,
         Err(error) => return Some(error.to_string()),
     };
@@ -263,11 +291,10 @@ proptest! {
                 continue;
             };
             // Everything that is quiet counts as slow, so that the poles decide.
-            let task = Task::new();
             let slow = [f64::INFINITY];
             let numbers: (&[f64], &[f64]) = (&[f64::NAN], &slow);
             let span = (slowest * 3.0 * share + 1.0).clamp(1.0, span);
-            let Ok(found) = metrics(&sets, numbers, span, &CRITERIA, &task) else {
+            let Ok(found) = all_metrics(&sets, numbers, span) else {
                 continue;
             };
             let (metrics, outcome) = found[0];
@@ -300,8 +327,7 @@ fn a_set_is_refused_or_diverges_alone() {
     let columns = columns(&rows);
     let entries: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
     let sets = Sets::new(1, 3, &entries, 1.0, false);
-    let found =
-        sets.and_then(|sets| metrics(&sets, (&[1.0], &[0.0]), 100.0, &CRITERIA, &Task::new()));
+    let found = sets.and_then(|sets| all_metrics(&sets, (&[1.0], &[0.0]), 100.0));
     let outcomes: Vec<Outcome> = found.into_iter().flatten().map(|(_, o)| o).collect();
     assert_eq!(outcomes, [Outcome::Ok, Outcome::Refused, Outcome::Diverged]);
 }

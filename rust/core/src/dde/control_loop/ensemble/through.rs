@@ -4,35 +4,32 @@ use pulp::WithSimd;
 
 use crate::simd::{Instructions, Outlined, Real, Simd, outlined};
 
-use super::block::Block;
+use super::block::{Block, Members};
+use super::delayed::{Delayed, Steps};
 use super::loops::{Loops, Plants};
 use super::sets::Sets;
-use super::shape::Shape;
 use super::trace::Trace;
 use super::walk::{Run, Walk};
-
-/// A set in a block: its shape and its index.
-pub(super) type Member = (Shape, usize);
 
 /// What is done with the loops of two vectors.
 pub(super) trait Job: Sync {
     type Found: Send;
 
-    /// Append the results of the lanes of `members`.
+    /// Append the results of the lanes of `members`, none for those that have to run alone.
     fn found<S: Simd, const P: usize>(
         &self,
         plants: &Plants<S, P>,
         run: &mut dyn Run<S>,
-        members: &[Member],
+        members: &[usize],
         trace: &mut Trace<S>,
-        found: &mut Vec<Self::Found>,
+        found: &mut Vec<Option<Self::Found>>,
     );
 }
 
 struct Through<'a, J> {
     sets: &'a Sets<'a>,
     plant: usize,
-    blocks: &'a [&'a [Member]],
+    blocks: &'a [Members<'a>],
     span: f64,
     job: &'a J,
 }
@@ -42,10 +39,10 @@ struct Through<'a, J> {
 pub(super) fn through<J: Job>(
     sets: &Sets<'_>,
     plant: usize,
-    blocks: &[&[Member]],
+    blocks: &[Members<'_>],
     span: f64,
     job: &J,
-) -> Vec<J::Found> {
+) -> Vec<Option<J::Found>> {
     Instructions::chosen().run(Through {
         sets,
         plant,
@@ -56,15 +53,15 @@ pub(super) fn through<J: Job>(
 }
 
 impl<J: Job> WithSimd for Through<'_, J> {
-    type Output = Vec<J::Found>;
+    type Output = Vec<Option<J::Found>>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let zero = Real::splat(simd, 0.0);
         let mut trace = Trace::new(zero);
-        let mut found = Vec::with_capacity(self.blocks.iter().map(|block| block.len()).sum());
-        for members in self.blocks {
-            let Some(block) = Block::new(self.sets, members) else {
+        let mut found = Vec::with_capacity(self.blocks.iter().map(|(_, sets)| sets.len()).sum());
+        for &(shape, members) in self.blocks {
+            let Some(block) = Block::new(self.sets, (shape, members)) else {
                 continue;
             };
             for (pair, members) in members.chunks(2 * S::F64_LANES).enumerate() {
@@ -76,6 +73,15 @@ impl<J: Job> WithSimd for Through<'_, J> {
                     span: self.span,
                     job: self.job,
                 };
+                if block.shape.is_continuous {
+                    match self.sets.states() {
+                        1 => lanes.step::<1>(&mut trace, &mut found),
+                        2 => lanes.step::<2>(&mut trace, &mut found),
+                        3 => lanes.step::<3>(&mut trace, &mut found),
+                        _ => lanes.step::<4>(&mut trace, &mut found),
+                    }
+                    continue;
+                }
                 match (self.sets.states(), self.plant) {
                     (1, _) => lanes.run::<1, 1>(&mut trace, &mut found),
                     (2, 1) => lanes.run::<2, 1>(&mut trace, &mut found),
@@ -99,13 +105,18 @@ struct Pair<'a, S, J> {
     simd: S,
     block: &'a Block,
     pair: usize,
-    members: &'a [Member],
+    members: &'a [usize],
     span: f64,
     job: &'a J,
 }
 
 impl<S: Simd, J: Job> Pair<'_, S, J> {
-    fn run<const N: usize, const P: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
+    /// Sampled loops.
+    fn run<const N: usize, const P: usize>(
+        &self,
+        trace: &mut Trace<S>,
+        found: &mut Vec<Option<J::Found>>,
+    ) {
         let made: Made<'_, S, N, P> = Made {
             simd: self.simd,
             block: self.block,
@@ -113,11 +124,26 @@ impl<S: Simd, J: Job> Pair<'_, S, J> {
             span: self.span,
         };
         let loops = outlined(self.simd, made);
-        let mut walk = Walk::new(&loops);
+        self.process(&loops.plants, &mut Walk::new(&loops), trace, found);
+    }
+
+    /// Continuous loops.
+    fn step<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<Option<J::Found>>) {
+        let loops: Delayed<S, N> = Delayed::new(self.simd, self.block, self.pair, self.span);
+        self.process(&loops.plants, &mut Steps::new(&loops), trace, found);
+    }
+
+    fn process<const P: usize>(
+        &self,
+        plants: &Plants<S, P>,
+        run: &mut dyn Run<S>,
+        trace: &mut Trace<S>,
+        found: &mut Vec<Option<J::Found>>,
+    ) {
         let job = Done {
             job: self.job,
-            plants: &loops.plants,
-            run: &mut walk,
+            plants,
+            run,
             members: self.members,
             trace,
             found,
@@ -148,9 +174,9 @@ struct Done<'a, S: Simd, J: Job, const P: usize> {
     job: &'a J,
     plants: &'a Plants<S, P>,
     run: &'a mut dyn Run<S>,
-    members: &'a [Member],
+    members: &'a [usize],
     trace: &'a mut Trace<S>,
-    found: &'a mut Vec<J::Found>,
+    found: &'a mut Vec<Option<J::Found>>,
 }
 
 impl<S: Simd, J: Job, const P: usize> Outlined for Done<'_, S, J, P> {

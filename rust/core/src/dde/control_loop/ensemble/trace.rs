@@ -4,10 +4,19 @@
 use crate::simd::{Lanes, Mask, Real, Simd, flat, flat_mut};
 
 /// Samples in a chunk, whose extremes are known without reading its outputs.
-pub(super) const CHUNK: usize = 8;
+pub(super) const CHUNK: usize = 4;
 
 /// Most samples in a trace: enough for most runs, and few enough for the cache of a core.
 pub(super) const SAMPLES: usize = 256;
+
+/// Parts in a trace of continuous loops, if a chunk has no more: enough for most runs, and few
+/// enough for the cache of a core.
+const PARTS: usize = 128;
+
+/// Delays in a trace of continuous loops, each of which has so many parts: whole chunks.
+pub(super) fn delays(parts: usize) -> usize {
+    (PARTS / parts).next_multiple_of(CHUNK).max(CHUNK)
+}
 
 /// Greatest and least output at the corners of a chunk and at the corner before it.
 #[derive(Clone, Copy)]
@@ -34,10 +43,13 @@ pub(super) struct Trace<S: Simd> {
     pub(super) outputs: Vec<Lanes<S>>,
     /// States of the plant at samples, one after the other, if the output is curved.
     pub(super) states: Vec<Real<S>>,
-    /// How far the output may exceed its corners, by samples.
+    /// How far the output may exceed its corners, by samples; by parts of continuous loops.
     pub(super) bulges: Vec<Lanes<S>>,
-    /// Commands by sample, from the first one that matters.
+    /// Commands by sample, from the first one that matters; of continuous loops, the polynomials of
+    /// the command on the parts of the latest delay.
     pub(super) commands: Vec<Real<S>>,
+    /// Polynomials of the output by parts, of continuous loops.
+    pub(super) pieces: Vec<Lanes<S>>,
     pub(super) chunks: Vec<Summary<S>>,
     /// Complete corners of each loop.
     pub(super) count: Real<S>,
@@ -47,7 +59,7 @@ pub(super) struct Trace<S: Simd> {
 
 impl<S: Simd> Trace<S> {
     /// Lanes of two vectors.
-    const WIDTH: usize = 2 * S::F64_LANES;
+    pub(super) const WIDTH: usize = 2 * S::F64_LANES;
 
     pub(super) fn new(zero: Real<S>) -> Self {
         Self {
@@ -59,10 +71,20 @@ impl<S: Simd> Trace<S> {
             states: Vec::new(),
             bulges: Vec::new(),
             commands: Vec::new(),
+            pieces: Vec::new(),
             chunks: Vec::new(),
             count: zero,
             is_cut: zero.lt(0.0),
         }
+    }
+
+    /// Forget what the trace holds, to begin with sample number `first` after an output.
+    #[inline(always)]
+    pub(super) fn restart(&mut self, first: usize, begin: Real<S>) {
+        self.chunks.clear();
+        (self.first, self.samples, self.begin) = (first, 0, begin);
+        self.count = begin.constant(0.0);
+        self.is_cut = self.count.lt(0.0);
     }
 
     /// Parts of the run of a loop in the trace.
@@ -102,12 +124,19 @@ impl<S: Simd> Trace<S> {
         output.copied().unwrap_or(f64::NAN)
     }
 
-    /// By how much an output of a sample may exceed its corners.
+    /// By how much an output of sample (or part) number `place` may exceed its corners.
     #[inline]
-    pub(super) fn bulge(&self, lane: usize, sample: usize) -> f64 {
+    pub(super) fn bulge(&self, lane: usize, place: usize) -> f64 {
         let bulges = flat::<S>(&self.bulges);
-        let bulge = bulges.get(sample * Self::WIDTH + lane);
+        let bulge = bulges.get(place * Self::WIDTH + lane);
         bulge.copied().unwrap_or(0.0)
+    }
+
+    /// The polynomial of a part that has so many terms.
+    #[inline]
+    pub(super) fn polynomial(&self, part: usize, terms: usize) -> &[Lanes<S>] {
+        let terms = self.pieces.get(part * terms..(part + 1) * terms);
+        terms.unwrap_or_default()
     }
 }
 

@@ -9,10 +9,10 @@
 )]
 
 use crate::dde::limits::slack;
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Mask, Outlined, Real, Simd, flat, outlined};
 
 use super::loops::Plants;
-use super::piece::{LONG, Piece, SHORT};
+use super::piece::{LONG, Piece};
 use super::trace::{CHUNK, Trace, of};
 use super::transition::row;
 
@@ -79,11 +79,13 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         {
             return 0.0;
         }
-        self.trace.bulge(lane, sample)
+        let is_continuous = self.loops.is_continuous;
+        self.trace
+            .bulge(lane, if is_continuous { part } else { sample })
     }
 
-    /// The output on one part of each loop.
-    pub(super) fn piece(&self, parts: &[usize]) -> Piece<S> {
+    /// The output on one part of each loop, zero where none is asked for.
+    pub(super) fn piece(&self, parts: &[Option<usize>]) -> Piece<S> {
         outlined(self.loops.d.simd(), PieceOf { view: self, parts })
     }
 
@@ -128,7 +130,7 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         let zero = self.loops.d.constant(0.0);
         let is_cut = self.trace.is_cut;
         let (mut first, mut last, mut into) = (zero, zero, zero);
-        let mut parts = vec![0; zero.numbers().len()];
+        let mut parts = vec![None; zero.numbers().len()];
         let marks = is_cut.select(1.0, zero);
         for (lane, place) in parts.iter_mut().enumerate() {
             if of(&marks, lane) == 0.0 {
@@ -137,7 +139,7 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
             let part = of(&self.trace.count, lane) as usize;
             let length = self.length(lane, part);
             let share = (of(&self.loops.end, lane) - self.begin(lane, part)) / length;
-            *place = part;
+            *place = Some(part);
             first.numbers_mut()[lane] = self.trace.output(lane, part);
             last.numbers_mut()[lane] = self.trace.output(lane, part + 1);
             into.numbers_mut()[lane] = share.clamp(0.0, 1.0);
@@ -154,7 +156,34 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
 /// See [`View::piece`].
 struct PieceOf<'a, S: Simd, const P: usize> {
     view: &'a View<'a, S, P>,
-    parts: &'a [usize],
+    parts: &'a [Option<usize>],
+}
+
+impl<S: Simd, const P: usize> PieceOf<'_, S, P> {
+    /// The polynomials that continuous loops leave in their trace.
+    #[inline(always)]
+    fn stored(&self, zero: Real<S>) -> Piece<S> {
+        let mut piece = Piece {
+            terms: [zero; LONG + 1],
+            degree: self.view.loops.degree,
+        };
+        for (lane, &part) in self.parts.iter().enumerate() {
+            let Some(part) = part else {
+                continue;
+            };
+            let stored = self.view.trace.polynomial(part, piece.degree + 1);
+            let numbers = flat::<S>(stored)
+                .iter()
+                .skip(lane)
+                .step_by(Trace::<S>::WIDTH);
+            for (term, &number) in piece.terms.iter_mut().zip(numbers) {
+                if let Some(place) = term.numbers_mut().get_mut(lane) {
+                    *place = number;
+                }
+            }
+        }
+        piece
+    }
 }
 
 impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
@@ -164,8 +193,14 @@ impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
     fn run(self) -> Piece<S> {
         let (view, loops) = (self.view, self.view.loops);
         let zero = loops.d.constant(0.0);
+        if loops.is_continuous {
+            return self.stored(zero);
+        }
         let (mut x, mut before, mut after, mut numbers) = ([zero; P], zero, zero, zero);
         for (lane, &part) in self.parts.iter().enumerate() {
+            let Some(part) = part else {
+                continue;
+            };
             let (sample, number) = view.split(part);
             let put = |into: &mut Real<S>, number: f64| {
                 if let Some(place) = into.numbers_mut().get_mut(lane) {
@@ -202,7 +237,7 @@ impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
         }
         let mut piece = Piece {
             terms: [zero; LONG + 1],
-            degree: if loops.is_long { LONG } else { SHORT },
+            degree: loops.degree,
         };
         piece.terms[0] = row(&loops.c, &x, loops.d * w);
         let mut v = x;

@@ -27,6 +27,9 @@ pub(super) trait Run<S: Simd> {
     /// The loops whose response exceeds all limits before its end.
     fn lost(&self) -> Mask<S>;
 
+    /// The loops that this method cannot simulate, as it turned out.
+    fn unfit(&self) -> Mask<S>;
+
     /// Are all poles of the loops without their limits within `radius` of zero?
     fn decay(&self, radius: Real<S>) -> Decay<S>;
 }
@@ -69,15 +72,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
     /// Are the runs of all loops over?
     #[inline(always)]
     fn ends(&self) -> bool {
-        let now = self.time(self.number);
-        let plants = &self.loops.plants;
-        !if self.is_closed {
-            // Rounding errors do not part the last sample from the end.
-            let rounding = (plants.end + plants.sample_time) * (32.0 * f64::EPSILON);
-            now.le(plants.end + rounding).any()
-        } else {
-            now.lt(self.loops.plants.end).any()
-        }
+        self.loops.plants.are_over(self.number, self.is_closed)
     }
 
     /// See [`Run::advance`].
@@ -98,10 +93,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             longer(&mut trace.states, SAMPLES * P, zero);
             longer(&mut trace.bulges, SAMPLES, zero.lanes());
         }
-        trace.chunks.clear();
-        (trace.first, trace.samples, trace.begin) = (self.number, 0, self.output);
-        trace.count = zero;
-        trace.is_cut = zero.lt(0.0);
+        trace.restart(self.number, self.output);
         while trace.samples < SAMPLES && !self.ends() {
             let is_whole = self.time(self.number + CHUNK).le(loops.end);
             if (!is_whole).any() {
@@ -131,7 +123,16 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         };
         let is_late = loops.parts.first().is_some_and(|part| part.is_after);
         let (mut x, mut output, mut number) = (self.x, self.output, self.number);
-        let (mut lost, lowest) = (self.lost, -loops.limit);
+        let mut lost = self.lost;
+        // Copies of few numbers stay in registers while the trace is written; more are read faster
+        // where they are.
+        let copies = (feedback.k, feedback.step);
+        let (k, step) = if N == 1 {
+            (&copies.0, &copies.1)
+        } else {
+            (&feedback.k, &feedback.step)
+        };
+        let (limit, lowest) = (loops.limit, -loops.limit);
         let first_sample = trace.samples;
         for sample in first_sample..first_sample + CHUNK {
             let now = loops.sample_time * number as f64;
@@ -139,11 +140,11 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 break;
             };
             let before = commands.first().copied().unwrap_or(loops.zero);
-            let u = row(&feedback.k, &x, feedback.l.mul_add(before, loops.command));
+            let u = row(k, &x, feedback.l.mul_add(before, loops.command));
             if ENDS {
                 lost = lost | (now.lt(loops.end) & !is_sound(&x, u));
             }
-            let w = u.min(loops.limit).max(lowest);
+            let w = u.min(limit).max(lowest);
             if let Some(place) = commands.last_mut() {
                 *place = w;
             }
@@ -198,7 +199,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                     summary.least = summary.least.min(output);
                 }
             }
-            x = feedback.step.apply(&x, before, after);
+            x = step.apply(&x, before, after);
             output = x[0];
             if !loops.is_first {
                 output = row(&loops.c, &first(&x), loops.zero);
@@ -235,7 +236,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
 
 /// Are all states, and `u`, within all limits?
 #[inline(always)]
-fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
+pub(super) fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
     let mut sound = u.abs().le(DIVERGED);
     for x in x {
         sound = sound & x.abs().le(DIVERGED);
@@ -244,17 +245,23 @@ fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
 }
 
 /// Corners of runs that end.
-struct Ends<S: Simd> {
-    count: Real<S>,
-    is_cut: Mask<S>,
-    inside: Real<S>,
-    run_end: Real<S>,
+pub(super) struct Ends<S: Simd> {
+    pub(super) count: Real<S>,
+    pub(super) is_cut: Mask<S>,
+    pub(super) inside: Real<S>,
+    pub(super) run_end: Real<S>,
 }
 
 impl<S: Simd> Ends<S> {
     /// The output at the end of a part between two times.
     #[inline(always)]
-    fn corner(&mut self, summary: &mut Summary<S>, output: Real<S>, begin: Real<S>, end: Real<S>) {
+    pub(super) fn corner(
+        &mut self,
+        summary: &mut Summary<S>,
+        output: Real<S>,
+        begin: Real<S>,
+        end: Real<S>,
+    ) {
         let running = begin.lt(self.run_end);
         let inside = running & end.le(self.run_end);
         self.count = inside.select(self.count + 1.0, self.count);
@@ -297,6 +304,10 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
         self.lost
     }
 
+    fn unfit(&self) -> Mask<S> {
+        self.loops.plants.no_lane
+    }
+
     fn decay(&self, radius: Real<S>) -> Decay<S> {
         let loops = self.loops;
         outlined(radius.simd(), Within { loops, radius })
@@ -319,7 +330,7 @@ impl<S: Simd, const N: usize, const P: usize> Outlined for Advance<'_, '_, S, N,
 }
 
 /// Bring `numbers` to at least `length`.
-fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
+pub(super) fn longer<T: Clone>(numbers: &mut Vec<T>, length: usize, zero: T) {
     if numbers.len() < length {
         numbers.resize(length, zero);
     }

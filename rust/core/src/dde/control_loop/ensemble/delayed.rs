@@ -1,0 +1,304 @@
+//! Continuous loops of two vectors, delay by delay, by the method of steps.
+//!
+//! Every delay is cut into the same equal parts. The command that reaches the plant on a part is
+//! that of the same part of the delay before, so that its polynomial needs no shift: with the local
+//! time σ ∈ [0, 1], x_{j+1} = h (A x_j + B w_j + E r_j)/(j + 1) and u_j = K x_j + L w_j + M r_j,
+//! where only r₀ is not zero. Parts are short enough for terms after the last one to be below
+//! rounding (`shape`). A loop whose command may exceed its limit is left to the code for single
+//! loops, since every such crossing cuts the parts anew.
+
+#![expect(
+    clippy::needless_range_loop,
+    reason = "indices as in the formulas; closures would not be compiled for the vectors"
+)]
+
+use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+
+use super::block::{Block, Number};
+use super::decay::Decay;
+use super::loops::{Part, Plants};
+use super::piece::LONG;
+use super::trace::{CHUNK, Summary, Trace, delays};
+use super::transition::{Map, row};
+use super::walk::{Ends, Run, is_sound, longer};
+
+/// Upper bounds on σ − σ^j for j from 2 on: σ^j c stays within c times this of its chord.
+const CHORDS: [f64; LONG - 1] = [
+    0.25, 0.385, 0.4725, 0.535, 0.5824, 0.6198, 0.6502, 0.6755, 0.6969, 0.7153, 0.7314, 0.7455,
+    0.758, 0.7692, 0.7793, 0.7885, 0.7968, 0.8045, 0.8115,
+];
+
+/// Loops in lanes. A sample is one delay.
+pub(super) struct Delayed<S: Simd, const N: usize> {
+    pub(super) plants: Plants<S, N>,
+    k: [Real<S>; N],
+    l: Real<S>,
+    /// Length of a part.
+    h: Real<S>,
+}
+
+impl<S: Simd, const N: usize> Delayed<S, N> {
+    /// The loops of pair number `pair` of vectors, run for `span` seconds of their output.
+    pub(super) fn new(simd: S, block: &Block, pair: usize, span: f64) -> Self {
+        let made = Made {
+            simd,
+            block,
+            pair,
+            span,
+        };
+        outlined(simd, made)
+    }
+}
+
+/// See [`Delayed::new`].
+struct Made<'a, S, const N: usize> {
+    simd: S,
+    block: &'a Block,
+    pair: usize,
+    span: f64,
+}
+
+impl<S: Simd, const N: usize> Outlined for Made<'_, S, N> {
+    type Output = Delayed<S, N>;
+
+    #[inline(always)]
+    fn run(self) -> Delayed<S, N> {
+        let (simd, block, pair) = (self.simd, self.block, self.pair);
+        let delay = block.number(simd, Number::Delay, pair);
+        let mut plants = Plants::new::<N>(simd, block, pair, (delay, self.span));
+        let parts = block.shape.late;
+        let h = delay / f64::from(parts);
+        for number in 0..parts {
+            plants.parts.push(Part {
+                start: Map::nothing(plants.zero),
+                offset: h * f64::from(number),
+                length: h,
+                is_after: true,
+                is_jump: false,
+            });
+        }
+        Delayed {
+            plants,
+            k: block.column(simd, N * N + 2 * N, pair),
+            l: block.number(simd, Number::L, pair),
+            h,
+        }
+    }
+}
+
+/// A run from rest.
+pub(super) struct Steps<'a, S: Simd, const N: usize> {
+    loops: &'a Delayed<S, N>,
+    x: [Real<S>; N],
+    output: Real<S>,
+    /// The output at the last corner inside of the run.
+    inside: Real<S>,
+    /// Number of the next sample.
+    number: usize,
+    /// Does the run include a sample at its end?
+    is_closed: bool,
+    lost: Mask<S>,
+    /// The loops whose command may have exceeded its limit.
+    limited: Mask<S>,
+}
+
+impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
+    pub(super) fn new(loops: &'a Delayed<S, N>) -> Self {
+        let zero = loops.plants.zero;
+        Self {
+            loops,
+            x: [zero; N],
+            output: zero,
+            inside: zero,
+            number: 0,
+            is_closed: false,
+            lost: loops.plants.no_lane,
+            limited: loops.plants.no_lane,
+        }
+    }
+
+    /// See [`Run::advance`].
+    #[inline(always)]
+    fn go_on(&mut self, trace: &mut Trace<S>) -> bool {
+        if self.is_over() {
+            return false;
+        }
+        trace.restart(self.number, self.output);
+        let most = delays(trace.per_sample);
+        while trace.samples < most && !self.is_over() {
+            self.chunk(trace);
+        }
+        true
+    }
+
+    /// Advance by [`CHUNK`] samples.
+    #[inline(always)]
+    fn chunk(&mut self, trace: &mut Trace<S>) {
+        let loops = &self.loops.plants;
+        let zero = loops.zero;
+        let (terms, per_sample) = (loops.degree + 1, trace.per_sample);
+        let mut part = trace.samples * per_sample;
+        let after = part + CHUNK * per_sample;
+        longer(&mut trace.outputs, after, zero.lanes());
+        longer(&mut trace.bulges, after, zero.lanes());
+        longer(&mut trace.pieces, after * terms, zero.lanes());
+        let mut summary = Summary {
+            most: self.inside,
+            least: self.inside,
+            bulge: zero,
+        };
+        let mut ends = Ends {
+            count: trace.count,
+            is_cut: trace.is_cut,
+            inside: self.inside,
+            run_end: loops.end,
+        };
+        for _ in 0..CHUNK {
+            let now = loops.sample_time * self.number as f64;
+            self.number += 1;
+            let mut begin = now;
+            for number in 1..=per_sample {
+                let (bulge, command) = if loops.is_limited {
+                    self.element::<true>(trace, part, number - 1, terms)
+                } else {
+                    self.element::<false>(trace, part, number - 1, terms)
+                };
+                self.limited = self.limited | (begin.lt(loops.end) & command.gt(loops.limit));
+                summary.bulge = summary.bulge.max(bulge);
+                let end = if let Some(next) = loops.parts.get(number) {
+                    now + next.offset
+                } else {
+                    loops.sample_time * self.number as f64
+                };
+                self.lost = self.lost | (begin.lt(loops.end) & !is_sound(&self.x, zero));
+                self.output = row(&loops.c, &self.x, zero);
+                if let (Some(output), Some(place)) =
+                    (trace.outputs.get_mut(part), trace.bulges.get_mut(part))
+                {
+                    (*output, *place) = (self.output.lanes(), bulge.lanes());
+                }
+                ends.corner(&mut summary, self.output, begin, end);
+                begin = end;
+                part += 1;
+            }
+        }
+        (trace.count, trace.is_cut) = (ends.count, ends.is_cut);
+        self.inside = ends.inside;
+        trace.samples += CHUNK;
+        trace.chunks.push(summary);
+    }
+
+    /// Expand one part, store its polynomial and go to its end. Returns by how much the output may
+    /// exceed its chord and, if `IS_LIMITED`, a bound on the modulus of the command.
+    #[inline(always)]
+    fn element<const IS_LIMITED: bool>(
+        &mut self,
+        trace: &mut Trace<S>,
+        part: usize,
+        number: usize,
+        terms: usize,
+    ) -> (Real<S>, Real<S>) {
+        let loops = self.loops;
+        let plants = &loops.plants;
+        let zero = plants.zero;
+        let (mut x, mut change, mut bulge) = (self.x, [zero; N], zero);
+        let (mut most, mut least) = (zero, zero);
+        let commands = trace.commands.get_mut(number * terms..(number + 1) * terms);
+        let outputs = trace.pieces.get_mut(part * terms..(part + 1) * terms);
+        let (Some(commands), Some(outputs)) = (commands, outputs) else {
+            return (zero, zero);
+        };
+        for j in 0..terms {
+            if j > 0 {
+                for i in 0..N {
+                    change[i] = change[i] + x[i];
+                }
+            }
+            let w = commands[j];
+            let y = row(&plants.c, &x, zero);
+            outputs[j] = y.lanes();
+            let mut u = row(&loops.k, &x, loops.l * w);
+            let old = x;
+            let factor = loops.h * (1.0 / (j + 1) as f64);
+            for i in 0..N {
+                x[i] = row(&plants.a[i], &old, plants.b[i] * w);
+            }
+            if j == 0 {
+                u = u + plants.command;
+                for i in 0..N {
+                    x[i] = x[i] + plants.e[i];
+                }
+            } else if j > 1 {
+                bulge = y.abs().mul_add(CHORDS[j - 2], bulge);
+            }
+            for i in 0..N {
+                x[i] = x[i] * factor;
+            }
+            commands[j] = u;
+            if IS_LIMITED {
+                // σ^j is between 0 and 1, and 1 for j = 0.
+                most = most + if j == 0 { u } else { u.max(zero) };
+                least = least + if j == 0 { u } else { u.min(zero) };
+            }
+        }
+        for i in 0..N {
+            self.x[i] = self.x[i] + change[i];
+        }
+        (bulge, most.max(-least))
+    }
+}
+
+impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
+    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool) {
+        let loops = self.loops;
+        *self = Self {
+            is_closed,
+            ..Self::new(loops)
+        };
+        let plants = &loops.plants;
+        trace.per_sample = plants.parts.len();
+        trace.commands.clear();
+        let numbers = trace.per_sample * (plants.degree + 1);
+        longer(&mut trace.commands, numbers, plants.zero);
+    }
+
+    fn advance(&mut self, trace: &mut Trace<S>) -> bool {
+        outlined(self.output.simd(), Advance { steps: self, trace })
+    }
+
+    fn is_over(&self) -> bool {
+        self.loops.plants.are_over(self.number, self.is_closed) || !(!self.limited).any()
+    }
+
+    fn unfit(&self) -> Mask<S> {
+        self.limited
+    }
+
+    fn lost(&self) -> Mask<S> {
+        self.lost
+    }
+
+    /// The poles of loops with a delay are not tested here.
+    fn decay(&self, _: Real<S>) -> Decay<S> {
+        let none = self.loops.plants.no_lane;
+        Decay {
+            yes: none,
+            no: none,
+        }
+    }
+}
+
+/// See [`Run::advance`].
+struct Advance<'a, 'b, S: Simd, const N: usize> {
+    steps: &'a mut Steps<'b, S, N>,
+    trace: &'a mut Trace<S>,
+}
+
+impl<S: Simd, const N: usize> Outlined for Advance<'_, '_, S, N> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        self.steps.go_on(self.trace)
+    }
+}
