@@ -28,10 +28,6 @@ const STALE_SWEEPS: u32 = 4;
 const SLOW_SWEEPS: u32 = 16;
 /// A solution that needs at most one in this many of the coefficients is smooth.
 const FEW_TERMS: usize = 4;
-/// Nodes in addition to the terms that the last element needed: so many, and this part of the terms.
-/// With fewer, more elements are rejected than nodes are saved.
-const SPARE: usize = 6;
-const SPARE_PART: usize = 4;
 /// Factor on the length where sweeps fail or the right-hand side is not finite.
 const RETREAT: f64 = 0.3;
 /// An element that contains its own delayed values needs many sweeps: it must be at least this many
@@ -480,8 +476,7 @@ impl<'a> Run<'a> {
         let parts = (room / wanted * (1.0 - WHOLE_PARTS)).ceil().max(1.0);
         let is_equal = parts <= EQUAL && room / parts <= length * (1.0 + WHOLE_PARTS);
         self.order = if (wanted > 1.5 * room.min(length) && wanted > room) || is_equal {
-            let spare = SPARE + verdict.terms / SPARE_PART;
-            control::order_for(verdict.terms + spare, self.preferred)
+            control::next_order(verdict.terms, self.order, self.preferred)
         } else {
             self.preferred
         };
