@@ -33,6 +33,8 @@ const RETREAT: f64 = 0.3;
 /// An element that contains its own delayed values needs many sweeps: it must be at least this many
 /// delays long.
 const OVERLAP: f64 = 12.0;
+/// Terms of an element from which on one so much longer does not succeed.
+const OVERLAP_TERMS: usize = 8;
 /// Upper limit on the elements before one of that kind is tried again.
 const LONGEST_WAIT: u32 = 4096;
 /// Orders of a jump that matter in addition to one for each digit of the tolerance.
@@ -464,7 +466,8 @@ impl<'a> Run<'a> {
         }
         self.wait.0 = self.wait.0.saturating_sub(1);
         // If a delay limits the length, the factors by which it should grow accumulate.
-        self.length = if wanted > self.shortest_delay && !self.problem.neutral {
+        let overlaps = !self.problem.neutral && verdict.terms <= OVERLAP_TERMS;
+        self.length = if wanted > self.shortest_delay && overlaps {
             wanted.max(self.length.min(OVERLAP * self.shortest_delay) * factor)
         } else {
             wanted
