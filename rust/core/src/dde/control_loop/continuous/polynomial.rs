@@ -22,7 +22,6 @@ const REST: usize = LANES;
 
 /// c_0 + c_1 σ + …; c_j stands at `FIRST` + j, so that powers from 1 on fill whole blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(64))]
 pub(super) struct Polynomial {
     terms: [f64; REST + DEGREE],
     /// Pairs of powers from 1 on that are not negligible.
