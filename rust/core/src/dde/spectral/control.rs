@@ -17,9 +17,7 @@ const SHARE: f64 = 0.2;
 const LAST_BUT_ONE: f64 = 0.2;
 /// Coefficients below this share of the tolerance are negligible.
 const NEGLIGIBLE: f64 = 0.02;
-/// Largest factor on the length: more than two, so that one half of a delay is followed by a whole
-/// one in spite of rounding.
-const LONGER: f64 = 2.1;
+const LONGER: f64 = 2.0;
 const SHORTER: f64 = 0.1;
 
 /// Nodes in addition to the terms that the last element needed: so many, and this part of the terms.
