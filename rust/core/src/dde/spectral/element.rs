@@ -323,7 +323,7 @@ impl Element {
             let slopes = &self.f[1..];
             return self
                 .newton
-                .from_rest(nodes, half, slopes, &mut self.residual);
+                .step_from_rest(nodes, half, slopes, &mut self.residual);
         }
         self.residual(nodes, half);
         !self.newton.is_on() || self.newton.solve(nodes, half, &mut self.residual)

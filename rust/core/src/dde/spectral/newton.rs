@@ -268,7 +268,7 @@ impl Newton {
 
     /// The step δ of one component from a constant at which the slopes at the nodes are known; `false`
     /// where the system is singular.
-    pub(super) fn from_rest(
+    pub(super) fn step_from_rest(
         &mut self,
         nodes: &Nodes,
         half: f64,
@@ -292,7 +292,9 @@ impl Newton {
             }
             None => {
                 let work = &mut self.known;
-                single.factors.from_rest(nodes, half, slopes, (step, work));
+                single
+                    .factors
+                    .step_from_rest(nodes, half, slopes, (step, work));
             }
         }
         true

@@ -61,7 +61,7 @@ impl Scalar {
 
     /// The solution for the residual (h/2) B F of slopes F at the nodes, which is that of a constant:
     /// it is formed in the Legendre basis as well. `work` is overwritten.
-    pub(super) fn from_rest(
+    pub(super) fn step_from_rest(
         &self,
         nodes: &Nodes,
         half: f64,
@@ -87,7 +87,7 @@ impl Scalar {
         self.solve_legendre(nodes, work, step);
     }
 
-    /// The matrix of [`Scalar::from_rest`]: a row for the slope at each node.
+    /// The matrix of [`Scalar::step_from_rest`]: a row for the slope at each node.
     pub(super) fn steps(&self, nodes: &Nodes, half: f64) -> Vec<f64> {
         let order = nodes.order;
         // Row k holds coefficient k for a unit slope at each of the nodes; a row at a time, so that
@@ -190,7 +190,7 @@ mod tests {
                 residual.iter_mut().for_each(|x| *x *= 0.7);
                 scalar.solve(nodes, &mut residual, &mut Vec::new());
                 let (mut step, mut work) = (vec![0.0; order], Vec::new());
-                scalar.from_rest(nodes, 0.7, &known, (&mut step, &mut work));
+                scalar.step_from_rest(nodes, 0.7, &known, (&mut step, &mut work));
                 for (step, solved) in step.iter().zip(&residual) {
                     assert!(
                         (step - solved).abs() < 1e-12,
