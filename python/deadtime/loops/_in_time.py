@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -25,6 +26,9 @@ from deadtime.systems._response import until_settled
 
 Vector = NDArray[np.float64]
 
+#: No commands before the start.
+_NONE: tuple[float, ...] = ()
+
 
 class LoopInTime:
     """The simulations of a `ControlLoop`."""
@@ -39,7 +43,7 @@ class LoopInTime:
         initial_output: float = 0.0,
         reference_before: float | None = None,
         reference_time: ArrayLike | None = None,
-        command_history: ArrayLike = (),
+        command_history: ArrayLike = _NONE,
         sample_phase: float = 0.0,
         sensitivities: Sequence[str] = (),
     ) -> Response:
@@ -129,13 +133,14 @@ class LoopInTime:
             raise ValueError("time is empty: give at least one output time")
         run: LoopRun | float
         if (
-            type(reference) is type(initial_output) is type(sample_phase) is float
+            isinstance(reference, float)
+            and type(initial_output) is type(sample_phase) is float
             and initial_output == sample_phase == 0.0
             and reference_before is reference_time is None
-            and type(command_history) is tuple
-            and not command_history
+            and command_history is _NONE
+            and isfinite(reference)
         ):
-            run, past = finite("reference", reference), 0.0
+            run, past = reference, 0.0
         else:
             run, past = _run_of(
                 loop, times, reference, initial_output, reference_before, reference_time,

@@ -119,9 +119,12 @@ class Response(ReadOnlyArrays, Pictured):
 
     @classmethod
     def _of_run(cls, run: KeptRun) -> Response:
-        """Make a response whose parts are those of a run, taken from it as they are read."""
+        """Make a response whose parts are those of a run, most of them taken as they are read."""
         response = object.__new__(cls)
-        object.__setattr__(response, "_dense", run)
+        parts = response.__dict__
+        parts["_dense"] = run
+        # Nearly everyone reads these, and a descriptor takes longer than the array.
+        parts["outputs"] = run.found.outputs
         return response
 
     def __getstate__(self) -> dict[str, Any]:

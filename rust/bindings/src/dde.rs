@@ -192,7 +192,7 @@ impl PyLinearLoop {
     ) -> PyResult<PyLoopResponse> {
         let time = owned(&time)?;
         let (start, reference_before, (reference_time, reference)) =
-            if let Ok(height) = run.cast_exact::<PyFloat>() {
+            if let Ok(height) = run.cast::<PyFloat>() {
                 let start = Start {
                     state: vec![0.0; self.inner.equations().states()],
                     ..Start::default()

@@ -5,6 +5,7 @@
 //! [`Task::advance`] as it finishes items; both are a relaxed atomic access.
 
 use std::fmt;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -25,8 +26,9 @@ pub struct Task {
 
 /// A function to call regularly, on the computing thread, that decides whether to continue.
 struct Lookout {
-    /// None where there is no clock, as in a page: then it is asked after every so many checks.
-    start: Option<Instant>,
+    /// The time of the first look at the clock, none where there is no clock, as in a page: then it
+    /// is asked after every so many checks.
+    start: OnceLock<Option<Instant>>,
     every: Duration,
     checks: AtomicU64,
     asked: AtomicU64,
@@ -49,10 +51,16 @@ impl Lookout {
         // harm.
         let checks = self.checks.load(Ordering::Relaxed);
         self.checks.store(checks.wrapping_add(1), Ordering::Relaxed);
-        if !checks.is_multiple_of(CHECKS) {
+        // Work of a few checks never looks at the clock.
+        if checks % CHECKS != CHECKS - 1 {
             return false;
         }
-        let Some(start) = self.start else {
+        let Some(start) = self.start.get() else {
+            // Two threads may come here at once, and either time will do.
+            let _ = self.start.set(now());
+            return true;
+        };
+        let Some(start) = start else {
             return true;
         };
         let period = start.elapsed().as_nanos() / self.every.as_nanos().max(1);
@@ -83,7 +91,7 @@ impl Task {
     pub fn asking(every: Duration, go_on: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         Self {
             lookout: Some(Lookout {
-                start: now(),
+                start: OnceLock::new(),
                 every,
                 checks: AtomicU64::new(0),
                 asked: AtomicU64::new(0),

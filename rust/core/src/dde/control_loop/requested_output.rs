@@ -5,7 +5,7 @@ use super::step_metrics::StepMetrics;
 use crate::Error;
 use crate::dde::limits::RESPONSE;
 use crate::dde::scalar::Scalar;
-use crate::memory::{push, reserved};
+use crate::memory::{push, reserved, room};
 
 /// Result of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -39,17 +39,21 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         input_times: &'a [f64],
         ahead: S,
     ) -> Result<Self, Error> {
+        room::<S>(RESPONSE, output_times.len() + input_times.len())?;
         Ok(Self {
             output_times,
             input_times,
             ahead,
-            trajectory: Trajectory {
-                outputs: reserved(RESPONSE, output_times.len())?,
-                inputs: reserved(RESPONSE, input_times.len())?,
-                ..Trajectory::default()
-            },
+            trajectory: Trajectory::default(),
             metrics: None,
         })
+    }
+
+    /// Take memory for all values.
+    pub(crate) fn reserve(&mut self) -> Result<(), Error> {
+        self.trajectory.outputs = reserved(RESPONSE, self.output_times.len())?;
+        self.trajectory.inputs = reserved(RESPONSE, self.input_times.len())?;
+        Ok(())
     }
 
     /// Measure the output as well, at least up to the last of the times.
@@ -130,6 +134,17 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
             push(RESPONSE, &mut self.trajectory.input_breaks, t)?;
         }
         Ok(())
+    }
+
+    /// Store all values and breaks.
+    pub(crate) fn store(&mut self, found: Trajectory) {
+        let moved = |values: Vec<f64>| values.into_iter().map(S::from).collect();
+        self.trajectory = Trajectory {
+            outputs: moved(found.outputs),
+            inputs: moved(found.inputs),
+            output_breaks: found.output_breaks,
+            input_breaks: found.input_breaks,
+        };
     }
 
     /// Are all values stored?

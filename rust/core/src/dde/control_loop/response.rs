@@ -5,6 +5,8 @@
 //! output and command are merged into one list, in which points that differ only by rounding errors
 //! are one.
 
+use std::borrow::Cow;
+
 use crate::memory::{append, collected, copied};
 use crate::{Error, Task};
 
@@ -68,16 +70,20 @@ impl LinearLoop {
         let jumps = since(request.reference_time)?;
         let values = copied(RESPONSE, request.reference)?;
         let reference = Reference::new(request.reference_before, jumps, values)?;
-        let input_times = since(request.time)?;
+        let input_times = if first == 0.0 && self.sample_time().is_none() {
+            Cow::Borrowed(request.time)
+        } else {
+            Cow::Owned(since(request.time)?)
+        };
         let later: Vec<f64>;
         let output_times = if request.output_lead == 0.0 {
-            &input_times
+            &input_times[..]
         } else {
             later = collected(
                 RESPONSE,
                 input_times.iter().map(|t| t + request.output_lead),
             )?;
-            &later
+            &later[..]
         };
         let found = self.simulate(start, &reference, output_times, &input_times, task)?;
         Ok(Response {

@@ -11,7 +11,7 @@ pub(crate) const NEGLIGIBLE: f64 = 1e-17;
 pub(crate) const DEGREE: usize = 24;
 
 /// Share of [`NEGLIGIBLE`] below which last coefficients are dropped.
-const TRIMMED: f64 = 1e-3;
+pub(crate) const TRIMMED: f64 = 1e-3;
 
 /// Rounding errors of slopes relative to those of values.
 const SLOPE_ROUNDING: f64 = 1e4;

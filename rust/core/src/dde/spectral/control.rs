@@ -9,6 +9,7 @@
 
 use super::element::Element;
 use super::nodes::{COUPLED, LARGEST, Nodes, ORDERS};
+use super::sizes::largest;
 
 /// Share of the tolerance that an element may use.
 const SHARE: f64 = 0.2;
@@ -18,6 +19,13 @@ const LAST_BUT_ONE: f64 = 0.2;
 const NEGLIGIBLE: f64 = 0.02;
 const LONGER: f64 = 2.0;
 const SHORTER: f64 = 0.1;
+
+/// Nodes in addition to the terms that the last element needed: so many, and this part of the terms.
+/// With fewer, more elements are rejected than nodes are saved.
+const SPARE: usize = 6;
+const SPARE_PART: usize = 4;
+/// Ratio of two numbers of nodes up to which the larger one is kept.
+const ONE_LESS: f64 = 1.25;
 
 /// Factor on the length that the error estimate suggests.
 const SAFETY: f64 = 0.95;
@@ -50,15 +58,12 @@ pub(super) fn judge(element: &Element, nodes: &Nodes) -> Verdict {
     };
     for (d, c) in element.coefficients.chunks_exact(n).enumerate() {
         let scale = element.scale[d];
-        let largest = largest_of(c);
+        let size = largest(c);
         // Rounding errors of values, distributed over coefficients and multiplied by k² in the
         // slope.
-        let rounding = f64::EPSILON * largest;
+        let rounding = f64::EPSILON * size;
         let last = c[n - 1].abs().max(LAST_BUT_ONE * c[n - 2].abs());
-        let (third, fourth) = (
-            largest_of(&c[n / 2..3 * n / 4]),
-            largest_of(&c[3 * n / 4..]),
-        );
+        let (third, fourth) = (largest(&c[n / 2..3 * n / 4]), largest(&c[3 * n / 4..]));
         let sum = n as f64 * fourth * (fourth / third.max(f64::MIN_POSITIVE)).min(1.0);
         let tail = last.max(if fourth > 4.0 * rounding { sum } else { 0.0 }) - 4.0 * rounding;
         let slope: f64 = (1..n)
@@ -81,10 +86,6 @@ pub(super) fn judge(element: &Element, nodes: &Nodes) -> Verdict {
     verdict
 }
 
-fn largest_of(coefficients: &[f64]) -> f64 {
-    coefficients.iter().fold(0.0, |size, c| size.max(c.abs()))
-}
-
 /// Factor for the length after an element with this error.
 pub(super) fn factor(error: f64, order: usize) -> f64 {
     let wanted = (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
@@ -95,6 +96,14 @@ pub(super) fn factor(error: f64, order: usize) -> f64 {
 pub(super) fn order_for(wanted: usize, most: usize) -> usize {
     let found = ORDERS.iter().copied().find(|order| *order >= wanted);
     found.unwrap_or(most).min(most)
+}
+
+/// The order after an element of this order that needed so many terms.
+pub(super) fn next_order(terms: usize, order: usize, most: usize) -> usize {
+    let next = order_for(terms + SPARE + terms / SPARE_PART, most);
+    // Nodes like those of the element before need no interpolation of the past.
+    let is_near = next < order && order <= most && order as f64 <= ONE_LESS * next as f64;
+    if is_near { order } else { next }
 }
 
 /// The largest order that pays: where calls are costly, nodes are almost free.

@@ -12,6 +12,7 @@ use super::newton::Newton;
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation, Problem};
 use super::products::{Rows, multiply};
+use super::sizes::{all_finite, largest};
 use crate::{Error, Task};
 
 /// Largest remaining error of the iteration, in tolerances.
@@ -67,6 +68,8 @@ pub(super) struct Element {
     table: Vec<f64>,
     delayed: Delayed,
     pub(super) newton: Newton,
+    /// Is the guess the constant from the start?
+    is_flat: bool,
     /// Ratio of the steps and first step, as last observed with Newton's iteration.
     seen: Option<(f64, f64)>,
     pub(super) calls: u64,
@@ -146,6 +149,7 @@ impl Element {
         for initial in begin.initial {
             self.y.extend(std::iter::repeat_n(*initial, n));
         }
+        self.is_flat = true;
         let Some(piece) = begin.history.latest().filter(|_| begin.smooth) else {
             return;
         };
@@ -153,11 +157,20 @@ impl Element {
         if far > FARTHEST {
             return;
         }
+        // Where the right-hand side is linear in its one component, a step from any guess is as good,
+        // so that an extrapolation pays only if it saves a sweep.
+        if self.newton.is_exact()
+            && let &[scale] = &self.scale[..]
+            && falling(&piece.coefficients, far).1 > BELIEVED * scale
+        {
+            return;
+        }
+        self.is_flat = false;
         let places: Vec<f64> = self.t.iter().map(|t| piece.place(*t)).collect();
         chebyshev::basis(&places, piece.terms, &mut self.table);
         let rows = piece.coefficients.chunks_exact(piece.terms);
         for ((y, initial), c) in self.y.chunks_exact_mut(n).zip(begin.initial).zip(rows) {
-            let terms = falling(c, far);
+            let (terms, _) = falling(c, far);
             let all = Rows::of(n);
             multiply((&c[..terms], Rows::of(terms)), &self.table, n, (y, all));
             let shift = initial - y[0];
@@ -194,7 +207,9 @@ impl Element {
             equation.slope(at, &mut self.f, task)?;
             self.calls += 1;
             self.evaluated += n as u64;
-            if let Some(bad) = self.f.iter().position(|f| !f.is_finite()) {
+            if !all_finite(&self.f)
+                && let Some(bad) = self.f.iter().position(|f| !f.is_finite())
+            {
                 return Ok(Sweeps::NotFinite(bad % n));
             }
             let costly = equation.is_costly();
@@ -218,8 +233,7 @@ impl Element {
             if count == 1 && problem.dim() == 1 {
                 self.before.clone_from(&self.f);
             }
-            self.residual(nodes, half);
-            if self.newton.is_on() && !self.newton.solve(nodes, half, &mut self.residual) {
+            if !self.find_step(count, nodes, half) {
                 return Ok(Sweeps::Stalled);
             }
             let grown = self.step(problem, n);
@@ -303,6 +317,18 @@ impl Element {
         self.linearise_at(0, most, equation, task)
     }
 
+    /// The step of a sweep, in the place of the residual; `false` where its system is singular.
+    fn find_step(&mut self, count: u32, nodes: &Nodes, half: f64) -> bool {
+        if count == 1 && self.is_flat && self.newton.is_exact() {
+            let slopes = &self.f[1..];
+            return self
+                .newton
+                .step_from_rest(nodes, half, slopes, &mut self.residual);
+        }
+        self.residual(nodes, half);
+        !self.newton.is_on() || self.newton.solve(nodes, half, &mut self.residual)
+    }
+
     /// y_0 + (h/2) B F − Y.
     fn residual(&mut self, nodes: &Nodes, half: f64) {
         let order = nodes.order;
@@ -320,15 +346,14 @@ impl Element {
     /// Add the step, and compute the size to which it is compared and the growth of y.
     fn step(&mut self, problem: &Problem, n: usize) -> f64 {
         self.scale.clear();
-        let before = self.y.iter().fold(0.0_f64, |size, y| size.max(y.abs()));
+        let before = largest(&self.y);
         let mut after = 0.0_f64;
         let rows = self.y.chunks_exact_mut(n);
         for (d, (y, step)) in rows.zip(self.residual.chunks_exact(n - 1)).enumerate() {
-            let mut size = y[0].abs();
             for (y, step) in y[1..].iter_mut().zip(step) {
                 *y += step;
-                size = size.max(y.abs());
             }
+            let size = largest(y);
             after = after.max(size);
             let atol = problem.atol.get(d).or(problem.atol.first());
             let scale = atol.copied().unwrap_or(0.0) + problem.rtol * size;
@@ -339,17 +364,12 @@ impl Element {
 
     /// Largest entry of the step, in tolerances.
     fn size(&self, order: usize) -> f64 {
+        if !all_finite(&self.residual) {
+            return f64::INFINITY;
+        }
         let rows = self.residual.chunks_exact(order).zip(&self.scale);
         rows.fold(0.0, |worst: f64, (row, scale)| {
-            let sum = row.iter().fold(0.0, |worst: f64, step| {
-                // NaN must not be lost, as `max` would do.
-                if step.is_finite() {
-                    worst.max(step.abs())
-                } else {
-                    f64::INFINITY
-                }
-            });
-            worst.max(sum / scale)
+            worst.max(largest(row) / scale)
         })
     }
 
@@ -371,8 +391,9 @@ impl Element {
     }
 }
 
-/// Number of terms of a sum that decrease at `far`, which lies beyond its interval.
-fn falling(coefficients: &[f64], far: f64) -> usize {
+/// Number of terms of a sum that decrease at `far`, which lies beyond its interval, and the size of
+/// the last of them.
+fn falling(coefficients: &[f64], far: f64) -> (usize, f64) {
     let (mut below, mut here) = (1.0, far);
     // In even and odd functions every other term is zero, so that pairs are compared.
     let (mut best, mut last) = ((f64::INFINITY, 1), 0.0);
@@ -387,5 +408,5 @@ fn falling(coefficients: &[f64], far: f64) -> usize {
         last = term;
         (below, here) = (here, 2.0 * far * here - below);
     }
-    best.1
+    (best.1, best.0)
 }

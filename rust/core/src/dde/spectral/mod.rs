@@ -31,6 +31,7 @@ mod products;
 mod run;
 mod scalar;
 mod shifted;
+mod sizes;
 mod sparsity;
 #[cfg(test)]
 mod tests;

@@ -16,6 +16,7 @@ use super::problem::{Columns, Equation};
 use super::products::{Rows, multiply};
 use super::scalar::Scalar;
 use super::shifted::Shifted;
+use super::sizes::{largest, largest_of};
 use super::sparsity::Sparsity;
 use crate::{Error, Task};
 
@@ -23,6 +24,8 @@ use crate::{Error, Task};
 const WHOLE: usize = 100;
 /// Number of components with the same system from which on its inverse pays.
 const SHARED: usize = 14;
+/// Number of steps with the same factors from which on their matrix pays.
+const OFTEN: u32 = 8;
 /// Number of columns up to which a Jacobian costs no more than a sweep or two.
 const CHEAP: usize = 32;
 /// Number of columns up to which the first Jacobian is evaluated to find its structure.
@@ -101,6 +104,9 @@ struct Single {
     factors: Scalar,
     /// The inverse, where many components share it.
     inverse: Option<Vec<f64>>,
+    /// The matrix of steps from a constant, where there were many, and their number.
+    steps: Option<Vec<f64>>,
+    used: u32,
 }
 
 impl Newton {
@@ -241,14 +247,8 @@ impl Newton {
         if entry.1 != 1 || entry.0 > 0.0 {
             return None;
         }
-        let beside = |slope: f64| {
-            let pairs = step.iter().zip(change);
-            pairs.fold(0.0_f64, |most, (step, change)| {
-                most.max((change - slope * step).abs())
-            })
-        };
+        let beside = |slope: f64| largest_of(step, change, |step, change| change - slope * step);
         let left = beside(entry.0);
-        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         if !self.is_exact && largest(step) > VISIBLE * largest(y) {
             let products = step.iter().zip(change).map(|(step, change)| step * change);
             let slope = products.sum::<f64>() / step.iter().map(|step| step * step).sum::<f64>();
@@ -261,8 +261,47 @@ impl Newton {
         Some(left)
     }
 
-    /// Replace the residual (component, node) by the step δ; `false` where the system is singular.
-    pub(super) fn solve(&mut self, nodes: &Nodes, half: f64, residual: &mut [f64]) -> bool {
+    /// Is the right-hand side linear in its one component, as far as it was seen?
+    pub(super) fn is_exact(&self) -> bool {
+        self.is_on() && self.is_exact
+    }
+
+    /// The step δ of one component from a constant at which the slopes at the nodes are known; `false`
+    /// where the system is singular.
+    pub(super) fn step_from_rest(
+        &mut self,
+        nodes: &Nodes,
+        half: f64,
+        slopes: &[f64],
+        step: &mut [f64],
+    ) -> bool {
+        if !self.prepare(nodes, half) {
+            return false;
+        }
+        let Some(single) = self.single.first_mut() else {
+            return false;
+        };
+        single.used += 1;
+        if single.used == OFTEN {
+            single.steps = Some(single.factors.steps(nodes, half));
+        }
+        match &single.steps {
+            Some(steps) => {
+                let row = Rows::of(nodes.order);
+                multiply((slopes, row), steps, nodes.order, (step, row));
+            }
+            None => {
+                let work = &mut self.known;
+                single
+                    .factors
+                    .step_from_rest(nodes, half, slopes, (step, work));
+            }
+        }
+        true
+    }
+
+    /// Have factors for this length and order; `false` where the system is singular.
+    fn prepare(&mut self, nodes: &Nodes, half: f64) -> bool {
         let order = nodes.order;
         let fits = |key: Option<(f64, usize)>| {
             key.is_some_and(|(length, number)| {
@@ -273,9 +312,15 @@ impl Newton {
             std::mem::swap(&mut self.key, &mut self.other.0);
             std::mem::swap(&mut self.single, &mut self.other.1);
         }
-        if !fits(self.key) && !self.factorise(nodes, half) {
+        fits(self.key) || self.factorise(nodes, half)
+    }
+
+    /// Replace the residual (component, node) by the step δ; `false` where the system is singular.
+    pub(super) fn solve(&mut self, nodes: &Nodes, half: f64, residual: &mut [f64]) -> bool {
+        if !self.prepare(nodes, half) {
             return false;
         }
+        let order = nodes.order;
         if let Some(whole) = &self.whole {
             whole.solve(residual);
             return true;
@@ -323,7 +368,12 @@ impl Newton {
                     return false;
                 };
                 let inverse = (sharing > SHARED).then(|| factors.inverse(nodes));
-                self.single.push(Single { factors, inverse });
+                self.single.push(Single {
+                    factors,
+                    inverse,
+                    steps: None,
+                    used: 0,
+                });
             }
         } else if let Some(jacobian) = &self.jacobian
             && jacobian.dim() * order <= WHOLE

@@ -28,15 +28,13 @@ const STALE_SWEEPS: u32 = 4;
 const SLOW_SWEEPS: u32 = 16;
 /// A solution that needs at most one in this many of the coefficients is smooth.
 const FEW_TERMS: usize = 4;
-/// Nodes in addition to the terms that the last element needed: so many, and this part of the terms.
-/// With fewer, more elements are rejected than nodes are saved.
-const SPARE: usize = 6;
-const SPARE_PART: usize = 4;
 /// Factor on the length where sweeps fail or the right-hand side is not finite.
 const RETREAT: f64 = 0.3;
 /// An element that contains its own delayed values needs many sweeps: it must be at least this many
 /// delays long.
 const OVERLAP: f64 = 12.0;
+/// Terms of an element from which on one so much longer does not succeed.
+const OVERLAP_TERMS: usize = 8;
 /// Upper limit on the elements before one of that kind is tried again.
 const LONGEST_WAIT: u32 = 4096;
 /// Orders of a jump that matter in addition to one for each digit of the tolerance.
@@ -468,7 +466,8 @@ impl<'a> Run<'a> {
         }
         self.wait.0 = self.wait.0.saturating_sub(1);
         // If a delay limits the length, the factors by which it should grow accumulate.
-        self.length = if wanted > self.shortest_delay && !self.problem.neutral {
+        let overlaps = !self.problem.neutral && verdict.terms <= OVERLAP_TERMS;
+        self.length = if wanted > self.shortest_delay && overlaps {
             wanted.max(self.length.min(OVERLAP * self.shortest_delay) * factor)
         } else {
             wanted
@@ -480,8 +479,7 @@ impl<'a> Run<'a> {
         let parts = (room / wanted * (1.0 - WHOLE_PARTS)).ceil().max(1.0);
         let is_equal = parts <= EQUAL && room / parts <= length * (1.0 + WHOLE_PARTS);
         self.order = if (wanted > 1.5 * room.min(length) && wanted > room) || is_equal {
-            let spare = SPARE + verdict.terms / SPARE_PART;
-            control::order_for(verdict.terms + spare, self.preferred)
+            control::next_order(verdict.terms, self.order, self.preferred)
         } else {
             self.preferred
         };

@@ -9,7 +9,7 @@
 //! quadrature at the nodes, exact to degree 2N − 2.
 
 use super::nodes::Nodes;
-use super::products::{Rows, multiply};
+use super::products::{Rows, multiply, transposed};
 
 /// Smallest pivot relative to the entries of the system.
 const LEAST: f64 = 1e-10;
@@ -53,10 +53,83 @@ impl Scalar {
 
     /// Solve in place; `work` is overwritten.
     pub(super) fn solve(&self, nodes: &Nodes, values: &mut [f64], work: &mut Vec<f64>) {
+        let row = Rows::of(nodes.order);
+        work.resize(nodes.order, 0.0);
+        multiply((values, row), &nodes.to_legendre, nodes.order, (work, row));
+        self.solve_legendre(nodes, work, values);
+    }
+
+    /// The solution for the residual (h/2) B F of slopes F at the nodes, which is that of a constant:
+    /// it is formed in the Legendre basis as well. `work` is overwritten.
+    pub(super) fn step_from_rest(
+        &self,
+        nodes: &Nodes,
+        half: f64,
+        slopes: &[f64],
+        (step, work): (&mut [f64], &mut Vec<f64>),
+    ) {
         let order = nodes.order;
         let row = Rows::of(order);
         work.resize(order, 0.0);
-        multiply((values, row), &nodes.to_legendre, order, (work, row));
+        multiply((slopes, row), &nodes.to_legendre, order, (work, row));
+        // What is integrated from the degree below; for P_0, and where P_N is P_{N−1}, from its own.
+        let mut below = work[0];
+        for k in 0..order {
+            let odd = (2 * k + 1) as f64;
+            let own = work[k] / odd;
+            let above = match work.get(k + 1) {
+                Some(above) => -above / (odd + 2.0),
+                None => own,
+            };
+            work[k] = half * (below + above);
+            below = own;
+        }
+        self.solve_legendre(nodes, work, step);
+    }
+
+    /// The matrix of [`Scalar::step_from_rest`]: a row for the slope at each node.
+    pub(super) fn steps(&self, nodes: &Nodes, half: f64) -> Vec<f64> {
+        let order = nodes.order;
+        // Row k holds coefficient k for a unit slope at each of the nodes; a row at a time, so that
+        // no sum waits for another.
+        let slopes = transposed(&nodes.to_legendre, order);
+        let mut rows = vec![0.0; order * order];
+        let line = |k: usize| slopes.chunks_exact(order).nth(k);
+        for (k, row) in rows.chunks_exact_mut(order).enumerate() {
+            let odd = (2 * k + 1) as f64;
+            let (below, by) = (line(k.saturating_sub(1)), 1.0 / (odd - 2.0).max(1.0));
+            add(row, half * by, below.unwrap_or_default());
+            match line(k + 1) {
+                Some(above) => add(row, -half / (odd + 2.0), above),
+                None => add(row, half / odd, line(k).unwrap_or_default()),
+            }
+        }
+        for k in (1..order).rev() {
+            let (lower, upper) = rows.split_at_mut(k * order);
+            add(
+                &mut lower[(k - 1) * order..],
+                -self.above[k - 1],
+                &upper[..order],
+            );
+        }
+        for k in 0..order {
+            let (lower, upper) = rows.split_at_mut(k * order);
+            let row = &mut upper[..order];
+            row.iter_mut().for_each(|x| *x *= self.inverse[k]);
+            if k > 0 {
+                add(row, self.below[k], &lower[(k - 1) * order..]);
+            }
+        }
+        let all = Rows::of(order);
+        let rows = transposed(&rows, order);
+        let mut steps = vec![0.0; order * order];
+        multiply((&rows, all), &nodes.legendre, order, (&mut steps, all));
+        steps
+    }
+
+    /// Solve for coefficients in the Legendre basis, and give the values at the nodes.
+    fn solve_legendre(&self, nodes: &Nodes, work: &mut [f64], values: &mut [f64]) {
+        let row = Rows::of(nodes.order);
         let mut higher = 0.0;
         for (x, above) in work.iter_mut().zip(&self.above).rev() {
             *x -= above * higher;
@@ -67,7 +140,7 @@ impl Scalar {
             *x = *x * inverse + below * lower;
             lower = *x;
         }
-        multiply((work, row), &nodes.legendre, order, (values, row));
+        multiply((work, row), &nodes.legendre, nodes.order, (values, row));
     }
 
     /// The inverse, a row for each right-hand side; it pays where many components share it.
@@ -79,6 +152,13 @@ impl Scalar {
             self.solve(nodes, column, &mut work);
         }
         inverse
+    }
+}
+
+/// Add `factor` times another row.
+fn add(row: &mut [f64], factor: f64, other: &[f64]) {
+    for (sum, x) in row.iter_mut().zip(other) {
+        *sum += factor * x;
     }
 }
 
@@ -105,6 +185,18 @@ mod tests {
                 let mut by_inverse = vec![0.0; order];
                 multiply((&found, row), &inverse, order, (&mut by_inverse, row));
                 scalar.solve(nodes, &mut found, &mut Vec::new());
+                let mut residual = vec![0.0; order];
+                multiply((&known, row), &nodes.integrals, order, (&mut residual, row));
+                residual.iter_mut().for_each(|x| *x *= 0.7);
+                scalar.solve(nodes, &mut residual, &mut Vec::new());
+                let (mut step, mut work) = (vec![0.0; order], Vec::new());
+                scalar.step_from_rest(nodes, 0.7, &known, (&mut step, &mut work));
+                for (step, solved) in step.iter().zip(&residual) {
+                    assert!(
+                        (step - solved).abs() < 1e-12,
+                        "{order} {a}: {step} {solved}"
+                    );
+                }
                 for (found, known) in found.iter().chain(&by_inverse).zip(known.iter().cycle()) {
                     assert!((found - known).abs() < 1e-9, "{order} {a}: {found} {known}");
                 }

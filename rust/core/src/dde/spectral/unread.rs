@@ -14,6 +14,7 @@ use super::history::History;
 use super::nodes::Nodes;
 use super::problem::Problem;
 use super::products::{Rows, multiply};
+use super::sizes::{largest, largest_of};
 
 /// Largest difference in tolerances: stored pieces and nodes both have errors of a share of one.
 const UNREAD: f64 = 10.0;
@@ -22,6 +23,8 @@ const LOOSEST: f64 = 0.1;
 /// Stretches no longer than this share of the time are rounding errors of it: breaking points this
 /// close are merged.
 const SHORTEST: f64 = 1024.0 * f64::EPSILON;
+/// Part of a length by which the ends of a stretch differ from those of its piece by rounding.
+const ONE_PIECE: f64 = 1e-13;
 /// Rounding errors of values, summed by interpolation.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 
@@ -56,6 +59,16 @@ struct Stretch<'a> {
     terms: usize,
     /// Coefficients of the values or of the slopes.
     rows: &'a [f64],
+}
+
+impl Stretch<'_> {
+    /// Is it one whole piece, up to rounding errors of times?
+    fn is_one_piece(&self) -> bool {
+        let apart = (self.low - self.span.0)
+            .abs()
+            .max((self.high - self.span.1).abs());
+        apart <= ONE_PIECE * (self.high - self.low)
+    }
 }
 
 impl Reading {
@@ -138,6 +151,28 @@ impl Reading {
         None
     }
 
+    /// [`Reading::compare`] for a stretch that is one whole piece and all that the element reads: the
+    /// sum of the differences of their coefficients bounds the difference.
+    fn compare_whole(
+        &self,
+        problem: &Problem,
+        element: &Element,
+        nodes: &Nodes,
+        (at_nodes, stretch): (&[f64], &Stretch<'_>),
+    ) -> f64 {
+        let n = nodes.order + 1;
+        let pieces = stretch.rows.chunks_exact(stretch.terms);
+        let mut worst = 0.0_f64;
+        for (d, (through, own)) in self.through[0].chunks_exact(n).zip(pieces).enumerate() {
+            let shared = through.iter().zip(own).map(|(a, b)| (a - b).abs());
+            let rest = own.iter().skip(n).chain(through.iter().skip(own.len()));
+            let off = shared.sum::<f64>() + rest.map(|c| c.abs()).sum::<f64>();
+            let size = largest(&at_nodes[d * n..(d + 1) * n]);
+            worst = worst.max(off / allowed(problem, element, d, size));
+        }
+        worst
+    }
+
     /// The difference on a stretch relative to the allowed one. For slopes the allowed difference
     /// follows from that of the values, by Markov's inequality for the length of the stretch.
     fn compare(
@@ -152,6 +187,9 @@ impl Reading {
         let n = nodes.order + 1;
         let m = n.max(stretch.terms) + 1;
         let (low, high) = (stretch.low, stretch.high);
+        if slopes_of.is_none() && (low, high) == window && stretch.is_one_piece() {
+            return self.compare_whole(problem, element, nodes, (at_nodes, stretch));
+        }
         self.points.clear();
         self.places.clear();
         for i in 0..m {
@@ -166,7 +204,6 @@ impl Reading {
         self.stored.resize(m, 0.0);
         let through = &self.through[usize::from(slopes_of.is_some())];
         let pieces = stretch.rows.chunks_exact(stretch.terms);
-        let ratio = UNREAD.min((LOOSEST / problem.rtol).max(1.0));
         let mut worst = 0.0_f64;
         for (d, (through, own)) in through.chunks_exact(n).zip(pieces).enumerate() {
             let (all, found) = (Rows::of(m), &mut self.found);
@@ -178,8 +215,7 @@ impl Reading {
                 m,
                 (stored, all),
             );
-            let pairs = self.found.iter().zip(&self.stored);
-            let off = pairs.fold(0.0_f64, |off, (a, b)| off.max((a - b).abs()));
+            let off = largest_of(&self.found, &self.stored, |a, b| a - b);
             let own = largest(&self.stored);
             let row = d * n..(d + 1) * n;
             let (size, part) = match slopes_of {
@@ -192,20 +228,22 @@ impl Reading {
                     )
                 }
             };
-            let atol = problem.atol.get(d).or(problem.atol.first());
-            let local = atol.copied().unwrap_or(0.0) + problem.rtol * size;
-            let allowed = (ratio * local.max(element.scale[d])).max(ROUNDING * size);
-            worst = worst.max(off * part / allowed.max(f64::MIN_POSITIVE));
+            worst = worst.max(off * part / allowed(problem, element, d, size));
         }
         worst
     }
 }
 
+/// The allowed difference of component `d`, of this size.
+fn allowed(problem: &Problem, element: &Element, d: usize, size: f64) -> f64 {
+    let ratio = UNREAD.min((LOOSEST / problem.rtol).max(1.0));
+    let atol = problem.atol.get(d).or(problem.atol.first());
+    let local = atol.copied().unwrap_or(0.0) + problem.rtol * size;
+    let allowed = (ratio * local.max(element.scale[d])).max(ROUNDING * size);
+    allowed.max(f64::MIN_POSITIVE)
+}
+
 /// Place of a time on [−1, 1].
 fn place((start, end): (f64, f64), time: f64) -> f64 {
     ((time - start) - (end - time)) / (end - start)
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |size, value| size.max(value.abs()))
 }

@@ -177,7 +177,7 @@ fn at_start<S: Scalar>(u: &Series<S>, limit: Option<S>) -> Mode {
 
 /// The orders of breaks behind the loop: an integration raises the order by one, a direct path
 /// keeps it.
-struct Orders {
+pub(super) struct Orders {
     command_is_direct: bool,
     output_is_direct: bool,
     reference_in_command: Order,
@@ -185,7 +185,7 @@ struct Orders {
 }
 
 impl Orders {
-    fn new<S: Scalar>(plant: &LinearLoop<S>) -> Self {
+    pub(super) fn new<S: Scalar>(plant: &LinearLoop<S>) -> Self {
         let equations = plant.equations();
         let reaches_states = !equations.e.iter().all(|e| e.is_nothing());
         Self {
@@ -202,13 +202,13 @@ impl Orders {
 
     /// Order of the break of the command where w breaks with order `arriving` and the reference may
     /// jump.
-    fn of_command(&self, arriving: Order, jumps: bool) -> Order {
+    pub(super) fn of_command(&self, arriving: Order, jumps: bool) -> Order {
         let jump = jumps.then_some(self.reference_in_command);
         Self::pass(arriving, self.command_is_direct).min(jump.unwrap_or(SMOOTH))
     }
 
     /// Order of the break of the output, likewise.
-    fn of_output(&self, arriving: Order, jumps: bool) -> Order {
+    pub(super) fn of_output(&self, arriving: Order, jumps: bool) -> Order {
         let jump = jumps.then_some(self.reference_in_output);
         Self::pass(arriving, self.output_is_direct).min(jump.unwrap_or(SMOOTH))
     }

@@ -7,17 +7,21 @@
 //! is shortened until the last ones are below rounding. u is cut exactly where it crosses ±limit,
 //! and the cut pieces, shifted by Td, are added to the queue. Breaking points are therefore element
 //! ends by construction. Without a delay the loop is closed inside the element instead
-//! ([`direct`]). Guaranteed: truncation below rounding, no crossing of the limit missed, switching
+//! ([`direct`]). Without a limit, and under a reference that stays constant after the start, breaking
+//! points lie at whole delays, and elements are equal parts of one ([`aligned`]). Guaranteed: truncation below rounding, no crossing of the limit missed, switching
 //! times to rounding. Not guaranteed: speed where the delay or a lag is tiny against the time
 //! simulated (elements are no longer than either allows), or where many breaks accumulate.
 
+mod aligned;
 mod delayed;
 mod direct;
 mod effort;
 mod expansion;
 mod impulses;
 mod pieces;
+mod polynomial;
 mod run;
 mod saturation;
+mod values_at_times;
 
 pub(crate) use run::run;

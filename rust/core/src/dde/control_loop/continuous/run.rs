@@ -1,7 +1,7 @@
 //! The response, with or without a delay.
 
 use super::effort::{MOST_ELEMENTS, endless};
-use super::{delayed, direct};
+use super::{aligned, delayed, direct};
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
@@ -12,7 +12,7 @@ pub(crate) fn run<S: Scalar>(
     plant: &LinearLoop<S>,
     start: &Start<S>,
     reference: &Reference,
-    requested: RequestedOutput<'_, S>,
+    mut requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     if plant.delay().value() > 0.0 {
@@ -21,8 +21,13 @@ pub(crate) fn run<S: Scalar>(
         if requested.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
             return Err(endless());
         }
+        if aligned::run(plant, start, reference, &mut requested, task)? {
+            return Ok(requested.trajectory);
+        }
+        requested.reserve()?;
         delayed::run(plant, start, reference, requested, task)
     } else {
+        requested.reserve()?;
         direct::run(plant, start, reference, requested, task)
     }
 }

@@ -23,9 +23,10 @@ pub(crate) fn run<S: Scalar>(
     sample_time: S,
     start: &Start<S>,
     reference: &Reference,
-    requested: RequestedOutput<'_, S>,
+    mut requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
+    requested.reserve()?;
     let equations = plant.equations();
     let timing = Timing::new(plant.delay(), sample_time);
     let mut walk = Walk {

@@ -1,0 +1,490 @@
+//! The loop without a limit under a constant reference: elements that are equal parts of the delay.
+//!
+//! Breaking points then lie at whole delays alone. With elements of length h = Td/m the command that
+//! arrives during an element is the one of m elements ago in the same local coordinate, so that no
+//! polynomial is moved or stretched, and only the values at the start of an element wait for the
+//! element before. For c_j, the coefficient of σ^j,
+//!
+//!   x_{j+1} = h (A x_j + B w_j)/(j + 1),  u_j = K x_j + L w_j,  with E r and M r added for j = 0.
+//!
+//! Where the last coefficients are not negligible, elements become half as long from there on; a loop
+//! that needs more than [`MOST_PARTS`] of them is left to [`super::delayed`]. The code is
+//! compiled for each instruction set: all operations are rounded one by one, in one order, and have
+//! the same bits in each.
+
+use pulp::{Simd, WithSimd};
+
+use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
+use crate::dde::control_loop::reference::Reference;
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
+use crate::dde::control_loop::series::DEGREE;
+use crate::dde::limits::{check_growth, slack};
+use crate::dde::scalar::Scalar;
+use crate::simd::Instructions;
+use crate::{Error, Task};
+
+use super::delayed::Orders;
+use super::effort::watch;
+use super::pieces::{REPORTED, SMOOTH};
+use super::polynomial::{LANES, Polynomial};
+use super::values_at_times::ValuesAtTimes;
+
+/// Largest number of elements in a delay.
+const MOST_PARTS: usize = 128;
+
+/// The same at the start, so that they can become shorter: what is found at one time does not depend
+/// on how long the run is.
+const MOST_AT_START: usize = 64;
+
+/// Growth of the coefficients with the degree, times the length of an element, for which the last
+/// ones are negligible as a rule.
+const REACH: f64 = 1.8;
+
+/// Reported breaks of a loop that has no direct path, about.
+const BREAKS: usize = REPORTED as usize + 2;
+
+/// Store the response in `requested`, if the loop and its reference are of this kind.
+pub(super) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
+    reference: &Reference,
+    requested: &mut RequestedOutput<'_, S>,
+    task: &Task,
+) -> Result<bool, Error> {
+    run_on(
+        Instructions::chosen(),
+        plant,
+        start,
+        reference,
+        requested,
+        task,
+    )
+}
+
+fn run_on<S: Scalar>(
+    instructions: Instructions,
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
+    reference: &Reference,
+    requested: &mut RequestedOutput<'_, S>,
+    task: &Task,
+) -> Result<bool, Error> {
+    // A page has no room for a second method; the general one gives the same to rounding.
+    let is_page = cfg!(target_family = "wasm");
+    if is_page || S::MOVES || requested.is_measured() || plant.limit().is_some() {
+        return Ok(false);
+    }
+    let delay = plant.delay().value();
+    let mut cursor = reference.cursor();
+    let before = cursor.advance(0.0, -slack(0.0, delay));
+    let r = cursor.advance(0.0, slack(0.0, delay));
+    let jumps_later = cursor.next_jump().is_finite();
+    let is_struck = !plant.equations().impulse.is_nothing() && r != before;
+    if jumps_later || is_struck {
+        return Ok(false);
+    }
+    match plant.equations().states() {
+        1 => serve::<S, 1>(instructions, plant, start, r, requested, task),
+        2 => serve::<S, 2>(instructions, plant, start, r, requested, task),
+        3 => serve::<S, 3>(instructions, plant, start, r, requested, task),
+        _ => Ok(false),
+    }
+}
+
+fn serve<S: Scalar, const N: usize>(
+    instructions: Instructions,
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
+    r: f64,
+    requested: &mut RequestedOutput<'_, S>,
+    task: &Task,
+) -> Result<bool, Error> {
+    let equations = plant.equations();
+    let delay = plant.delay().value();
+    let column = |numbers: &[S]| -> [f64; N] { std::array::from_fn(|i| numbers[i].value()) };
+    let a: [[f64; N]; N] = std::array::from_fn(|i| column(&equations.a[i * N..]));
+    let (b, k) = (column(&equations.b), column(&equations.k));
+    let rate = (0..N)
+        .map(|i| {
+            let row: f64 = a[i].iter().map(|a| a.abs()).sum();
+            row + (b[i] * k[i]).abs()
+        })
+        .fold(0.0, f64::max);
+    let mut parts = 1;
+    while rate * delay > REACH * parts as f64 {
+        parts *= 2;
+        if parts > MOST_AT_START {
+            return Ok(false);
+        }
+    }
+    let [output_times, input_times] = requested.times();
+    let mut found = Found {
+        outputs: ValuesAtTimes::new(output_times)?,
+        inputs: ValuesAtTimes::new(input_times)?,
+        output_breaks: Vec::with_capacity(BREAKS),
+        input_breaks: Vec::with_capacity(BREAKS),
+    };
+    let run = Run {
+        a,
+        b,
+        k,
+        c: column(&equations.c),
+        forcing: column(&equations.e).map(|e| e * r),
+        l: equations.l.value(),
+        d: equations.d.value(),
+        constant: equations.m.value() * r,
+        state: column(&start.state),
+        command: start.command.value(),
+        delay,
+        parts,
+        orders: Orders::new(plant),
+        found: &mut found,
+        task,
+    };
+    let is_stored = instructions.run(run)?;
+    if is_stored {
+        requested.store(Trajectory {
+            outputs: found.outputs.found(),
+            inputs: found.inputs.found(),
+            output_breaks: found.output_breaks,
+            input_breaks: found.input_breaks,
+        });
+    }
+    Ok(is_stored)
+}
+
+struct Found<'a> {
+    outputs: ValuesAtTimes<'a>,
+    inputs: ValuesAtTimes<'a>,
+    output_breaks: Vec<f64>,
+    input_breaks: Vec<f64>,
+}
+
+/// One run of a loop with `N` states.
+struct Run<'a, 't, const N: usize> {
+    a: [[f64; N]; N],
+    b: [f64; N],
+    k: [f64; N],
+    c: [f64; N],
+    /// E r.
+    forcing: [f64; N],
+    l: f64,
+    d: f64,
+    /// M r.
+    constant: f64,
+    state: [f64; N],
+    /// The command before the start.
+    command: f64,
+    delay: f64,
+    /// Elements in a delay.
+    parts: usize,
+    orders: Orders,
+    found: &'a mut Found<'t>,
+    task: &'a Task,
+}
+
+impl<const N: usize> WithSimd for Run<'_, '_, N> {
+    type Output = Result<bool, Error>;
+
+    /// Is the response stored? Not where an element is too long.
+    #[inline(always)]
+    fn with_simd<V: Simd>(self, _: V) -> Self::Output {
+        let Found {
+            outputs,
+            inputs,
+            output_breaks,
+            input_breaks,
+        } = self.found;
+        let mut parts = self.parts;
+        let mut lengths = Lengths::new(self.delay, parts, self.b[0]);
+        let is_integrator = N == 1 && self.a[0][0] == 0.0;
+        // Output and command at one time follow from the state then.
+        let from_state = N == 1 && self.l == 0.0 && self.d == 0.0;
+        let is_one = std::ptr::eq(outputs.times(), inputs.times());
+        let mut commands = vec![Polynomial::constant(self.command); parts];
+        let mut x = [Polynomial::constant(0.0); N];
+        let mut state = self.state;
+        let (mut slot, mut before) = (0, parts - 1);
+        let mut arriving = SMOOTH;
+        let mut element = 0;
+        while !(outputs.is_done() && inputs.is_done()) {
+            watch(element, self.task)?;
+            let t = element as f64 * self.delay / parts as f64;
+            let next = (element + 1) as f64 * self.delay / parts as f64;
+            let end = next - slack(next, self.delay);
+            let w = &commands[slot];
+            if is_integrator {
+                x[0].integrate(state[0], w, &lengths.gains, lengths.h * self.forcing[0]);
+            } else {
+                expand(
+                    &mut x,
+                    &self.a,
+                    &self.b,
+                    &state,
+                    &self.forcing,
+                    w,
+                    &lengths.factors,
+                );
+            }
+            let mut is_sound = true;
+            for x in &mut x {
+                is_sound &= x.trim();
+            }
+            if !is_sound {
+                if 2 * parts > MOST_PARTS {
+                    return Ok(false);
+                }
+                commands = halved(&commands);
+                (parts, slot, before, element) = (2 * parts, 2 * slot, 2 * before + 1, 2 * element);
+                lengths = Lengths::new(self.delay, parts, self.b[0]);
+                continue;
+            }
+            for (x, state) in x.iter().zip(&mut state) {
+                *state = x.end();
+            }
+            let mut u = Polynomial::constant(self.constant);
+            for (k, x) in self.k.iter().zip(&x) {
+                u.add(*k, x);
+            }
+            if self.l != 0.0 {
+                u.add(self.l, w);
+            }
+            let h = lengths.h;
+            if from_state {
+                let output = |mut x: [f64; LANES]| {
+                    x.iter_mut().for_each(|x| *x *= self.c[0]);
+                    x
+                };
+                let command = |mut x: [f64; LANES]| {
+                    x.iter_mut()
+                        .for_each(|x| *x = self.constant + self.k[0] * *x);
+                    x
+                };
+                if is_one {
+                    outputs.fill_both(inputs, t, h, end, |sigmas| {
+                        let x = x[0].at(sigmas);
+                        (output(x), command(x))
+                    });
+                } else {
+                    outputs.fill(t, h, end, |sigmas| output(x[0].at(sigmas)));
+                    inputs.fill(t, h, end, |sigmas| command(x[0].at(sigmas)));
+                }
+            } else {
+                let mut y = Polynomial::constant(0.0);
+                for (c, x) in self.c.iter().zip(&x) {
+                    y.add(*c, x);
+                }
+                if self.d != 0.0 {
+                    y.add(self.d, w);
+                }
+                outputs.fill(t, h, end, |sigmas| y.at(sigmas));
+                inputs.fill(t, h, end, |sigmas| u.at(sigmas));
+            }
+            if slot == 0 {
+                let jumps = element == 0;
+                if self.orders.of_output(arriving, jumps) <= REPORTED && outputs.reaches(t) {
+                    output_breaks.push(t);
+                }
+                let order = self.orders.of_command(arriving, jumps);
+                if order <= REPORTED && inputs.reaches(t) {
+                    input_breaks.push(t);
+                }
+                // Where one constant continues as itself, nothing breaks a delay later.
+                arriving = if order <= REPORTED && u.is_constant() && u == commands[before] {
+                    SMOOTH
+                } else {
+                    order
+                };
+            }
+            check_growth(&state, u.coefficient(0), next)?;
+            commands[slot] = u;
+            before = slot;
+            slot += 1;
+            if slot == parts {
+                slot = 0;
+            }
+            element += 1;
+        }
+        Ok(true)
+    }
+}
+
+/// What follows from the length of elements.
+struct Lengths {
+    h: f64,
+    /// h/(j + 1).
+    factors: [f64; DEGREE],
+    /// The same times B of the first state.
+    gains: [f64; DEGREE],
+}
+
+impl Lengths {
+    #[inline(always)]
+    fn new(delay: f64, parts: usize, b: f64) -> Self {
+        let h = delay / parts as f64;
+        let (mut factors, mut gains) = ([0.0; DEGREE], [0.0; DEGREE]);
+        for (j, (factor, gain)) in factors.iter_mut().zip(&mut gains).enumerate() {
+            *factor = h / (j + 1) as f64;
+            *gain = *factor * b;
+        }
+        Self { h, factors, gains }
+    }
+}
+
+/// The commands of one delay in elements half as long.
+#[cold]
+#[inline(never)]
+fn halved(commands: &[Polynomial]) -> Vec<Polynomial> {
+    commands.iter().flat_map(Polynomial::halves).collect()
+}
+
+/// x on an element that starts at `state`.
+#[inline(always)]
+fn expand<const N: usize>(
+    x: &mut [Polynomial; N],
+    a: &[[f64; N]; N],
+    b: &[f64; N],
+    state: &[f64; N],
+    forcing: &[f64; N],
+    w: &Polynomial,
+    factors: &[f64; DEGREE],
+) {
+    let (mut old, mut forcing) = (*state, *forcing);
+    for (x, first) in x.iter_mut().zip(state) {
+        x.set(0, *first);
+    }
+    for (j, factor) in factors.iter().enumerate() {
+        let input = w.coefficient(j);
+        let mut new = forcing;
+        for ((new, b), row) in new.iter_mut().zip(b).zip(a) {
+            *new += b * input;
+            for (a, old) in row.iter().zip(&old) {
+                *new += a * old;
+            }
+        }
+        for (new, x) in new.iter_mut().zip(x.iter_mut()) {
+            *new *= factor;
+            x.set(j + 1, *new);
+        }
+        old = new;
+        forcing = [0.0; N];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::delayed;
+    use super::*;
+    use crate::dde::Equations;
+    use proptest::prelude::*;
+
+    const DELAY: f64 = 0.3;
+
+    fn found(
+        plant: &LinearLoop,
+        start: &Start,
+        times: [&[f64]; 2],
+        instructions: Option<Instructions>,
+    ) -> Option<Trajectory> {
+        let reference = Reference::step(0.2, 1.0).unwrap();
+        let task = Task::new();
+        let mut requested = RequestedOutput::new(times[0], times[1], 0.0).unwrap();
+        let Some(instructions) = instructions else {
+            return Some(delayed::run(plant, start, &reference, requested, &task).unwrap());
+        };
+        let is_stored = run_on(
+            instructions,
+            plant,
+            start,
+            &reference,
+            &mut requested,
+            &task,
+        );
+        is_stored.unwrap().then_some(requested.trajectory)
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        let size = b.iter().fold(1.0_f64, |most, b| most.max(b.abs()));
+        a.iter()
+            .zip(b)
+            .fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))
+            / size
+    }
+
+    proptest! {
+        /// The general method gives the same response, and every instruction set the same bits.
+        #[test]
+        fn it_is_the_response_of_the_general_method(
+            n in 1_usize..=3,
+            numbers in prop::collection::vec(-2.0..2.0_f64, 32),
+            (is_integrator, is_direct, is_same, parts) in (any::<bool>(), any::<bool>(), any::<bool>(), 0.5..4.0),
+        ) {
+            let at = |first: usize, count: usize| numbers[first..first + count].to_vec();
+            let mut a: Vec<f64> = at(0, n * n).iter().map(|a| a * parts).collect();
+            if is_integrator && n == 1 {
+                a[0] = 0.0;
+            }
+            let equations = Equations {
+                a,
+                b: at(9, n),
+                e: at(12, n),
+                k: at(15, n),
+                c: at(18, n),
+                l: if is_direct { 0.4 * numbers[21] } else { 0.0 },
+                m: numbers[22],
+                d: if is_direct { numbers[23] } else { 0.0 },
+                impulse: 0.0,
+            };
+            let plant = LinearLoop::new(equations, DELAY, None, None).unwrap();
+            let start = Start { state: at(24, n), command: numbers[27], ..Start::default() };
+            let times: Vec<f64> = (0..=40).map(|i| 0.05 * f64::from(i)).collect();
+            let later: Vec<f64> = times.iter().map(|t| t + DELAY).collect();
+            let times = [if is_same { &times[..] } else { &later[..] }, &times[..]];
+            let truth = found(&plant, &start, times, None).unwrap();
+            let mut bits = None;
+            for instructions in Instructions::available() {
+                let Some(here) = found(&plant, &start, times, Some(instructions)) else {
+                    prop_assert!(bits.is_none());
+                    continue;
+                };
+                prop_assert!(apart(&here.outputs, &truth.outputs) < 1e-13);
+                prop_assert!(apart(&here.inputs, &truth.inputs) < 1e-13);
+                prop_assert_eq!(here.output_breaks.len(), truth.output_breaks.len());
+                prop_assert_eq!(here.input_breaks.len(), truth.input_breaks.len());
+                prop_assert!(apart(&here.output_breaks, &truth.output_breaks) < 1e-14);
+                let found = [here.outputs, here.inputs].map(|values| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+                let first = bits.get_or_insert(found.clone());
+                prop_assert_eq!(&found, first);
+            }
+        }
+    }
+
+    #[test]
+    fn what_moves_or_jumps_later_is_left_to_the_general_method() {
+        let equations = |impulse| Equations {
+            a: vec![0.0],
+            b: vec![1.0],
+            e: vec![0.0],
+            k: vec![-1.3],
+            m: 1.3,
+            c: vec![1.0],
+            impulse,
+            ..Equations::default()
+        };
+        let start = Start {
+            state: vec![0.0],
+            ..Start::default()
+        };
+        let is_stored = |impulse, limit, reference: Reference| {
+            let plant = LinearLoop::new(equations(impulse), DELAY, None, limit).unwrap();
+            let mut requested = RequestedOutput::new(&[0.0, 1.0], &[], 0.0).unwrap();
+            run(&plant, &start, &reference, &mut requested, &Task::new()).unwrap()
+        };
+        let jump = |time| Reference::new(0.0, vec![time], vec![1.0]).unwrap();
+        assert!(is_stored(0.0, None, jump(0.0)));
+        assert!(!is_stored(0.0, None, jump(0.5)));
+        assert!(!is_stored(0.1, None, jump(0.0)));
+        assert!(!is_stored(0.0, Some(1.0), jump(0.0)));
+    }
+}
