@@ -8,7 +8,7 @@ use deadtime::Task;
 use deadtime::dde::ensemble::{self, Sets};
 use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
 use deadtime::dde::sampled::{self, LoopCells};
-use deadtime::dde::{Criteria, Equations, LinearLoop, Reference, Start};
+use deadtime::dde::{Criteria, Equations, LinearLoop, Metrics, Reference, Start};
 
 const DELAY: f64 = 0.36;
 const SAMPLE_TIME: f64 = 0.065;
@@ -149,7 +149,7 @@ fn poles(criterion: &mut Criterion) {
 fn sweeps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sweep 10 s, metrics");
     group.sample_size(10);
-    let count = 10_000;
+    let count: usize = 10_000;
     let cases = [
         ("p", drone(1.0, 0.0)),
         ("p, lag", lagging(1.0, 0.2)),
@@ -161,7 +161,7 @@ fn sweeps(criterion: &mut Criterion) {
         let mut gains = Vec::new();
         let (mut feedback, mut delays) = (Vec::new(), Vec::new());
         for i in 0..count {
-            let part = f64::from(i) / f64::from(count);
+            let part = i as f64 / count as f64;
             let gain = 0.5 + 2.0 * part;
             gains.push(gain);
             feedback.push(-gain);
@@ -185,7 +185,7 @@ fn sweeps(criterion: &mut Criterion) {
         entries[states * states + 2 * states] = &feedback;
         entries[matrices + 1] = &gains;
         entries[matrices + 4] = &delays;
-        let Ok(sets) = Sets::new(states, count as usize, &entries, 1.0, false) else {
+        let Ok(sets) = Sets::new(states, count, &entries, 1.0, false) else {
             continue;
         };
         let criteria = Criteria {
@@ -195,8 +195,11 @@ fn sweeps(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(count as u64));
         group.bench_function(name, |bencher| {
             let task = Task::new();
+            let mut overshoots = vec![0.0; count];
             bencher.iter(|| {
-                ensemble::metrics(black_box(&sets), (&[1.0], &[0.0]), 10.0, &criteria, &task)
+                let keep = |set: usize, metrics: &Metrics, _| overshoots[set] = metrics.overshoot;
+                let numbers: (&[f64], &[f64]) = (&[1.0], &[0.0]);
+                ensemble::metrics(black_box(&sets), numbers, 10.0, &criteria, &task, keep)
             });
         });
     }
