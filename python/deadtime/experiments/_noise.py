@@ -45,7 +45,9 @@ class FlightNoise:
     sensor is added to the output that is read.
 
     All parts are Gaussian and independent. Air and coloured noise are Ornstein-Uhlenbeck processes,
-    stationary from the first sample on; the walk of the air begins at zero there.
+    stationary from the first sample on; the walk of the air begins at zero there. The plant is at
+    rest at the first sample: what air did to its lags before, as in a flight that is recorded from
+    its middle on, is not in it.
 
     Parameters
     ----------

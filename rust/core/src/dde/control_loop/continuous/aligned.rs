@@ -251,23 +251,28 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
             }
             let h = lengths.h;
             if from_state {
-                let output = |mut x: [f64; LANES]| {
-                    x.iter_mut().for_each(|x| *x *= self.c[0]);
-                    x
+                // Arguments by value that are changed were changed for their caller as well by
+                // rustc 1.89 to 1.95, without optimisation across functions.
+                let output = |x: &[f64; LANES]| {
+                    let mut output = *x;
+                    output.iter_mut().for_each(|x| *x *= self.c[0]);
+                    output
                 };
-                let command = |mut x: [f64; LANES]| {
-                    x.iter_mut()
+                let command = |x: &[f64; LANES]| {
+                    let mut command = *x;
+                    command
+                        .iter_mut()
                         .for_each(|x| *x = self.constant + self.k[0] * *x);
-                    x
+                    command
                 };
                 if is_one {
                     outputs.fill_both(inputs, t, h, end, |sigmas| {
                         let x = x[0].at(sigmas);
-                        (output(x), command(x))
+                        (output(&x), command(&x))
                     });
                 } else {
-                    outputs.fill(t, h, end, |sigmas| output(x[0].at(sigmas)));
-                    inputs.fill(t, h, end, |sigmas| command(x[0].at(sigmas)));
+                    outputs.fill(t, h, end, |sigmas| output(&x[0].at(sigmas)));
+                    inputs.fill(t, h, end, |sigmas| command(&x[0].at(sigmas)));
                 }
             } else {
                 let mut y = Polynomial::constant(0.0);
