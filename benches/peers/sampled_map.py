@@ -4,7 +4,8 @@ For loops of 7, 38 and 74 states (one drone sampled every 65, 10 and 5 ms): the 
 our counts, with and without the abscissa, of numpy's eigenvalues of the transition matrices in one
 stack, and of the Schur-Cohn recursion on the characteristic polynomial with one cell in each entry
 of a numpy array; ``cargo bench --bench stability_map -- sampled`` has it with one cell in
-each lane. Then cells drawn at random, whose counts are compared with those of the eigenvalues. Run
+each lane. Then cells drawn at random, whose counts are compared with those of the eigenvalues, and
+single loops at 1 kHz. Run
 ``python benches/peers/sampled_map.py [--quick]``.
 """
 
@@ -93,6 +94,20 @@ def main() -> None:
         loop = loop_of(sample_time)
         timed(loop, side, rounds, rng, quick)
         compared(loop, side, drawn // 3, rng)
+    single_loops(3 if quick else 40)
+
+
+def single_loops(rounds: int) -> None:
+    """Print times of loops at 1 kHz with a delay of 0.36 s (362 states), made anew each time."""
+    lagging = dtm.PV(2.0, 0.1, filter=dtm.DerivativeFilter(20.0))
+    for name, plant, controller in (
+        ("P", dtm.Integrator(), dtm.P(2.0)),
+        ("filtered PV behind a lag", dtm.Integrator(1.0, 0.1), lagging),
+    ):
+        loop = dtm.ControlLoop(plant, controller, delay=0.36, sample_time=0.001)
+        stable = least_time(lambda loop=loop: loop.replace(delay=0.36).is_stable(), rounds)
+        margin = least_time(lambda loop=loop: loop.replace(delay=0.36).margin(), rounds)
+        print(f"1 kHz, {name}: is_stable {stable * 1e3:.3f} ms, margin {margin * 1e3:.3f} ms")
 
 
 def timed(

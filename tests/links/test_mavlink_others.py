@@ -9,6 +9,8 @@ pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 from deadtime import FlightAbortedError, LinkError
 from deadtime.links import Limits, run
 from deadtime.links.mavlink import MAVLinkVehicle
+from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink.connection import Connection
 from pymavlink.dialects.v20 import ardupilotmega as d
 from stand_in_autopilot import StandIn, told
 
@@ -204,3 +206,29 @@ def test_a_vehicle_that_follows_another_station_is_refused():
             assert vehicle.parameters == before
 
     run(connected())
+
+
+def test_a_heartbeat_that_was_overtaken_on_the_way_tells_nothing():
+    """The mode of before a landing, 60 ms late: nobody went back to it."""
+    vehicle = d.MAVLink(None, srcSystem=1, srcComponent=1)
+
+    def heartbeat(number, mode):
+        vehicle.seq = number % 256
+        sent = d.MAVLink_heartbeat_message(2, 3, 129, mode, 4, 3)
+        sent.pack(vehicle)
+        return sent
+
+    connection = Connection([LinkAddress.of(ADDRESS)], 255, 190)
+    seen = []
+    connection.take = lambda message, time: seen.append(message.custom_mode)
+    carrier = connection.carriers.current
+    # Numbers begin anew after 255. A second later they may have done so any number of times.
+    for number, mode, time in [
+        (250, 4, 0.0),
+        (258, 9, 1.0),
+        (254, 4, 1.06),
+        (258, 9, 1.07),
+        (200, 4, 2.0),
+    ]:
+        connection._receive(carrier, heartbeat(number, mode), time)
+    assert seen == [4, 9, 9, 4]

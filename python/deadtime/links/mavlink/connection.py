@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -23,6 +24,13 @@ LOOK = 0.05
 
 #: Time for an answer before a request is repeated, s, and number of requests.
 ANSWER, TRIES = 0.7, 6
+
+#: Of two heartbeats that come within this time, s, the one that was sent later counts: a link that
+#: scatters delivers them in another order, and the mode would seem to go back.
+REORDERED = 0.2
+
+#: Messages are numbered up to this.
+NUMBERS = 256
 
 #: Texts of the vehicle that are kept, and severity up to which: 4 is a warning.
 TEXTS, WARNING = 8, 4
@@ -80,6 +88,7 @@ class Connection:
         self.carriers = Carriers(links, _warn, lambda: self.switched())
         self._waiting: list[tuple[Callable[[Any], bool], asyncio.Future[Any]]] = []
         self._tasks: list[asyncio.Task[None]] = []
+        self._heartbeats: dict[tuple[Carrier, int, int], tuple[float, int]] = {}
 
     @property
     def is_open(self) -> bool:
@@ -151,8 +160,20 @@ class Connection:
         self.carriers.current.send(message)
 
     def _receive(self, carrier: Carrier, message: Any, time: float) -> None:
-        if carrier is self.carriers.current:
+        if carrier is self.carriers.current and not self._is_overtaken(carrier, message, time):
             self._accept(message, time)
+
+    def _is_overtaken(self, carrier: Carrier, message: Any, time: float) -> bool:
+        """Whether this is a heartbeat that comes after one that was sent later."""
+        if message.get_type() != "HEARTBEAT":
+            return False
+        sender = carrier, message.get_srcSystem(), message.get_srcComponent()
+        seen, newest = self._heartbeats.get(sender, (-math.inf, 0))
+        number = message.get_seq()
+        if time - seen < REORDERED and 0 < (newest - number) % NUMBERS < NUMBERS // 2:
+            return True
+        self._heartbeats[sender] = time, number
+        return False
 
     def _accept(self, message: Any, time: float) -> None:
         kind = message.get_type()
