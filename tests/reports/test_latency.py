@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from browser import check_page
 from deadtime._base.digits import between, rounded, shown, stated
+from deadtime.reports.latencies._axes import doubted_by_axes
 from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
 from deadtime.reports.latencies._live import around_the_vehicle
 from flights import flight_path
@@ -141,6 +142,20 @@ def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_adequate(found):
         assert around_the_vehicle([other]).explorer.state["Kp"] == one.cost.well_damped
     doubted = replace(one, estimate=replace(one.estimate, adequate=False))
     assert around_the_vehicle([doubted, found.loop("roll rate")]) is None
+
+
+def test_north_and_east_that_contradict_each_other_are_not_adequate(found):
+    """In gusts, 10 s fit best with 0.13 s to the north, and 20 s with 3.3 s to the east."""
+    flight = dtm.latency(
+        flight_path("arducopter_2014-10-18_21-19-07.bin"), loops=["north position", "east position"]
+    )
+    for axis in ("north", "east"):
+        estimate = flight.loop(f"{axis} position").estimate
+        assert not estimate.adequate
+        assert "contradict each other" in estimate.message
+    one = found.loop("roll rate", "actuator")
+    alike = [replace(one, axis=axis) for axis in ("north", "east")]
+    assert all(one.estimate.adequate for one in doubted_by_axes(alike))
 
 
 def test_without_excitation_every_loop_is_refused_by_name(tmp_path):

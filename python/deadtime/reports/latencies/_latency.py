@@ -18,6 +18,7 @@ from deadtime._base.progress import Stages, stage_report
 from deadtime.estimation import SharedNumber, shared_number
 from deadtime.recordings import Log, LogLoop, Recording, open_log
 from deadtime.recordings.logs import Link
+from deadtime.reports.latencies._axes import doubted_by_axes
 from deadtime.reports.latencies._budget import Stage, stages_of
 from deadtime.reports.latencies._controller import (
     Command,
@@ -254,7 +255,8 @@ def latency(
 
     Where command and response are stamped by clocks that drift apart, by more than a tenth of the
     interval over the log, the estimate is not adequate. The time of each window over the log tells
-    that, and stamps that are regular.
+    that, and stamps that are regular. Nor are those of north and east whose intervals lie apart by
+    more than a factor of two.
 
     Examples
     --------
@@ -276,7 +278,8 @@ def latency(
     if not isinstance(log, Log):
         log = open_log(log)
     chosen = _chosen(log, axes, loops)
-    found = _all_told(log, [(loop, one) for loop in chosen for one in _commands(loop)], report)
+    wanted = [(loop, one) for loop in chosen for one in _commands(loop)]
+    found = doubted_by_axes(_all_told(log, wanted, report))
     filters = filters_of(log)
     stages = {loop.name: stages_of(log, loop.name, found, filters) for loop in chosen}
     vehicle = " ".join(one for one in (log.autopilot, log.vehicle, log.firmware) if one)

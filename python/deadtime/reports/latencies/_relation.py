@@ -163,14 +163,14 @@ def relation_of(
     if why := _no_answer(fit, told[0]):
         return refused(why)
     if fit.delay_plus_lag < hidden:
-        fit = _doubted(
+        fit = doubted(
             fit,
             f"the {command} moves between rows of the log by more than it shows, which hides times "
             f"below {stated(hidden, 0.0, 's')}",
         )
     low, high = fit.ci(0.95, "delay+lag")
     if unsure > WORTH * (high - low):
-        fit = _doubted(
+        fit = doubted(
             fit,
             "the log does not tell when commands changed between its rows, or how long each holds, "
             f"which is worth {stated(unsure, 0.0, 's')} more or less",
@@ -192,7 +192,7 @@ def doubted_by_clocks(
     if found.estimate is None:
         return found
     why = why_two_clocks(found.estimate, seen, command, response)
-    return replace(found, estimate=_doubted(found.estimate, why)) if why else found
+    return replace(found, estimate=doubted(found.estimate, why)) if why else found
 
 
 def _ends_of(windows: list[Window]) -> tuple[tuple[float, float], ...]:
@@ -269,7 +269,7 @@ def _fitted(
         if better > 0.0:
             fit, parts = still, [held(one) for one in windows]
     if doubt:
-        return _doubted(fit, doubt)
+        return doubted(fit, doubt)
     fit = richer(parts[:1], fit)
     # What the plant lacks in one window it lacks in all together.
     if len(parts) == 1 or not fit.adequate:
@@ -280,10 +280,10 @@ def _fitted(
         return fit
     reasons = together.message.partition(" (try ")[0].split("; ")
     apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
-    return _doubted(fit, "; ".join(apart)) if apart else richer(parts, together)
+    return doubted(fit, "; ".join(apart)) if apart else richer(parts, together)
 
 
-def _doubted(fit: DelayEstimate, why: str) -> DelayEstimate:
+def doubted(fit: DelayEstimate, why: str) -> DelayEstimate:
     """The estimate as one that is not adequate, for this reason."""
     known = NOT_ADEQUATE in fit.message
     message = f"{fit.message}{'; ' if known else NOT_ADEQUATE}{why}"
