@@ -20,38 +20,6 @@ from deadtime.links.ardrone2.emulator.motion import GRAVITY
 from deadtime.links.ardrone2.navdata import parse_navdata
 from pilot import COMMANDS, DOWN, NAVDATA, UP, Pilot
 
-#: The keys of the developer guide of the SDK 2.0.
-DOCUMENTED = [
-    f"{section}:{name}"
-    for section, names in {
-        "general": "num_version_config num_version_mb num_version_soft drone_serial "
-        "soft_build_date motor1_soft motor1_hard motor1_supplier motor2_soft motor2_hard "
-        "motor2_supplier motor3_soft motor3_hard motor3_supplier motor4_soft motor4_hard "
-        "motor4_supplier ardrone_name flying_time navdata_demo navdata_options com_watchdog "
-        "video_enable vision_enable vbat_min",
-        "control": "accs_offset accs_gains gyros_offset gyros_gains gyros110_offset gyros110_gains "
-        "magneto_offset magneto_radius gyro_offset_thr_x gyro_offset_thr_y gyro_offset_thr_z "
-        "pwm_ref_gyros osctun_value osctun_test altitude_max altitude_min control_level "
-        "euler_angle_max control_iphone_tilt control_vz_max control_yaw outdoor "
-        "flight_without_shell autonomous_flight manual_trim indoor_euler_angle_max "
-        "indoor_control_vz_max indoor_control_yaw outdoor_euler_angle_max outdoor_control_vz_max "
-        "outdoor_control_yaw flying_mode hovering_range flight_anim",
-        "network": "ssid_single_player ssid_multi_player wifi_mode wifi_rate owner_mac",
-        "pic": "ultrasound_freq ultrasound_watchdog pic_version",
-        "video": "camif_fps codec_fps camif_buffers num_trackers video_codec video_slices "
-        "video_live_socket video_storage_space bitrate max_bitrate bitrate_ctrl_mode "
-        "bitrate_storage video_channel video_on_usb video_file_index",
-        "leds": "leds_anim",
-        "detect": "enemy_colors groundstripe_colors enemy_without_shell detect_type "
-        "detections_select_h detections_select_v_hsync detections_select_v",
-        "syslog": "output max_size nb_files",
-        "userbox": "userbox_cmd",
-        "gps": "latitude longitude altitude",
-        "custom": "application_id application_desc profile_id profile_desc session_id session_desc",
-    }.items()
-    for name in names.split()
-]
-
 # --- the link --------------------------------------------------------------------------------
 
 

@@ -156,7 +156,7 @@ impl Recorded {
             } else {
                 flat
             },
-            ..QUIET
+            ..Noise::QUIET
         };
         (air(0.65, 3.0, 1.0), air(0.02, 0.3, SLOW))
     }
@@ -200,7 +200,7 @@ impl Recorded {
         };
         let lags = usize::from(self.has_lag);
         let plain = self.model(lags, false)?;
-        let calms = self.grid(&plain, QUIET, task)?;
+        let calms = self.grid(&plain, Noise::QUIET, task)?;
         let airs = self.grid(&plain, strong, task)?;
         let trims: &[bool] = if self.integrates() {
             &[false, true]
@@ -264,7 +264,7 @@ impl Recorded {
         let without = model.held(&near, quantity, least * self.between, task)?;
         let mut noises = vec![best.noise()];
         if best.noise().air > 0.0 {
-            noises.push(QUIET);
+            noises.push(Noise::QUIET);
         }
         let starts = noises.into_iter().flat_map(|noise| {
             let behind = &behind;
@@ -360,7 +360,12 @@ impl Recorded {
 
 impl Found {
     fn noise(&self) -> Noise {
-        self.fit.point.noise.first().copied().unwrap_or(QUIET)
+        self.fit
+            .point
+            .noise
+            .first()
+            .copied()
+            .unwrap_or(Noise::QUIET)
     }
 
     fn fitted(&self, start: &Point, tolerance: f64, task: &Task) -> Result<Fit, Error> {
@@ -373,7 +378,7 @@ impl Found {
         if self.noise().air == 0.0 {
             return Ok(());
         }
-        let without = with_noise(&self.fit.point, QUIET);
+        let without = with_noise(&self.fit.point, Noise::QUIET);
         let objective = self.model.objective(&without, task)?;
         if objective < self.fit.objective + 1e-3 {
             self.fit = Fit {
@@ -482,13 +487,3 @@ fn likeliest(model: &Model, starts: &[Point], task: &Task) -> Result<Option<Fit>
     }
     Ok(best)
 }
-
-/// No air, no coloured noise and no scatter.
-const QUIET: Noise = Noise {
-    air_time: 1.0,
-    air: 0.0,
-    sensor_time: 1.0,
-    sensor: 0.0,
-    stamps: 0.0,
-    arrivals: 0.0,
-};

@@ -48,6 +48,16 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// White noise alone.
+    pub const QUIET: Self = Self {
+        air_time: 1.0,
+        air: 0.0,
+        sensor_time: 1.0,
+        sensor: 0.0,
+        stamps: 0.0,
+        arrivals: 0.0,
+    };
+
     fn parts(&self) -> [Disturbance; 2] {
         [
             (Entry::Input, self.air_time, self.air),

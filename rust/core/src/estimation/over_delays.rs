@@ -204,7 +204,6 @@ impl Responses {
 mod tests {
     use super::super::likelihood::{Wanted, evaluate};
     use super::super::tests::recorded;
-    use super::super::variables::QUIET;
     use super::*;
 
     const PLANTS: [(&[f64], &[f64]); 2] = [(&[1.0], &[1.0, 0.0]), (&[1.0], &[1.0, 0.4])];
@@ -214,7 +213,7 @@ mod tests {
         let airy = Noise {
             air_time: 2.0,
             air: 0.6,
-            ..QUIET
+            ..Noise::QUIET
         };
         let task = Task::new();
         let by = Derivatives::none();
@@ -226,7 +225,7 @@ mod tests {
             rows.output[17] = f64::NAN;
             let step = rows.row_time();
             let delays: Vec<f64> = (0..100).map(|i| 0.25 * f64::from(i) * step).collect();
-            for noise in [QUIET, airy] {
+            for noise in [Noise::QUIET, airy] {
                 for gain in [Gain::Eliminated, Gain::Searched(0.8), Gain::Known(0.8)] {
                     let mut values = Values {
                         delay: 0.0,
@@ -264,7 +263,16 @@ mod tests {
         };
         let of = |rows: &Rows, delays: &[f64]| {
             let by = Derivatives::none();
-            over_delays(rows, &plant, &values, &QUIET, &by, delays, &Task::new()).unwrap()
+            over_delays(
+                rows,
+                &plant,
+                &values,
+                &Noise::QUIET,
+                &by,
+                delays,
+                &Task::new(),
+            )
+            .unwrap()
         };
         let step = rows.row_time();
         let many: Vec<f64> = (0..9).map(|i| f64::from(i) * 0.1 * step).collect();

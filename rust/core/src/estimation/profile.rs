@@ -261,15 +261,6 @@ mod tests {
     use super::super::variables::Free;
     use super::*;
 
-    const QUIET: Noise = Noise {
-        air_time: 1.0,
-        air: 0.0,
-        sensor_time: 1.0,
-        sensor: 0.0,
-        stamps: 0.0,
-        arrivals: 0.0,
-    };
-
     /// The fit of an integrator behind 0.31 s and these lags, which are free.
     fn fitted(lags: &[f64]) -> (Model, Fit) {
         let lag = lags.first().copied().unwrap_or(0.0);
@@ -290,7 +281,7 @@ mod tests {
             noise: vec![Noise {
                 air_time: 2.0,
                 air: 0.3,
-                ..QUIET
+                ..Noise::QUIET
             }],
         };
         let mut best = model

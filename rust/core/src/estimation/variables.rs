@@ -105,7 +105,7 @@ impl Variables<'_> {
     pub(super) fn variable(&self, slot: Slot, start: &Point) -> Variable {
         let row_time = self.row_time;
         let span = |run: usize| self.runs.get(run).map_or(1.0, Rows::span);
-        let noise = |run: usize| start.noise.get(run).copied().unwrap_or(QUIET);
+        let noise = |run: usize| start.noise.get(run).copied().unwrap_or(Noise::QUIET);
         let logarithm = |start: f64, low: f64, high: f64| Variable {
             start: start.abs().ln(),
             low: low.ln(),
@@ -232,16 +232,6 @@ pub(super) fn mean_slots(slots: &[Slot]) -> usize {
         |slot: &&Slot| matches!(slot, Slot::Time | Slot::Lag(_) | Slot::Zero | Slot::Gain);
     slots.iter().take_while(of_mean).count()
 }
-
-/// No noise but white noise.
-pub(super) const QUIET: Noise = Noise {
-    air_time: 1.0,
-    air: 0.0,
-    sensor_time: 1.0,
-    sensor: 0.0,
-    stamps: 0.0,
-    arrivals: 0.0,
-};
 
 /// Put the value of a variable into a point.
 pub(super) fn put(point: &mut Point, slot: Slot, value: f64) {

@@ -1,5 +1,5 @@
 use super::super::tests::recorded;
-use super::super::variables::{MOST_DEVIATION, QUIET};
+use super::super::variables::MOST_DEVIATION;
 use super::*;
 
 const INTEGRATOR: (&[f64], &[f64]) = (&[1.0], &[1.0, 0.0]);
@@ -45,7 +45,7 @@ fn commands_that_are_late_in_an_exact_record_leave_a_finite_scatter() {
     let model = model(INTEGRATOR, vec![rows]);
     let noise = Noise {
         arrivals: 1e9,
-        ..QUIET
+        ..Noise::QUIET
     };
     let found = fitted(&model, point(0.31, 0.02, vec![noise]));
     assert!(found.objective.is_finite());
@@ -71,7 +71,7 @@ fn delay_gain_and_lag_are_recovered() {
         INTEGRATOR,
         vec![recorded(INTEGRATOR, (0.31, 0.85, 0.17), 1e-5, 1)],
     );
-    let found = fitted(&model, point(0.25, 0.3, vec![QUIET]));
+    let found = fitted(&model, point(0.25, 0.3, vec![Noise::QUIET]));
     assert!((found.point.delay() - 0.31).abs() < 1e-4, "{found:?}");
     assert!((found.point.lags[0] - 0.17).abs() < 1e-4);
     let there = model.at(0, &found.point, &Task::new()).unwrap();
@@ -92,10 +92,10 @@ fn air_that_is_not_there_is_fitted_to_nothing() {
     let windy = Noise {
         air_time: 1.0,
         air: 3.0,
-        ..QUIET
+        ..Noise::QUIET
     };
     let found = fitted(&model, point(0.3, 0.2, vec![windy]));
-    let white = fitted(&model, point(0.3, 0.2, vec![QUIET]));
+    let white = fitted(&model, point(0.3, 0.2, vec![Noise::QUIET]));
     assert!(found.objective <= white.objective + 1e-3);
     assert!(
         white.objective - found.objective < 8.0,
@@ -108,7 +108,7 @@ fn air_that_is_not_there_is_fitted_to_nothing() {
 fn an_unstable_plant_of_first_order_has_a_negative_lag() {
     let unstable = recorded(NOTHING, (0.31, 0.85, -4.0), 1e-3, 3);
     let model = model(NOTHING, vec![unstable]);
-    let found = fitted(&model, point(0.25, -3.7, vec![QUIET]));
+    let found = fitted(&model, point(0.25, -3.7, vec![Noise::QUIET]));
     assert!((found.point.delay() - 0.31).abs() < 0.01, "{found:?}");
     assert!((found.point.lags[0] + 4.0).abs() < 0.01);
 }
@@ -121,7 +121,7 @@ fn recordings_share_the_plant_and_keep_their_noise() {
         recorded(INTEGRATOR, numbers, 1e-2, 5),
     ];
     let model = model(INTEGRATOR, runs);
-    let found = fitted(&model, point(0.25, 0.3, vec![QUIET; 2]));
+    let found = fitted(&model, point(0.25, 0.3, vec![Noise::QUIET; 2]));
     assert!((found.point.delay() - 0.31).abs() < 1e-3, "{found:?}");
     assert!((found.point.gain - 0.85).abs() < 1e-3);
     for (run, deviation) in [1e-4, 1e-2].into_iter().enumerate() {
@@ -141,7 +141,7 @@ fn a_known_delay_stays() {
     };
     let plant = Plant::new(INTEGRATOR.0, INTEGRATOR.1).unwrap();
     let model = Model::new(plant, runs, free, 5.0).unwrap();
-    let found = fitted(&model, point(0.31, 0.5, vec![QUIET]));
+    let found = fitted(&model, point(0.31, 0.5, vec![Noise::QUIET]));
     assert_eq!(found.point.delay(), 0.31);
     assert!((found.point.lags[0] - 0.17).abs() < 1e-4);
 }
@@ -189,13 +189,19 @@ fn numbers_out_of_range_are_refused_by_value() {
         vec![Noise {
             air_time,
             air,
-            ..QUIET
+            ..Noise::QUIET
         }]
     };
     for (point, expected) in [
-        (point(f64::NAN, 0.2, vec![QUIET]), "the delay is NaN"),
-        (point(0.2, f64::INFINITY, vec![QUIET]), "the delay is"),
-        (point(0.2, 0.2, vec![QUIET; 2]), "noise of 2 recordings"),
+        (point(f64::NAN, 0.2, vec![Noise::QUIET]), "the delay is NaN"),
+        (
+            point(0.2, f64::INFINITY, vec![Noise::QUIET]),
+            "the delay is",
+        ),
+        (
+            point(0.2, 0.2, vec![Noise::QUIET; 2]),
+            "noise of 2 recordings",
+        ),
         (point(0.2, 0.2, noise(1.0, -2.0)), "noise of deviation -2"),
         (point(0.2, 0.2, noise(-3.0, 2.0)), "time constant -3"),
     ] {
@@ -215,7 +221,7 @@ fn numbers_out_of_range_are_refused_by_value() {
         }
     }
     let found = model.fit(
-        &point(0.2, 0.2, vec![QUIET]),
+        &point(0.2, 0.2, vec![Noise::QUIET]),
         None,
         Search::All,
         0.0,

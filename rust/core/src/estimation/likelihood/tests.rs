@@ -6,14 +6,6 @@ use super::super::tests::{
 };
 use super::*;
 
-const QUIET: Noise = Noise {
-    air_time: 1.0,
-    air: 0.0,
-    sensor_time: 1.0,
-    sensor: 0.0,
-    stamps: 0.0,
-    arrivals: 0.0,
-};
 const WINDY: Noise = Noise {
     air_time: 0.8,
     air: 3.0,
@@ -135,7 +127,7 @@ fn dense(
 #[test]
 fn the_objective_is_that_of_dense_matrices() {
     let rows = rows(90);
-    for noise in [QUIET, WINDY] {
+    for noise in [Noise::QUIET, WINDY] {
         for known in [None, Some(0.8)] {
             let gain = known.map_or(Gain::Eliminated, Gain::Known);
             let found = at(&rows, &values(gain, &[]), &noise);
@@ -156,7 +148,7 @@ fn the_error_of_a_command_is_in_the_objective() {
     // The first ends when row 40 is read; the second has no row any more.
     rows.commands.uncertain = vec![(2.0, 2.6 - DELAY, 0.5), (5.0, 9.0, 1.0)];
     let rows = rows.checked().unwrap();
-    for noise in [QUIET, WINDY] {
+    for noise in [Noise::QUIET, WINDY] {
         let found = at(&rows, &values(Gain::Eliminated, &[]), &noise);
         let size = 0.5 * noise.sensor.hypot(1.0) * (2.6 - DELAY - 2.0);
         let (objective, _) = dense(&rows, &noise, &[(40, size)], None);
@@ -170,7 +162,7 @@ fn scattered_times_are_in_the_objective() {
     rows.speed = rows.time.iter().map(|t| (3.0 * t).sin()).collect();
     let rows = rows.checked().unwrap();
     let sent = commands(&rows);
-    for noise in [QUIET, WINDY] {
+    for noise in [Noise::QUIET, WINDY] {
         let noise = Noise {
             stamps: 1.5,
             arrivals: 2.0,
@@ -208,7 +200,7 @@ fn delay_and_zero_of_a_response_that_jumps_are_dependent_at_any_lag() {
     let plant = Plant::new(&[1.0], &[1.0]).unwrap();
     for lag in [1e-3, 0.01, 0.03, 0.1, 0.5] {
         for zero in [-0.1, 1e-3, 0.2] {
-            for noise in [QUIET, WINDY] {
+            for noise in [Noise::QUIET, WINDY] {
                 let at = Values {
                     delay: 0.12,
                     zero,
@@ -272,13 +264,13 @@ fn residuals_score_and_covariance_are_those_of_the_fit() {
     assert_eq!(found.gain, found.linear[0]);
     assert_eq!(found.inverse.len(), 36);
     // Without noise beside the white the residuals are those, but for their scale.
-    let white = at(&rows, &values(Gain::Eliminated, &[0.1]), &QUIET);
+    let white = at(&rows, &values(Gain::Eliminated, &[0.1]), &Noise::QUIET);
     for i in (0..90).filter(|i| rows.used[*i]) {
         let expected = white.whitened[i] * white.variance.sqrt();
         assert!((white.residuals[i] - expected).abs() < 1e-12);
     }
     // The delay is known as well as the part of its derivative that no linear unknown explains.
-    let alone = at(&rows, &values(Gain::Eliminated, &[]), &QUIET);
+    let alone = at(&rows, &values(Gain::Eliminated, &[]), &Noise::QUIET);
     let sent = commands(&rows);
     let slope: f64 = rows
         .time
@@ -326,7 +318,7 @@ fn differences_of_the_objective_do_not_depend_on_units() {
     other.commands.value.iter_mut().for_each(|u| *u *= 250.0);
     let difference = |rows: &Rows| {
         at(rows, &values(Gain::Eliminated, &[0.1]), &WINDY).objective
-            - at(rows, &values(Gain::Eliminated, &[0.3]), &QUIET).objective
+            - at(rows, &values(Gain::Eliminated, &[0.3]), &Noise::QUIET).objective
     };
     assert!((difference(&first) - difference(&other)).abs() < 1e-6);
 }
@@ -341,7 +333,7 @@ fn fewer_rows_than_unknowns_are_refused() {
         &rows,
         &integrator(),
         &values,
-        &QUIET,
+        &Noise::QUIET,
         &by,
         Wanted::Slopes,
         &Task::new(),

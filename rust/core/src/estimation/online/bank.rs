@@ -13,21 +13,17 @@ use super::row_by_row::Online;
 use super::settings::Settings;
 use crate::Error;
 
+mod change;
+
 /// Deviations of what a level or a state that is not known may be, in those of the white noise.
 const UNKNOWN: f64 = 1e3;
 
-/// Time over which information about the delay is averaged, and over which it has to tell the delay
-/// to the width of the gate, s.
+/// Time over which information about the delay is averaged, s.
 const RECENT: f64 = 2.0;
-const SPELL: f64 = 5.0;
 
 /// Innovations beyond so many deviations in every cell are outliers, at most so many in a row.
 const OUTLIER: f64 = 6.0;
 const MOST_OUTLIERS: u32 = 2;
-
-/// Time between changes that is expected before the first row, s. The hazard of the second bank is
-/// one a second, so that its weights over this time are the odds for a change.
-const RARE: f64 = 3600.0;
 
 /// Over this time the weights of the second bank fade, s: what began before it is no change now.
 const WINDOW: f64 = 30.0;
@@ -250,46 +246,6 @@ impl<const N: usize> Bank<N> {
         }
     }
 
-    /// The share of the walk and of the hazard that there is: both need information.
-    fn gate(&self) -> f64 {
-        let enough = 1.0 / (SPELL * self.settings.width.powi(2));
-        self.rate / (self.rate + enough)
-    }
-
-    /// The delay may change now: states of the main bank go over to every delay.
-    fn inject(&mut self, hazard: f64, white: f64) {
-        if hazard <= 0.0 {
-            return;
-        }
-        let (count, own) = (self.settings.delays.len(), self.changed.places.len());
-        for set in 0..self.layers.len() {
-            let range = set * count..(set + 1) * count;
-            let total: f64 = self.main.weights[range.clone()].iter().sum();
-            if total <= 0.0 {
-                continue;
-            }
-            let parts: Vec<(f64, &Cell<N>)> = self.main.weights[range.clone()]
-                .iter()
-                .map(|weight| weight / total)
-                .zip(&self.main.cells[range])
-                .filter(|(share, _)| *share > 1e-6)
-                .collect();
-            let here = Cell::blend(&parts, white);
-            let new = hazard * total / own as f64;
-            for i in set * own..(set + 1) * own {
-                let sum = self.changed.weights[i] + new;
-                let share = new / sum;
-                let cell = &mut self.changed.cells[i];
-                *cell = if share > 1.0 - 1e-9 {
-                    here.clone()
-                } else {
-                    Cell::blend(&[(1.0 - share, cell), (share, &here)], white)
-                };
-                self.changed.weights[i] = sum;
-            }
-        }
-    }
-
     /// Take an output in. Has the delay changed?
     fn see(&mut self, time: f64, output: f64) -> bool {
         let delays = self.settings.delays.len();
@@ -378,54 +334,6 @@ impl<const N: usize> Bank<N> {
             self.history.at(time - age) - self.history.at(time - age - step)
         });
         self.judge.hear(mean / deviation, length, &changes);
-    }
-
-    /// Go over to what the second bank has found, as far as changes are more probable than not.
-    fn change(&mut self, sum: f64, white: f64) {
-        let (count, own) = (self.settings.delays.len(), self.changed.places.len());
-        let delays = &self.settings.delays;
-        let mut added = vec![0.0; self.main.cells.len()];
-        let mut nearest = vec![0; self.main.cells.len()];
-        for set in 0..self.layers.len() {
-            for (delay, late) in delays.iter().enumerate() {
-                let places = &self.changed.places;
-                let after = places.partition_point(|place| *place < delay).min(own - 1);
-                let before = match places[after] > delay {
-                    true => after.saturating_sub(1),
-                    false => after,
-                };
-                let (low, high) = (delays[places[before]], delays[places[after]]);
-                let share = if high > low {
-                    ((late - low) / (high - low)).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
-                let weight = |place: usize| self.changed.weights[set * own + place];
-                let place = set * count + delay;
-                added[place] = (1.0 - share) * weight(before) + share * weight(after);
-                nearest[place] = set * own + if share < 0.5 { before } else { after };
-            }
-        }
-        let odds = sum / (RARE * added.iter().sum::<f64>());
-        let mut total = 0.0;
-        for (place, (added, nearest)) in added.iter().zip(nearest).enumerate() {
-            let (weight, added) = (self.main.weights[place], added * odds);
-            let whole = weight + added;
-            if added > 1e-9 * whole {
-                let parts = [
-                    (weight / whole, &self.main.cells[place]),
-                    (added / whole, &self.changed.cells[nearest]),
-                ];
-                self.main.cells[place] = Cell::blend(&parts, white);
-            }
-            self.main.weights[place] = whole;
-            total += whole;
-        }
-        for weight in &mut self.main.weights {
-            *weight /= total;
-        }
-        self.changed.weights.fill(0.0);
-        self.judge.forget();
     }
 
     fn answer(&self, time: f64, changed: bool) -> Answer {

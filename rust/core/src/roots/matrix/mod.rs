@@ -2,7 +2,7 @@
 //!
 //! `system` holds the matrices, `rows` complex ones, `balance` scales them at a point, `factor` their factors and
 //! inverses (`kernel`) with rounding bounds, `local_enclosure` what is proved about det M around a point;
-//! `walker` follows arg det M along lines and iterates by Newton's method, so that rectangles are
+//! `walker` follows arg det M along lines, and `walker::seek` iterates by Newton's method, so that rectangles are
 //! counted, divided and searched as for one function (`counting::cell`, `locating::isolate`).
 //! `simple_root` encloses one root by Newton's method for a bordered matrix, `starts` guesses the
 //! rightmost ones from a linearisation, `leading` proves that these are the rightmost.

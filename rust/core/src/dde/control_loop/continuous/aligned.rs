@@ -45,23 +45,6 @@ const BREAKS: usize = REPORTED as usize + 2;
 
 /// Store the response in `requested`, if the loop and its reference are of this kind.
 pub(super) fn run<S: Scalar>(
-    plant: &LinearLoop<S>,
-    start: &Start<S>,
-    reference: &Reference,
-    requested: &mut RequestedOutput<'_, S>,
-    task: &Task,
-) -> Result<bool, Error> {
-    run_on(
-        Instructions::chosen(),
-        plant,
-        start,
-        reference,
-        requested,
-        task,
-    )
-}
-
-fn run_on<S: Scalar>(
     instructions: Instructions,
     plant: &LinearLoop<S>,
     start: &Start<S>,
@@ -397,7 +380,7 @@ mod tests {
         let Some(instructions) = instructions else {
             return Some(delayed::run(plant, start, &reference, requested, &task).unwrap());
         };
-        let is_stored = run_on(
+        let is_stored = run(
             instructions,
             plant,
             start,
@@ -484,7 +467,16 @@ mod tests {
         let is_stored = |impulse, limit, reference: Reference| {
             let plant = LinearLoop::new(equations(impulse), DELAY, None, limit).unwrap();
             let mut requested = RequestedOutput::new(&[0.0, 1.0], &[], 0.0).unwrap();
-            run(&plant, &start, &reference, &mut requested, &Task::new()).unwrap()
+            let chosen = Instructions::chosen();
+            run(
+                chosen,
+                &plant,
+                &start,
+                &reference,
+                &mut requested,
+                &Task::new(),
+            )
+            .unwrap()
         };
         let jump = |time| Reference::new(0.0, vec![time], vec![1.0]).unwrap();
         assert!(is_stored(0.0, None, jump(0.0)));

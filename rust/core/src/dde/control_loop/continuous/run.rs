@@ -6,6 +6,7 @@ use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::scalar::Scalar;
+use crate::simd::Instructions;
 use crate::{Error, Task};
 
 pub(crate) fn run<S: Scalar>(
@@ -21,7 +22,8 @@ pub(crate) fn run<S: Scalar>(
         if requested.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
             return Err(endless());
         }
-        if aligned::run(plant, start, reference, &mut requested, task)? {
+        let chosen = Instructions::chosen();
+        if aligned::run(chosen, plant, start, reference, &mut requested, task)? {
             return Ok(requested.trajectory);
         }
         requested.reserve()?;

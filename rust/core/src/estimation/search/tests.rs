@@ -1,0 +1,179 @@
+use super::*;
+
+fn variable(start: f64, low: f64, high: f64) -> Variable {
+    Variable {
+        start,
+        low,
+        high,
+        step: 1e-3,
+        longest: 0.06,
+    }
+}
+
+/// A function of which no slope is known.
+fn unknown(value: f64) -> Result<Value, Error> {
+    Ok(Value::new(value, 0))
+}
+
+#[test]
+fn a_curved_valley_is_followed_to_its_minimum() {
+    let rosenbrock =
+        |x: &[f64], _| unknown((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
+    let around = [variable(-0.5, -9.0, 9.0), variable(0.5, -9.0, 9.0)];
+    let found = minimise(&around, 1e-12, &mut None, rosenbrock);
+    assert!(found.is_ok_and(|found| (found.place[0] - 1.0).abs() < 1e-3 && found.value < 1e-6));
+}
+
+#[test]
+fn the_inverse_of_a_search_near_by_saves_evaluations_and_changes_no_minimum() {
+    // Two variables that almost have the same effect.
+    let evaluations = std::cell::Cell::new(0);
+    let valley = |place: f64, from: f64, near: &mut Option<Vec<f64>>| {
+        evaluations.set(0);
+        let around = [variable(from, -9.0, 9.0), variable(from + 0.4, -9.0, 9.0)];
+        let around = around.map(|one| Variable {
+            longest: 1.0,
+            ..one
+        });
+        minimise(&around, 1e-9, near, |x: &[f64], _| {
+            evaluations.set(evaluations.get() + 1);
+            let (a, b) = (x[0] + x[1] - place, x[0] - x[1] + 0.3);
+            unknown(50.0 * a * a + 0.5 * b * b + 0.01 * a.powi(4))
+        })
+        .unwrap()
+    };
+    let mut near = None;
+    let first = valley(1.0, 0.0, &mut near);
+    let after_first = valley(1.2, first.place[0], &mut near);
+    let with_it = evaluations.get();
+    let alone = valley(1.2, first.place[0], &mut None);
+    assert!(
+        with_it < evaluations.get(),
+        "{with_it} of {}",
+        evaluations.get()
+    );
+    assert!((after_first.value - alone.value).abs() < 1e-8);
+}
+
+#[test]
+fn a_minimum_beyond_a_bound_is_found_on_it() {
+    let bowl = |x: &[f64], _| unknown((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
+    let found = minimise(
+        &[variable(1.0, 0.0, 9.0), variable(1.5, -9.0, 9.0)],
+        1e-12,
+        &mut None,
+        bowl,
+    );
+    assert!(found.is_ok_and(|found| found.place[0] == 0.0 && (found.place[1] - 2.0).abs() < 1e-4));
+}
+
+/// A function of a sum and the logarithm of a part of it, the rest of which is not below zero.
+struct Parts<F: Fn(f64, f64) -> f64>(F);
+
+impl<F: Fn(f64, f64) -> f64> Function for Parts<F> {
+    fn slack(&self, place: &[f64]) -> Option<Slack> {
+        let part = place[1].exp();
+        Some(Slack {
+            value: place[0] - part,
+            slope: vec![1.0, -part],
+        })
+    }
+
+    fn at(&mut self, place: &[f64], _: Wanted) -> Result<Value, Error> {
+        let rest = self.slack(place).map_or(0.0, |slack| slack.value);
+        assert!(rest > -1e-12, "{place:?}");
+        unknown(self.0(rest, place[1].exp()))
+    }
+}
+
+/// Where it is least: the rest, and the part.
+fn parts(start: (f64, f64), function: impl Fn(f64, f64) -> f64) -> (f64, f64) {
+    let (rest, part) = start;
+    let logarithm = Variable {
+        step: 0.02,
+        longest: 1.2,
+        ..variable(part.ln(), -9.0, 9.0)
+    };
+    let around = [variable(rest + part, 0.0, 9.0), logarithm];
+    let found = minimise(&around, 1e-12, &mut None, Parts(function)).unwrap();
+    let part = found.place[1].exp();
+    (found.place[0] - part, part)
+}
+
+#[test]
+fn a_minimum_beyond_a_bound_on_two_variables_is_found_on_it() {
+    // Known best is the sum, and without the bound the rest would be −0.02 or −0.3.
+    for far in [0.02, 0.3] {
+        let valley = |rest: f64, part: f64| {
+            let (sum, rest) = (rest + part - 0.5, rest + far);
+            1e4 * sum * sum + rest * rest
+        };
+        for start in [(0.4, 0.1), (0.1, 0.1), (0.0, 0.9), (0.2, 0.05), (-0.3, 0.5)] {
+            let (rest, part) = parts(start, valley);
+            // The slope by the part is zero on the bound.
+            assert!(rest.abs() < 1e-12, "{start:?} {rest}");
+            assert!((part - 0.5).abs() < 1e-5, "{start:?} {part}");
+        }
+    }
+}
+
+#[test]
+fn a_bound_on_two_variables_is_left_where_the_function_falls_inwards() {
+    let bowl =
+        |rest: f64, part: f64| 100.0 * (rest - 0.2).powi(2) + 400.0 * (rest + part - 0.7).powi(2);
+    for start in [(0.0, 0.1), (0.0, 0.9), (0.01, 0.3)] {
+        let (rest, part) = parts(start, bowl);
+        assert!((rest - 0.2).abs() < 1e-3, "{start:?} {rest}");
+        assert!((part - 0.5).abs() < 1e-3, "{start:?} {part}");
+    }
+}
+
+#[test]
+fn a_known_slope_saves_evaluations_and_what_it_lacks_is_found() {
+    // The sum of squares of a line and a curve, and a part whose slope is not known.
+    let mut evaluations = 0;
+    let function = |x: &[f64], _| {
+        evaluations += 1;
+        let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
+        let by = [[1.0, -2.0 * x[0]], [2.0, 10.0]];
+        let mut found = Value::new(line * line + curve * curve + 0.1 * x[0], 2);
+        for i in 0..2 {
+            found.slope[i] = 2.0 * (by[i][0] * line + by[i][1] * curve);
+            for j in 0..2 {
+                found.curvature[2 * i + j] = 2.0 * (by[i][0] * by[j][0] + by[i][1] * by[j][1]);
+            }
+        }
+        Ok(found)
+    };
+    let free = |start| Variable {
+        longest: 10.0,
+        ..variable(start, -9.0, 9.0)
+    };
+    let found = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, function);
+    let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x: &[f64], _| {
+        let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
+        unknown(line * line + curve * curve + 0.1 * x[0])
+    });
+    let (Ok(found), Ok(expected)) = (found, from_nothing) else {
+        unreachable!("the function has a value everywhere")
+    };
+    assert!((found.value - expected.value).abs() < 1e-8);
+    assert!(evaluations < 25, "{evaluations} evaluations");
+}
+
+#[test]
+fn the_inverse_is_one_and_only_of_definite_matrices() {
+    let matrix = [4.0, 1e-3, 2.0, 1e-3, 1e-6, 1e-4, 2.0, 1e-4, 3.0];
+    let inverse = inverted(&matrix, 3).unwrap();
+    for i in 0..3 {
+        for j in 0..3 {
+            let sum: f64 = (0..3).map(|k| matrix[i * 3 + k] * inverse[k * 3 + j]).sum();
+            let size = (inverse[j * 3 + j] * matrix[i * 3 + i]).sqrt();
+            let unit = if i == j { 1.0 } else { 0.0 };
+            assert!((sum - unit).abs() < 1e-5 * size, "{i} {j} {sum}");
+        }
+    }
+    assert_eq!(inverted(&[1.0, 2.0, 2.0, 1.0], 2), None);
+    assert_eq!(inverted(&[f64::NAN], 1), None);
+    assert_eq!(inverted(&[0.0], 1), None);
+}
