@@ -5,6 +5,7 @@ use super::super::propagation::Propagation;
 use super::answer::Answer;
 use super::cell::{Cell, Column, Look};
 use super::cells::Cells;
+use super::change::{change, inject};
 use super::history::{History, Jump};
 use super::judge::{AGES, Judge, Scale};
 use super::layer::Layer;
@@ -13,10 +14,11 @@ use super::row_by_row::Online;
 use super::settings::Settings;
 use crate::Error;
 
-mod change;
-
 /// Deviations of what a level or a state that is not known may be, in those of the white noise.
 const UNKNOWN: f64 = 1e3;
+
+/// Time over which the information about the delay has to tell it to the width of the gate, s.
+const SPELL: f64 = 5.0;
 
 /// Time over which information about the delay is averaged, s.
 const RECENT: f64 = 2.0;
@@ -208,6 +210,12 @@ impl<const N: usize> Bank<N> {
         self.used = Some(time);
     }
 
+    /// The share of the walk and of the hazard that there is: both need information.
+    fn gate(&self) -> f64 {
+        let enough = 1.0 / (SPELL * self.settings.width.powi(2));
+        self.rate / (self.rate + enough)
+    }
+
     /// Go to `time` without looking.
     fn go(&mut self, time: f64, length: f64) {
         let gate = self.gate();
@@ -220,7 +228,7 @@ impl<const N: usize> Bank<N> {
                 .weights
                 .iter_mut()
                 .for_each(|weight| *weight *= fade);
-            self.inject(length * gate, white);
+            inject(&self.main, &mut self.changed, length * gate, white);
             self.changed.mix(walked, white);
         }
         self.arrive(time, length);
@@ -310,7 +318,14 @@ impl<const N: usize> Bank<N> {
         if sum < self.settings.alarm {
             return false;
         }
-        self.change(sum, variance);
+        change(
+            &mut self.main,
+            &mut self.changed,
+            &self.settings.delays,
+            sum,
+            variance,
+        );
+        self.judge.forget();
         true
     }
 

@@ -12,6 +12,7 @@ mod answer;
 mod bank;
 mod cell;
 mod cells;
+mod change;
 mod estimator;
 mod history;
 mod judge;

@@ -2,8 +2,9 @@
 //!
 //! `system` holds the matrices, `rows` complex ones, `balance` scales them at a point, `factor` their factors and
 //! inverses (`kernel`) with rounding bounds, `local_enclosure` what is proved about det M around a point;
-//! `walker` follows arg det M along lines, and `walker::seek` iterates by Newton's method, so that rectangles are
-//! counted, divided and searched as for one function (`counting::cell`, `locating::isolate`).
+//! `walker` evaluates M, `line` follows arg det M along lines and `newton` iterates to its roots, so
+//! that rectangles are counted, divided and searched as for one function (`counting::cell`,
+//! `locating::isolate`).
 //! `simple_root` encloses one root by Newton's method for a bordered matrix, `starts` guesses the
 //! rightmost ones from a linearisation, `leading` proves that these are the rightmost.
 //! `outer` bounds the roots of half planes by norms, `difference` bounds the chains of neutral
@@ -18,7 +19,9 @@ mod difference;
 mod factor;
 mod kernel;
 mod leading;
+mod line;
 mod local_enclosure;
+mod newton;
 mod outer;
 mod prepared;
 mod rows;

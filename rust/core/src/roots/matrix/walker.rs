@@ -1,24 +1,13 @@
-//! The change of arg det M along a line; `seek` has Newton's iteration on det M.
-//!
-//! The reaches of two neighbouring points meet at a point between them (`local_enclosure`): the
-//! true change of arg det M is that expected from both, up to less than 2.5, and computed arguments
-//! are wrong by 0.1 at most. So the difference of the computed ones that is next to the expected
-//! change is the true one up to their errors, which cancel in the sum but at the two ends of the
-//! line.
+//! Evaluations of M for `line`, which follows arg det M, and `newton`, which finds its roots: their
+//! number, the scaling kept from one point to the next, and the discs already proved.
 
 use num_complex::Complex64;
 
 use super::balance::{Balanced, balance};
-use super::local_enclosure::{LocalEnclosure, Reach};
+use super::local_enclosure::LocalEnclosure;
 use super::system::CharacteristicMatrix;
-use crate::quasipoly::modulus;
-use crate::roots::counting::{Turn, Walk};
 use crate::roots::disc::Disc;
 use crate::{Error, Task};
-
-use std::f64::consts::{PI, TAU};
-
-mod seek;
 
 /// Factorisations after which a computation is given up.
 pub(super) const MAX_EVALUATIONS: u64 = 1_000_000;
@@ -26,86 +15,41 @@ pub(super) const MAX_EVALUATIONS: u64 = 1_000_000;
 /// Approximate number of operations between two checks for cancellation.
 const CHECK_EVERY: u64 = 1_000_000;
 
-/// Upper limit on the hints kept of one line; the first ones are kept.
-const MAX_HINTS: usize = 1000;
-
-/// Error of the arithmetic of one step, relative to the angles that occur in it.
-const STEP_ERROR: f64 = 16.0 * f64::EPSILON;
-
-/// Summands of the error of a step, apart from one for each row.
-const OTHER_SUMMANDS: f64 = 8.0;
-
 /// Shortest distance from a point that the arithmetic resolves, relative to its modulus. Larger:
 /// wider discs, fewer attempts; smaller: attempts that cannot succeed.
-const RESOLUTION: f64 = 4.0 * f64::EPSILON;
-
-/// Covers the rounding error of the length of a step.
-const ENLARGED: f64 = 1.0 + 1e-12;
-
-/// Covers the rounding errors of two reaches, which have to overlap.
-const OVERLAP: f64 = 1.0 + 1e-9;
-
-/// Points next to a root that are tried before a line counts as blocked.
-const MOST_UNCLEAR: u32 = 5;
-
-/// Longest step that is tried, relative to the reach of its first point.
-const STRETCH: f64 = 1.9;
+pub(super) const RESOLUTION: f64 = 4.0 * f64::EPSILON;
 
 /// Modulus that replaces that of points close to 0, in units of the rate of the system.
-const LEAST_SIZE: f64 = 1e-3;
-
-/// Upper limit on the distances at which a line is proved to be free of roots.
-const MAX_ASIDE: usize = 40;
-
-/// First of these distances, as a multiple of Newton's step, because the root is about that far
-/// away. Larger: the advice moves a line farther than it has to; smaller: more attempts.
-const BEYOND_ROOT: f64 = 2.0;
-
-/// Factor from one of these distances to the next. Larger: fewer attempts, advice to move a line
-/// farther; smaller: the reverse.
-const ASIDE_GROWTH: f64 = 4.0;
-
-/// Upper limit on the lengths tried for one step.
-const MAX_STEP_ATTEMPTS: usize = 60;
-
-/// Factors on the length of steps after one that was proved and one that was not, and its least
-/// value.
-const STRETCHES: (f64, f64, f64) = (1.05, 0.9, 1.2);
-
-/// Factor on the reach for a step that could not be proved.
-const SHORTENED: f64 = 0.999;
+pub(super) const LEAST_SIZE: f64 = 1e-3;
 
 /// Largest change of Re s, in units of one over the longest delay, up to which a scaling is kept: on
 /// lines, where steps shorten if it does not suit, and in Newton's iteration. Larger: entries differ
 /// more in size; smaller: it is chosen anew more often, which takes as long as an evaluation.
-const ON_LINE: f64 = 0.02;
+pub(super) const ON_LINE: f64 = 0.02;
 pub(super) const NEAR_ROOT: f64 = 1.0;
 
 /// Residual in units of the least one with a scaling at which it is chosen anew. Larger: shorter
 /// steps until then; smaller: more scalings next to roots, where residuals are large anyway.
 const MOST_RESIDUALS: f64 = 30.0;
 
-/// Upper limit on the points kept that are too far ahead (bounds memory).
-const MOST_AHEAD: usize = 64;
-
 /// Follows arg det M along lines. Keeps the number of evaluations, the hints of roots and the discs
 /// already proved.
 pub(super) struct MatrixWalker<'a> {
-    system: &'a CharacteristicMatrix,
+    pub(super) system: &'a CharacteristicMatrix,
     task: &'a Task,
     /// The scaling of M at the last points, and the least residual met with it.
-    balanced: Option<Balanced>,
+    pub(super) balanced: Option<Balanced>,
     least_residual: f64,
     /// The end of the last line, where the next one usually begins.
-    last: Option<LocalEnclosure>,
+    pub(super) last: Option<LocalEnclosure>,
     /// Ends of Newton's steps from the points closest to a root.
     pub(super) hints: Vec<Complex64>,
-    known: Vec<Disc>,
+    pub(super) known: Vec<Disc>,
     /// Points next to which no single root could be proved.
-    stalled: Vec<Complex64>,
+    pub(super) stalled: Vec<Complex64>,
     /// Number of evaluations at which a small square is replaced by a larger one.
-    eager_limit: u64,
-    evaluations: u64,
+    pub(super) eager_limit: u64,
+    pub(super) evaluations: u64,
     work: u64,
     limit: u64,
 }
@@ -133,7 +77,7 @@ impl<'a> MatrixWalker<'a> {
     }
 
     /// Count an evaluation; check for cancellation and for the limit on evaluations.
-    fn spend(&mut self) -> Result<(), Error> {
+    pub(super) fn spend(&mut self) -> Result<(), Error> {
         let size = self.system.size() as u64;
         self.evaluations += 1;
         self.work += 20 * size * size * size + 1000;
@@ -169,7 +113,7 @@ impl<'a> MatrixWalker<'a> {
     ///
     /// Long chains of states grow exponentially with a scaling that does not suit them. The residual
     /// shows that, and the scaling is then chosen anew.
-    fn tried(&mut self, s: Complex64, farthest: f64) -> Option<LocalEnclosure> {
+    pub(super) fn tried(&mut self, s: Complex64, farthest: f64) -> Option<LocalEnclosure> {
         let system = self.system;
         let fresh = |scaling: &Balanced| scaling.place == s;
         let mut found = LocalEnclosure::tried(system, self.balanced(s, farthest)?, s);
@@ -190,184 +134,8 @@ impl<'a> MatrixWalker<'a> {
         found
     }
 
-    fn enclosure(&mut self, s: Complex64) -> Result<Option<LocalEnclosure>, Error> {
+    pub(super) fn enclosure(&mut self, s: Complex64) -> Result<Option<LocalEnclosure>, Error> {
         self.spend()?;
         Ok(self.tried(s, ON_LINE).filter(LocalEnclosure::is_clear))
     }
-
-    /// The error for a line that cannot be proved to be free of roots at `place`.
-    fn blocked(&mut self, place: Complex64) -> Result<Error, Error> {
-        let mut distance = RESOLUTION * modulus(place).max(LEAST_SIZE * self.system.rate());
-        // The point itself may be free of roots, and the root as far away as Newton's step leads.
-        if let Some(here) = self.tried(place, ON_LINE) {
-            let correction = modulus(here.correction);
-            if correction.is_finite() {
-                distance = distance.max(BEYOND_ROOT * correction);
-            }
-        }
-        for _ in 0..MAX_ASIDE {
-            let mut clear = true;
-            for step in [Complex64::ONE, -Complex64::ONE, Complex64::I] {
-                clear &= self.enclosure(place + step * distance)?.is_some();
-            }
-            if clear {
-                break;
-            }
-            distance *= ASIDE_GROWTH;
-        }
-        Ok(Error::Contour { place, distance })
-    }
-
-    /// The next point, with the distance from `here` of the point where both reaches meet.
-    ///
-    /// Points that turn out to be too far away are kept in `ahead`, the nearest one last.
-    fn step(
-        &mut self,
-        here: &LocalEnclosure,
-        (to, along): (Complex64, Complex64),
-        (stretch, ahead): (&mut f64, &mut Vec<LocalEnclosure>),
-    ) -> Result<(LocalEnclosure, Meeting), Error> {
-        let rest = (to - here.s).re.abs() + (to - here.s).im.abs();
-        let reach = here.reach(along, rest);
-        let mut length = *stretch * reach.length;
-        if let Some(next) = ahead.pop() {
-            match Meeting::of(here, reach, &next, along) {
-                Ok(meeting) => return Ok((next, meeting)),
-                Err(middle) => length = middle,
-            }
-            ahead.push(next);
-        } else if reach.length >= rest {
-            length = rest;
-        }
-        let mut unclear = 0;
-        for attempt in 0..MAX_STEP_ATTEMPTS {
-            let place = if length >= rest {
-                to
-            } else {
-                here.s + along * length
-            };
-            if place == here.s {
-                break;
-            }
-            let Some(next) = self.enclosure(place)? else {
-                // Points that are free of roots exist at any distance from a root, with shorter and
-                // shorter reaches.
-                unclear += 1;
-                if unclear > MOST_UNCLEAR {
-                    break;
-                }
-                length *= 0.5;
-                continue;
-            };
-            match Meeting::of(here, reach, &next, along) {
-                Ok(meeting) => {
-                    if attempt == 0 {
-                        *stretch = (STRETCHES.0 * *stretch).min(STRETCH);
-                    }
-                    return Ok((next, meeting));
-                }
-                Err(middle) => {
-                    *stretch = (STRETCHES.1 * *stretch).max(STRETCHES.2);
-                    length = if attempt == 0 {
-                        middle
-                    } else {
-                        (SHORTENED * reach.length).max(0.5 * length.min(reach.length))
-                    };
-                    if ahead.len() < MOST_AHEAD {
-                        ahead.push(next);
-                    }
-                }
-            }
-        }
-        Err(self.blocked(here.s)?)
-    }
-}
-
-impl Walk for MatrixWalker<'_> {
-    fn walk(&mut self, from: Complex64, to: Complex64) -> Result<Turn, Error> {
-        let whole = modulus(to - from);
-        if whole == 0.0 {
-            return Ok(Turn::default());
-        }
-        let along = (to - from) / ((to - from).re.abs() + (to - from).im.abs());
-        let known = self.last.take().filter(|last| last.s == from);
-        let first = match known {
-            Some(last) => Some(last),
-            None => self.enclosure(from)?,
-        };
-        let Some(mut here) = first else {
-            return Err(self.blocked(from)?);
-        };
-        let mut turn = Turn {
-            angle: 0.0,
-            slack: here.error,
-        };
-        let summands = self.system.size() as f64 + OTHER_SUMMANDS;
-        let mut stretch = STRETCH;
-        let mut known = Vec::new();
-        // Newton's corrections at the last two points: a local minimum indicates a root.
-        let mut before = (f64::INFINITY, f64::INFINITY);
-        while here.s != to {
-            let step = self.step(&here, (to, along), (&mut stretch, &mut known))?;
-            let (ahead, Meeting { reach, back, gone }) = step;
-            let middle = here.s + along * gone;
-            let (first, second) = (middle - here.s, middle - ahead.s);
-            let expected = here.expected(reach, first) - ahead.expected(back, second);
-            let shift = (here.delay - ahead.delay) * middle.im;
-            let off = ahead.angle - here.angle - expected + shift;
-            let delays = (ahead.delay * second.im, here.delay * first.im);
-            turn.angle += expected + principal(off) + delays.0 - delays.1;
-            turn.slack += STEP_ERROR
-                * summands
-                * (1.0 + expected.abs() + shift.abs() + delays.0.abs() + delays.1.abs())
-                + f64::EPSILON * turn.angle.abs();
-            if here.delay != ahead.delay {
-                turn.slack += STEP_ERROR * summands * here.delay.max(ahead.delay) * middle.im.abs();
-            }
-            let correction = modulus(here.correction);
-            if before.1 < before.0 && before.1 < correction && self.hints.len() < MAX_HINTS {
-                self.hints.push(here.s - here.correction);
-            }
-            before = (before.1, correction);
-            here = ahead;
-        }
-        turn.slack += here.error;
-        self.last = Some(here);
-        Ok(turn)
-    }
-}
-
-/// How the reaches of two points overlap, and the distance from the first one of a point in both.
-struct Meeting {
-    reach: Reach,
-    back: Reach,
-    gone: f64,
-}
-
-impl Meeting {
-    /// Where the reach of `here` and that of `next` meet; as an error, the middle of the part that
-    /// neither covers.
-    fn of(
-        here: &LocalEnclosure,
-        reach: Reach,
-        next: &LocalEnclosure,
-        along: Complex64,
-    ) -> Result<Self, f64> {
-        let whole = modulus(next.s - here.s) * ENLARGED;
-        let back = next.reach(-along, whole);
-        if back.length + reach.length < whole * OVERLAP && reach.length < whole {
-            let middle = 0.5 * (whole + reach.length - back.length);
-            return Err(middle.min(STRETCH * reach.length));
-        }
-        // As far from the end of either reach as possible.
-        let part = reach.length / (reach.length + back.length);
-        let gone = part * whole;
-        Ok(Self { reach, back, gone })
-    }
-}
-
-/// The angle reduced to [−π, π].
-fn principal(angle: f64) -> f64 {
-    let rest = angle - (angle / TAU).round() * TAU;
-    rest.clamp(-PI, PI)
 }

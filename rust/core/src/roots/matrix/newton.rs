@@ -6,8 +6,8 @@
 
 use num_complex::Complex64;
 
-use super::super::simple_root::simple_root;
-use super::{LEAST_SIZE, MatrixWalker, NEAR_ROOT, RESOLUTION};
+use super::simple_root::simple_root;
+use super::walker::{LEAST_SIZE, MatrixWalker, NEAR_ROOT, RESOLUTION};
 use crate::Error;
 use crate::quasipoly::modulus;
 use crate::roots::counting::Cell;
