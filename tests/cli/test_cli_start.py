@@ -46,6 +46,7 @@ def test_help_and_version_load_neither_numerics_nor_drawing(argument):
         "deadtime._base.errors",
         "deadtime._cli",
         "deadtime._cli.app",
+        "deadtime._cli.interruption",
         "deadtime._cli.readable",
     }
 

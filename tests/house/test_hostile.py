@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 
 import deadtime as dtm
@@ -244,6 +245,28 @@ def test_ctrl_c_ends_a_command_with_one_line(tmp_path):
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert said.splitlines() == ["deadtime: interrupted"]
+
+
+def test_ctrl_c_during_an_import_ends_a_command_and_becomes_no_other_error(tmp_path):
+    code = """
+        import signal
+        from deadtime._cli.interruption import ended_by_ctrl_c
+
+        class Interrupted:
+            def __set_name__(self, owner, name):
+                signal.raise_signal(signal.SIGINT)
+
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        with ended_by_ctrl_c():
+            pass
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        with ended_by_ctrl_c():
+            class Owner:
+                attribute = Interrupted()
+    """
+    program = [sys.executable, "-c", textwrap.dedent(code)]
+    done = subprocess.run(program, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stderr) == (130, "deadtime: interrupted\n")
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path):

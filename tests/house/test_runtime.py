@@ -123,6 +123,34 @@ def test_a_fork_in_the_middle_of_a_computation_does_not_hang():
     assert result.stdout.strip() == "7", result.stderr
 
 
+def test_ctrl_c_while_the_kernels_are_loaded_interrupts_the_import_and_no_more():
+    result = run_python(
+        """
+        import signal
+        import numpy.lib
+
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        version = numpy.lib.NumpyVersion
+
+        def interrupted(text):
+            signal.raise_signal(signal.SIGINT)
+            return version(text)
+
+        numpy.lib.NumpyVersion = interrupted
+        try:
+            from deadtime import _deadtime
+        except KeyboardInterrupt:
+            print("interrupted")
+        numpy.lib.NumpyVersion = version
+        print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)
+        from deadtime import _deadtime
+        print(_deadtime.lambertw0_number(0.0))
+        """
+    )
+    assert result.stderr == ""
+    assert result.stdout.split() == ["interrupted", "True", "0.0"]
+
+
 @pytest.mark.usefixtures("listens_to_ctrl_c")
 def test_ctrl_c_stops_a_long_call():
     # It takes 0.2 s on an idle machine; the bound here only distinguishes it from not stopping.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import sys
 
+from deadtime._cli.interruption import INTERRUPTED, SAID, ended_by_ctrl_c
+
 __all__ = ["main"]
 
 EXTRAS = ("rich", "typer")
@@ -30,11 +32,12 @@ def main() -> None:
         )
         raise SystemExit(1)
     try:
-        from deadtime._cli.app import run
-        from deadtime._cli.readable import make_readable
+        with ended_by_ctrl_c():
+            from deadtime._cli.app import run
+            from deadtime._cli.readable import make_readable
 
         make_readable()
         run()
-    except KeyboardInterrupt:  # also while the rest is still being imported
-        print("deadtime: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    except KeyboardInterrupt:
+        print(SAID, file=sys.stderr)
+        raise SystemExit(INTERRUPTED) from None

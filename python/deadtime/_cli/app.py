@@ -12,16 +12,13 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from deadtime._base.errors import DeadtimeError
+from deadtime._cli.interruption import INTERRUPTED, ended_by_ctrl_c
 
 #: Errors that end a command with one line; any other is a defect and prints its traceback.
 FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 
 #: Exit code after a defect: that of an error within a program, as `sysexits.h` has it.
 DEFECT = 70
-
-#: Exit code after Ctrl-C.
-INTERRUPTED = 130
-
 
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
@@ -56,7 +53,8 @@ class _Commands(TyperGroup):
 
 def _loaded(name: str) -> Any:
     """Import a command."""
-    found = importlib.import_module(f"deadtime._cli.{name.replace('-', '_')}").command
+    with ended_by_ctrl_c():
+        found = importlib.import_module(f"deadtime._cli.{name.replace('-', '_')}").command
     if isinstance(found, typer.Typer):
         return get_command(found)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)

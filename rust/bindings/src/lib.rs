@@ -10,6 +10,7 @@ mod estimation;
 mod fixed_step;
 mod frequency;
 mod held;
+mod loading;
 mod matrix;
 mod online;
 mod pointers;
@@ -91,7 +92,7 @@ mod _deadtime {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        super::special::add_ufuncs(module)?;
+        super::loading::load_numpy(module.py(), || super::special::add_ufuncs(module))?;
         super::pointers::add_pointers(module)
     }
 }

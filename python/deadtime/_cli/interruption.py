@@ -1,0 +1,37 @@
+"""Ctrl-C while modules are imported."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+#: Exit code after Ctrl-C.
+INTERRUPTED = 130
+
+#: What a command says when Ctrl-C ends it.
+SAID = "deadtime: interrupted"
+
+
+@contextmanager
+def ended_by_ctrl_c() -> Iterator[None]:
+    """End the process at once on Ctrl-C; nothing is lost while modules are imported.
+
+    An exception in the middle of an import may become one of another kind, or be ignored.
+    """
+    plain = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if not plain or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> None:
+        os.write(2, f"{SAID}\n".encode())
+        os._exit(INTERRUPTED)
+
+    signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
