@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from deadtime import paper
 from deadtime._base.drawing import new_figure
-from deadtime._cli.fly import emulated_drone
+from deadtime._cli.vehicles import emulated_drone
 from deadtime.estimation import Waveform
 from deadtime.flights import FlightPlan, fly_experiment
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry

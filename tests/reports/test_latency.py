@@ -11,6 +11,8 @@ from deadtime._base.digits import between, rounded, shown, stated
 from deadtime.reports.latencies._axes import doubted_by_axes
 from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
 from deadtime.reports.latencies._live import around_the_vehicle
+from deadtime.reports.latencies._relation import relation_of
+from deadtime.reports.latencies._windows import others_of, window_of
 from flights import flight_path
 from hypothesis import given
 from hypothesis import strategies as st
@@ -314,3 +316,41 @@ def test_ends_of_an_interval_have_them_too():
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6))
 def test_what_is_left_out_is_less_than_the_error(value, error):
     assert abs(float(rounded(value, error)) - value) <= 0.25 * error + 1e-11
+
+
+def window_from(start, delay, seed):
+    """Twelve seconds of a vehicle with a lag of 0.08 s that follows steps."""
+    time = start + 0.01 * np.arange(1200)
+    told = 0.2 * np.sign(np.sin(3.7 * (time - start)))
+    vehicle = dtm.FactoredPlant([0.08]).transfer_function() * dtm.delay(delay)
+    angle = np.ravel(vehicle.simulate(time - start, told).outputs)
+    noise = 0.003 * np.random.default_rng(seed).standard_normal(time.size)
+    return window_of(dtm.Recording(time, told, angle + noise, told), integrates=False)
+
+
+def test_a_window_that_contradicts_the_estimate_makes_it_doubtful():
+    used, alike, later = (window_from(20.0 * k, (0.03, 0.03, 0.04)[k], k) for k in range(3))
+
+    def estimate(*others):
+        found = relation_of("roll", "roll", "attitude", "setpoint", False, [used], others=others)
+        return found.estimate
+
+    assert estimate(alike).adequate
+    doubted = estimate(alike, later)
+    assert not doubted.adequate
+    why = "the window from 40.0 to 52.0 s of the log contradicts it: delay and lag are 119.8"
+    assert why in doubted.message
+
+
+def test_windows_that_share_rows_are_not_compared():
+    best, second, third, fourth = (window_from(6.0 * k, 0.03, k) for k in range(4))
+    assert others_of([best, second, third, fourth], [best]) == [third]
+    assert others_of([best, third._replace(promise=np.inf, explained=0.0)], [best]) == []
+
+
+def test_a_turn_that_takes_longer_makes_a_recorded_flight_doubtful():
+    """Most of the flight fits 0.25 s, a window of it 0.35 s and more."""
+    flight = dtm.latency(flight_path("arducopter_2014-10-18_21-19-07.bin"), loops=["roll"])
+    roll = flight.loop("roll").estimate
+    assert not roll.adequate
+    assert "the window from 47.5 to 51.4 s of the log contradicts it" in roll.message

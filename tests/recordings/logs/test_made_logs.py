@@ -198,8 +198,8 @@ def test_a_log_that_was_begun_in_the_air_was_armed_before_it_was_disarmed(
     assert loop.why_left_out == ("1 s are left out: the vehicle is disarmed",)
 
 
-def flying(rows=400, period=0.02):
-    """A ULog of a vehicle in the air, in position control."""
+def flying(**further):
+    """A ULog of a vehicle in the air, in position control; topics may be added."""
     log = ULogFile()
     log.info("char[3]", "sys_name", b"PX4")
     log.parameter("MC_ROLLRATE_P", 0.15)
@@ -210,6 +210,7 @@ def flying(rows=400, period=0.02):
             "vehicle_local_position": ("z", "vz"),
             "vehicle_local_position_setpoint": ("z", "vz"),
             "vehicle_status": ("arming_state", "nav_state"),
+            **further,
         }
     )
     return log
@@ -229,6 +230,25 @@ def test_a_copy_of_the_estimate_is_left_out(opened):
     loop = opened(log).loops["vertical speed"]
     assert np.array(loop.segments) == pytest.approx(np.array([(0.0, 3.0), (5.0, 7.98)]), abs=0.05)
     assert loop.why_left_out == ("1.98 s are left out: the setpoint is a copy of the estimate",)
+
+
+def test_lift_off_and_touch_down_are_left_out(opened):
+    # For the autopilot in the air from 2 s, with full thrust from 4 s; it notices the landing
+    # at 8 s, as late as 2.5 s after it.
+    log = flying(vehicle_land_detected=("landed",), takeoff_status=("takeoff_state",))
+    log.add("vehicle_status", 1.0, 2.0, 2.0)
+    for at, landed, state in ((1.0, 1, 2), (2.0, 0, 4), (4.0, 0, 5), (8.0, 1, 3)):
+        log.add("vehicle_land_detected", at, landed)
+        log.add("takeoff_status", at, state)
+    for k in range(400):
+        at = 1.0 + 0.02 * k
+        log.add("vehicle_local_position", at, 0.0, np.sin(0.1 * k))
+        log.add("vehicle_local_position_setpoint", at, np.nan, 0.5 * (k // 20 % 2))
+    loop = opened(log).loops["vertical speed"]
+    assert np.array(loop.segments) == pytest.approx(np.array([(3.0, 4.5)]), abs=0.03)
+    ground, thrust = loop.why_left_out
+    assert ground.endswith("the vehicle is on the ground or touches down")
+    assert thrust.endswith("the thrust is raised for take-off")
 
 
 def test_a_setpoint_that_rests_on_coarse_values_is_no_copy(opened):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from deadtime.recordings.logs._ardupilot_modes import HORIZONTAL, UNCONTROLLED, VERTICAL
-from deadtime.recordings.logs._conditions import in_modes, not_in_modes, state
+from deadtime.recordings.logs._conditions import in_modes, in_the_air, not_in_modes, state
 from deadtime.recordings.logs._contents import LogContents
 from deadtime.recordings.logs._names import AutopilotNames, Condition, LoopNames, Signal
 from deadtime.recordings.logs._rotations import unwrapped
@@ -14,7 +14,8 @@ DEGREE = np.pi / 180.0
 
 ARMED = Condition(state("armed", "state", lambda values: values > 0), "the vehicle is disarmed")
 IN_THE_AIR = Condition(
-    state("landed", "state", lambda values: values == 0), "the vehicle is on the ground"
+    in_the_air("landed", "state", lambda values: values == 0),
+    "the vehicle is on the ground or touches down",
 )
 CONTROLLED = Condition(not_in_modes(UNCONTROLLED), "the mode does not close it")
 HELD_HEIGHT = Condition(in_modes(VERTICAL), "the mode does not close it")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from deadtime.recordings.logs._ardupilot_modes import HORIZONTAL as ARDUPILOT_HORIZONTAL
 from deadtime.recordings.logs._ardupilot_modes import UNCONTROLLED
 from deadtime.recordings.logs._ardupilot_modes import VERTICAL as ARDUPILOT_VERTICAL
-from deadtime.recordings.logs._conditions import in_modes, not_in_modes, state
+from deadtime.recordings.logs._conditions import in_modes, in_the_air, not_in_modes, state
 from deadtime.recordings.logs._contents import Array
 from deadtime.recordings.logs._names import Condition, LoopNames, Signal
 from deadtime.recordings.logs._px4_modes import HORIZONTAL as PX4_HORIZONTAL
@@ -27,8 +27,8 @@ FLYING = (
         "the vehicle is disarmed",
     ),
     Condition(
-        state("EXTENDED_SYS_STATE", "landed_state", lambda values: values != ON_GROUND),
-        "the vehicle is on the ground",
+        in_the_air("EXTENDED_SYS_STATE", "landed_state", lambda values: values != ON_GROUND),
+        "the vehicle is on the ground or touches down",
     ),
 )
 ATTITUDE = (*FLYING, Condition(not_in_modes(UNCONTROLLED), "the mode does not close it"))

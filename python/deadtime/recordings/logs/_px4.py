@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.recordings.logs._conditions import first_told, in_modes, not_in_modes, state
+from deadtime.recordings.logs._conditions import (
+    first_told,
+    in_modes,
+    in_the_air,
+    not_in_modes,
+    state,
+)
 from deadtime.recordings.logs._contents import Array, LogContents
 from deadtime.recordings.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
 from deadtime.recordings.logs._px4_modes import HORIZONTAL, VERTICAL
@@ -18,6 +24,9 @@ DEMANDED = ("q_d[0]", "q_d[1]", "q_d[2]", "q_d[3]")
 
 #: ``vehicle_status.arming_state`` of an armed vehicle, in all versions.
 ARMED = 2
+
+#: ``takeoff_status.takeoff_state`` while the thrust is raised until the vehicle lifts off.
+RAMP_UP = 4
 
 
 def _is_set(values: Array) -> NDArray[np.bool_]:
@@ -33,8 +42,12 @@ FLYING = (
         "the vehicle is disarmed",
     ),
     Condition(
-        state("vehicle_land_detected", "landed", lambda values: values == 0),
-        "the vehicle is on the ground",
+        in_the_air("vehicle_land_detected", "landed", lambda values: values == 0),
+        "the vehicle is on the ground or touches down",
+    ),
+    Condition(
+        state("takeoff_status", "takeoff_state", lambda values: values != RAMP_UP),
+        "the thrust is raised for take-off",
     ),
 )
 

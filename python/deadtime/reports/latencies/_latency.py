@@ -33,6 +33,7 @@ from deadtime.reports.latencies._relation import LoopLatency, doubted_by_clocks,
 from deadtime.reports.latencies._windows import (
     Window,
     best_of,
+    others_of,
     parts_of,
     rows_of_a_window,
     seen_windows,
@@ -255,8 +256,9 @@ def latency(
 
     Where command and response are stamped by clocks that drift apart, by more than a tenth of the
     interval over the log, the estimate is not adequate. The time of each window over the log tells
-    that, and stamps that are regular. Nor are those of north and east whose intervals lie apart by
-    more than a factor of two.
+    that, and stamps that are regular. Nor is an estimate adequate if one of the two next best
+    windows, fitted by itself, contradicts it, nor those of north and east whose intervals lie apart
+    by more than a factor of two.
 
     Examples
     --------
@@ -390,7 +392,7 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
             unsure = math.hypot(unsure, smeared(log, loop.kind, told, *first))
     found = relation_of(
         loop.name, loop.axis, loop.kind, command, integrates, windows, between,
-        held if between is None else None, hidden, unsure,
+        held if between is None else None, hidden, unsure, others_of(seen, windows),
     )  # fmt: skip
     named = ((one.source, one.time) for one in (told, loop.response))
     return doubted_by_clocks(found, [one for one in seen if one.tells], *named)

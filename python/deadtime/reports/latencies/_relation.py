@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -19,6 +19,7 @@ from deadtime.recordings import Recording
 from deadtime.reports.latencies._clocks import Stamped, why_two_clocks
 from deadtime.reports.latencies._controller import Between, Command
 from deadtime.reports.latencies._cost import GainCost, cost_of
+from deadtime.reports.latencies._elsewhere import TWO_SIDED, contradiction
 from deadtime.reports.latencies._windows import LONGEST, OF_A_ROW, Window
 
 #: The second lag that is tried, as a share of the first.
@@ -36,9 +37,6 @@ LACKING, CONTRADICT = "a further lag of", "the recordings contradict one another
 
 #: Intervals of the other numbers are computed when they are asked for.
 METHOD = OutputError(intervals="sum")
-
-#: Half of a 95 % interval in standard errors.
-TWO_SIDED = 1.96
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +136,14 @@ def relation_of(
     held: Callable[[Window], Recording] | None = None,
     hidden: float = 0.0,
     unsure: float = 0.0,
+    others: Sequence[Window] = (),
 ) -> LoopLatency:
     """Fit the plant of a loop to its windows, or say why that tells nothing.
 
     Where it is not known whether commands hold or move between rows, `held` gives a window with
     commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not adequate,
-    nor one whose interval is narrow against `unsure`, s, by which commands may hold longer or less.
+    nor one whose interval is narrow against `unsure`, s, by which commands may hold longer or less,
+    nor one that `others` contradict.
     """
     ends = _ends_of(windows)
     told = [one for one in windows if one.tells]
@@ -157,7 +157,7 @@ def relation_of(
     if not told:
         return refused(_says_nothing(windows[0], command))
     try:
-        fit = _fitted(told, integrates, held)
+        fit = _fitted(told, integrates, held, others)
     except DeadtimeError as error:
         return refused(str(error).partition("; check ")[0])
     if why := _no_answer(fit, told[0]):
@@ -228,7 +228,10 @@ def _says_nothing(window: Window, command: str) -> str:
 
 
 def _fitted(
-    windows: list[Window], integrates: bool, held: Callable[[Window], Recording] | None
+    windows: list[Window],
+    integrates: bool,
+    held: Callable[[Window], Recording] | None,
+    others: Sequence[Window],
 ) -> DelayEstimate:
     """The plant that fits all windows, or the first of them where they contradict one another."""
     first = max(0.5 * windows[0].time, windows[0].recording.sample_time)
@@ -259,7 +262,7 @@ def _fitted(
             pass
         return found[likeliest(found)]
 
-    parts = [one.recording for one in windows]
+    parts, beside = ([one.recording for one in some] for some in (windows, others))
     fit, doubt = tried(parts[:1], lagging(first)), ""
     if held is not None:
         still = tried([held(windows[0])], lagging(first))
@@ -267,20 +270,23 @@ def _fitted(
         if abs(better) < CLEARLY:
             doubt = _either(fit, still)
         if better > 0.0:
-            fit, parts = still, [held(one) for one in windows]
+            fit = still
+            parts, beside = ([held(one) for one in some] for some in (windows, others))
     if doubt:
         return doubted(fit, doubt)
     fit = richer(parts[:1], fit)
     # What the plant lacks in one window it lacks in all together.
-    if len(parts) == 1 or not fit.adequate:
-        return fit
-    try:
-        together = tried(parts, cast(FactoredPlant, fit.loop.plant))
-    except NotIdentifiableError:
-        return fit
-    reasons = together.message.partition(" (try ")[0].split("; ")
-    apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
-    return doubted(fit, "; ".join(apart)) if apart else richer(parts, together)
+    if len(parts) > 1 and fit.adequate:
+        try:
+            together = tried(parts, cast(FactoredPlant, fit.loop.plant))
+        except NotIdentifiableError:
+            return fit
+        reasons = together.message.partition(" (try ")[0].split("; ")
+        apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
+        fit = doubted(fit, "; ".join(apart)) if apart else richer(parts, together)
+    if fit.adequate and (why := contradiction(fit, beside, METHOD)):
+        return doubted(fit, why)
+    return fit
 
 
 def doubted(fit: DelayEstimate, why: str) -> DelayEstimate:

@@ -46,6 +46,9 @@ LONGEST = 0.2
 #: Further windows that are used with the best, and by how much less they may promise.
 FURTHER, LESS = 2, 3.0
 
+#: Windows that are compared with those.
+COMPARED = 2
+
 #: A window says something if it promises the time to this share of itself, or of a row.
 SHARE, OF_A_ROW = 0.5, 2.0
 
@@ -116,6 +119,15 @@ def best_of(found: Sequence[Window]) -> list[Window]:
         if len(chosen) > FURTHER:
             break
     return chosen
+
+
+def others_of(found: Sequence[Window], chosen: Sequence[Window]) -> list[Window]:
+    """The windows beside those to fit that promise the most, which are to agree with them."""
+    apart: list[Window] = list(chosen)
+    for one in found:
+        if one.tells and all(one.stop <= other.start or one.start >= other.stop for other in apart):
+            apart.append(one)
+    return apart[len(chosen) :][:COMPARED]
 
 
 def window_of(recording: Recording, integrates: bool) -> Window:
