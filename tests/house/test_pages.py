@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import re
+import runpy
 from pathlib import Path
 
 import deadtime as dtm
@@ -86,3 +87,10 @@ def test_each_promise_names_a_test_or_survey_that_exists():
             assert re.search(rf"\b(?:def|fn) {name}\b", source), f"{path} has no {name}"
     for path in re.findall(r"`python ([\w/]+\.py)\b", text):
         assert (ROOT / path).is_file(), f"no survey {path}"
+
+
+@pytest.mark.parametrize("script", sorted(DOCS.glob("*.py")), ids=lambda path: path.name)
+def test_the_scripts_of_the_pages_find_what_they_import(script):
+    for needed in ("matplotlib", "sphinx"):
+        pytest.importorskip(needed)
+    runpy.run_path(str(script), run_name="imported")
