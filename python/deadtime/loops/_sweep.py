@@ -350,8 +350,8 @@ class _Sets:
     def measured(self, times: Vector, progress: Report | None = None) -> Sweep:
         """Metrics; sets of which the poles have to tell whether they have settled are _DOUBTFUL."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
-        # One piece of memory, which is reused by the next sweep; many would be given back to the
-        # system and cleared by it again, at a quarter of the cost of a sweep.
+        # One piece of memory, which the next sweep uses again; many would be given back to the
+        # system and cleared by it each time, at a tenth of the cost of a sweep.
         metrics = dict(zip(_METRICS, np.empty((len(_METRICS), count)), strict=True))
         status = np.empty(count, dtype=np.uint8)
         for place, numbers, sets, report in self.blocks(progress):

@@ -47,8 +47,7 @@ impl<S: Simd> Measured<S> {
             dip: nan,
         };
         let mut counts = zero;
-        for lane in 0..zero.numbers().len() {
-            let level = &levels[lane];
+        for (lane, level) in levels.iter().enumerate().take(zero.numbers().len()) {
             out.sign.numbers_mut()[lane] = level.sign;
             out.steady.numbers_mut()[lane] = level.steady;
             out.band.numbers_mut()[lane] = level.band;

@@ -168,7 +168,8 @@ impl<'a> Shapes<'a> {
         let &[.., d, _, delay, sample_time, limit] = &*self.row else {
             return None;
         };
-        if !fits || !(limit > 0.0) {
+        fits &= limit > 0.0;
+        if !fits {
             return None;
         }
         if sample_time == 0.0 {

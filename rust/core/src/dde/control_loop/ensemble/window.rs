@@ -3,11 +3,6 @@
 //! Each loop has a range of parts of its own. Some parts of all ranges are read side by side, and a
 //! test is made of them without a branch.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "indices as in the formulas; closures would not be compiled for the vectors"
-)]
-
 use crate::simd::{Lanes, Mask, Outlined, Real, Simd, flat, flat_mut};
 
 use super::trace::{Trace, WINDOW};
