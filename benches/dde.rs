@@ -5,10 +5,10 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
-use deadtime::dde::ensemble::{self, Sets};
+use deadtime::dde::ensemble::{self, Measures, Sets};
 use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
 use deadtime::dde::sampled::{self, LoopCells};
-use deadtime::dde::{Criteria, Equations, LinearLoop, Metrics, Reference, Start};
+use deadtime::dde::{Criteria, Equations, LinearLoop, Reference, Start};
 
 const DELAY: f64 = 0.36;
 const SAMPLE_TIME: f64 = 0.065;
@@ -197,7 +197,11 @@ fn sweeps(criterion: &mut Criterion) {
             let task = Task::new();
             let mut overshoots = vec![0.0; count];
             bencher.iter(|| {
-                let keep = |set: usize, metrics: &Metrics, _| overshoots[set] = metrics.overshoot;
+                let keep = |sets: &[usize], measures: &Measures| {
+                    for (&set, overshoot) in sets.iter().zip(measures.metrics[3]) {
+                        overshoots[set] = overshoot;
+                    }
+                };
                 let numbers: (&[f64], &[f64]) = (&[1.0], &[0.0]);
                 ensemble::metrics(black_box(&sets), numbers, 10.0, &criteria, &task, keep)
             });

@@ -85,6 +85,12 @@ def vector(entries: Sequence[Any]) -> NDArray[Any]:
     """Array of the entries."""
     if not entries:
         return _NO_VECTOR
+    if any(type(entry) is Each for entry in entries):
+        # NumPy would ask each of these whether it is an array.
+        array = np.empty(len(entries), dtype=object)
+        for place, entry in enumerate(entries):
+            array[place] = entry
+        return array
     array = np.array(entries)
     if array.dtype is _FLOAT or array.dtype.kind in "cO":
         return array

@@ -25,6 +25,11 @@ Vector = NDArray[np.float64]
 TIME_CONSTANTS = 3.0
 
 
+def _any(values: Any) -> bool:
+    """Whether a number, or any of an array, is not zero."""
+    return bool(values.any() if isinstance(values, np.ndarray) else values)
+
+
 def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Vector:
     """Upper bound in s on 1/abs(root) of plant and controller, except for roots at zero.
 
@@ -33,17 +38,20 @@ def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Vect
     longest: Any = 0.0
     parts = (*loop.plant._polynomials(numbers), *loop.controller._feedback(numbers))
     for coefficients in parts:
-        rising = [np.abs(c) for c in coefficients[::-1]]
+        rising = [abs(c) for c in coefficients[::-1]]
         open_: Any = True
         for low, c in enumerate(rising[:-1]):
             # c_0 is the first coefficient that is not zero: lower powers are roots at zero.
             here = open_ & (c > 0.0)
             for k, other in enumerate(rising[low + 1 :], 1):
-                if not np.any(other):
+                if not (_any(here) and _any(other)):
                     continue
-                ratio = np.where(here, other, 0.0) / np.where(here, c, 1.0)
+                if here is True:
+                    ratio = other / c
+                else:
+                    ratio = np.where(here, other, 0.0) / np.where(here, c, 1.0)
                 longest = np.maximum(longest, 2.0 * ratio ** (1.0 / k))
             open_ = open_ & (c == 0.0)
-            if not np.any(open_):
+            if not _any(open_):
                 break
     return float(longest) if np.ndim(longest) == 0 else np.asarray(longest)

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use deadtime::dde::ensemble::{self, Outcome, Sets};
+use deadtime::dde::Criteria;
+use deadtime::dde::ensemble::{self, Measures, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
-use deadtime::dde::{Criteria, Metrics};
 use deadtime::stability::abscissae;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray1,
@@ -19,19 +19,23 @@ type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 type Columns<'py> = Vec<PyReadwriteArray1<'py, f64>>;
 
-/// The metrics of a response in the order of the columns that they are written to.
-fn in_columns(metrics: &Metrics) -> [f64; 9] {
-    [
-        metrics.rise_time,
-        metrics.settling_time,
-        metrics.peak_time,
-        metrics.overshoot,
-        metrics.undershoot,
-        metrics.settling_min,
-        metrics.settling_max,
-        metrics.peak,
-        metrics.steady_state,
-    ]
+/// Write the first of `values` to the places of `sets`, which increase.
+fn put(column: &mut [f64], sets: &[usize], values: &[f64]) {
+    let (Some(&first), Some(&last)) = (sets.first(), sets.last()) else {
+        return;
+    };
+    if last - first + 1 == sets.len()
+        && let (Some(places), Some(values)) =
+            (column.get_mut(first..=last), values.get(..sets.len()))
+    {
+        places.copy_from_slice(values);
+        return;
+    }
+    for (&set, value) in sets.iter().zip(values) {
+        if let Some(place) = column.get_mut(set) {
+            *place = *value;
+        }
+    }
 }
 
 /// Loops of one structure, and the step of their reference.
@@ -122,14 +126,14 @@ pub(crate) fn sweep_metrics<'py>(
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     let status = status.as_slice_mut()?;
     run(py, threads, progress.as_ref(), |task| {
-        let keep = |set: usize, metrics: &Metrics, outcome: Outcome| {
-            for (column, metric) in columns.iter_mut().zip(in_columns(metrics)) {
-                if let Some(place) = column.get_mut(set) {
-                    *place = metric;
-                }
+        let keep = |sets: &[usize], measures: &Measures| {
+            for (column, metrics) in columns.iter_mut().zip(&measures.metrics) {
+                put(column, sets, metrics);
             }
-            if let Some(place) = status.get_mut(set) {
-                *place = outcome as u8;
+            for (&set, outcome) in sets.iter().zip(measures.outcomes()) {
+                if let Some(place) = status.get_mut(set) {
+                    *place = outcome as u8;
+                }
             }
         };
         ensemble::metrics(&sets, (&steady, &slowest), span, &criteria, task, keep)

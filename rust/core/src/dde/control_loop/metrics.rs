@@ -48,9 +48,34 @@ impl Metrics {
         steady_state: f64::NAN,
     };
 
-    /// In the order of the fields.
     #[cfg(test)]
-    pub(crate) fn to_array(self) -> [f64; 9] {
+    pub(crate) fn from_array(fields: [f64; 9]) -> Self {
+        let [
+            rise_time,
+            settling_time,
+            peak_time,
+            overshoot,
+            undershoot,
+            settling_min,
+            settling_max,
+            peak,
+            steady_state,
+        ] = fields;
+        Self {
+            rise_time,
+            settling_time,
+            peak_time,
+            overshoot,
+            undershoot,
+            settling_min,
+            settling_max,
+            peak,
+            steady_state,
+        }
+    }
+
+    /// In the order of the fields.
+    pub fn to_array(self) -> [f64; 9] {
         [
             self.rise_time,
             self.settling_time,

@@ -139,7 +139,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
         let (terms, per_sample) = (loops.degree + 1, trace.per_sample);
         let mut part = trace.samples * per_sample;
         let after = part + CHUNK * per_sample;
-        longer(&mut trace.outputs, after, zero.lanes());
+        longer(&mut trace.outputs, after + 1, zero.lanes());
         longer(&mut trace.bulges, after, zero.lanes());
         longer(&mut trace.pieces, after * terms, zero.lanes());
         let mut summary = Summary {
@@ -173,7 +173,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
                 self.lost = self.lost | (begin.lt(loops.end) & !is_sound(&self.x, zero));
                 self.output = row(&loops.c, &self.x, zero);
                 if let (Some(output), Some(place)) =
-                    (trace.outputs.get_mut(part), trace.bulges.get_mut(part))
+                    (trace.outputs.get_mut(part + 1), trace.bulges.get_mut(part))
                 {
                     (*output, *place) = (self.output.lanes(), bulge.lanes());
                 }
@@ -257,6 +257,8 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
         };
         let plants = &loops.plants;
         trace.per_sample = plants.parts.len();
+        (trace.jump, trace.is_curved) = (plants.jump, true);
+        trace.is_continuous = true;
         trace.commands.clear();
         let numbers = trace.per_sample * (plants.degree + 1);
         longer(&mut trace.commands, numbers, plants.zero);

@@ -7,9 +7,6 @@ use crate::simd::{Mask, Outlined, Real, Simd, outlined};
 use super::block::{Block, Number};
 use super::transition::{Map, Matrix, Over, row, scaled};
 
-/// Terms of the bound on the second derivative: as many as the series of a part needs.
-const TERMS: u32 = 20;
-
 /// A part of a sample, on which the command that reaches the plant is constant.
 #[derive(Clone, Copy)]
 pub(super) struct Part<S: Simd, const P: usize> {
@@ -81,6 +78,8 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) no_lane: Mask<S>,
     /// Is D not zero?
     pub(super) is_direct: bool,
+    /// The number, within a sample, of the part that is the jump of the output; of no part if D = 0.
+    pub(super) jump: usize,
     /// Is the output the first state, D left out?
     pub(super) is_first: bool,
     /// Does the reference reach the plant other than through the command?
@@ -185,8 +184,8 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
                 *term = *term + *start;
             }
             let mut sum = absolute(&term);
-            for j in 1..=TERMS {
-                let factor = part.length * (1.0 / f64::from(j));
+            for j in 1..=plants.degree {
+                let factor = part.length * (1.0 / j as f64);
                 term = scaled(&along(&term, &plants.a), factor);
                 for (sum, term) in sum.iter_mut().zip(&term) {
                     *sum = *sum + term.abs();
@@ -244,6 +243,11 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             zero,
             no_lane: zero.lt(0.0),
             is_direct: shape.jumps,
+            jump: if shape.jumps {
+                usize::from(shape.early)
+            } else {
+                usize::MAX
+            },
             is_first: shape.is_first,
             is_pushed: shape.is_pushed,
             bulge: [zero; P],
@@ -262,6 +266,16 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             now.le(self.end + rounding).any()
         } else {
             now.lt(self.end).any()
+        }
+    }
+
+    /// C x.
+    #[inline(always)]
+    pub(super) fn seen(&self, x: &[Real<S>; P]) -> Real<S> {
+        if self.is_first {
+            x[0]
+        } else {
+            row(&self.c, x, self.zero)
         }
     }
 

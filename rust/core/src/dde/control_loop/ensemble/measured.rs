@@ -1,83 +1,88 @@
-//! What is known of one response while its trace is searched.
+//! What is known of the responses of two vectors while their traces are searched.
 
 use crate::dde::control_loop::metrics::{Levels, Record};
+use crate::simd::{Mask, Real, Simd};
 
-/// What is known of one response.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Measured {
-    pub(super) levels: Levels,
-    pub(super) record: Record,
-    /// Least output after the rise, times the sign of the step.
-    pub(super) dip: f64,
-    pub(super) stage: Stage,
-    /// The part or place at which the stage continues.
-    pub(super) at: usize,
-}
+use super::block::SETS;
+use super::trace::of;
 
-impl Measured {
-    /// Nothing yet, of a response that begins at `first`.
-    pub(super) fn new(levels: Levels, first: f64) -> Self {
-        let is_inside = (first - levels.steady).abs() <= levels.band;
-        Self {
-            levels,
-            record: Record {
-                top: (first, 0.0),
-                bottom: (first, 0.0),
-                risen: (f64::NAN, f64::NAN),
-                after: (f64::NAN, f64::NAN),
-                inside_since: if is_inside { 0.0 } else { f64::NAN },
-                unsettled_until: 0.0,
-            },
-            dip: f64::NAN,
-            stage: Stage::Top,
-            at: 0,
-        }
-    }
-
-    pub(super) fn dip(&self) -> f64 {
-        self.dip
-    }
-
+/// What is known of responses.
+pub(super) struct Measured<S: Simd> {
+    /// The responses that count.
+    pub(super) counts: Mask<S>,
+    pub(super) sign: Real<S>,
+    pub(super) steady: Real<S>,
+    pub(super) band: Real<S>,
+    pub(super) quiet_band: Real<S>,
     /// Levels of the rise, in the direction of the step.
-    pub(super) fn level(&self, is_end: bool) -> f64 {
-        if is_end {
-            self.levels.rise.1
-        } else {
-            self.levels.rise.0
+    pub(super) levels: [Real<S>; 2],
+    /// The fields of [`Record`].
+    pub(super) top: (Real<S>, Real<S>),
+    pub(super) bottom: (Real<S>, Real<S>),
+    pub(super) risen: [Real<S>; 2],
+    pub(super) inside_since: Real<S>,
+    pub(super) unsettled_until: Real<S>,
+    /// Least output after the rise, times the sign of the step.
+    pub(super) dip: Real<S>,
+}
+
+impl<S: Simd> Measured<S> {
+    /// Nothing yet, of responses that begin at `first`, of which the first `count` ones count.
+    #[inline(always)]
+    pub(super) fn new(levels: &[Levels; SETS], first: Real<S>, count: usize) -> Self {
+        let zero = first.constant(0.0);
+        let nan = zero.constant(f64::NAN);
+        let mut out = Self {
+            counts: zero.lt(0.0),
+            sign: zero,
+            steady: zero,
+            band: zero,
+            quiet_band: zero,
+            levels: [zero; 2],
+            top: (first, zero),
+            bottom: (first, zero),
+            risen: [nan; 2],
+            inside_since: nan,
+            unsettled_until: zero,
+            dip: nan,
+        };
+        let mut counts = zero;
+        for (lane, level) in levels.iter().enumerate().take(zero.numbers().len()) {
+            out.sign.numbers_mut()[lane] = level.sign;
+            out.steady.numbers_mut()[lane] = level.steady;
+            out.band.numbers_mut()[lane] = level.band;
+            out.quiet_band.numbers_mut()[lane] = level.quiet_band;
+            out.levels[0].numbers_mut()[lane] = level.rise.0;
+            out.levels[1].numbers_mut()[lane] = level.rise.1;
+            counts.numbers_mut()[lane] = f64::from(u8::from(lane < count));
+        }
+        out.counts = counts.gt(0.0);
+        let is_inside = (first - out.steady).abs().le(out.band);
+        out.inside_since = is_inside.select(0.0, nan);
+        out
+    }
+
+    /// The outputs that are outside the band.
+    #[inline(always)]
+    pub(super) fn are_outside(&self, y: Real<S>) -> Mask<S> {
+        (y - self.steady).abs().gt(self.band)
+    }
+
+    /// The record of a response in the end.
+    pub(super) fn record(&self, lane: usize) -> Record {
+        let (top, bottom) = (of(&self.top.0, lane), of(&self.bottom.0, lane));
+        let dip = of(&self.dip, lane);
+        Record {
+            top: (top, of(&self.top.1, lane)),
+            bottom: (bottom, of(&self.bottom.1, lane)),
+            risen: (of(&self.risen[0], lane), of(&self.risen[1], lane)),
+            after: if of(&self.sign, lane) > 0.0 {
+                (dip, top)
+            } else {
+                (bottom, -dip)
+            },
+            inside_since: of(&self.inside_since, lane),
+            unsettled_until: of(&self.unsettled_until, lane),
         }
     }
-
-    pub(super) fn is_outside(&self, y: f64) -> bool {
-        (y - self.levels.steady).abs() > self.levels.band
-    }
-
-    /// The record in the end.
-    pub(super) fn finished(mut self) -> Self {
-        let record = &mut self.record;
-        record.after = if self.levels.sign > 0.0 {
-            (self.dip, record.top.0)
-        } else {
-            (record.bottom.0, -self.dip)
-        };
-        self
-    }
-}
-
-/// What is looked for, one after the other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
-    Top,
-    Bottom,
-    Rise(bool),
-    Dip,
-    Band,
-    Done,
-}
-
-/// What has to be known of a part to continue.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Wanted {
-    Extremum,
-    /// Where it passes through a level.
-    Crossing(f64),
 }

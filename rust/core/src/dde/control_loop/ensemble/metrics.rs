@@ -3,11 +3,12 @@
 use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics};
 use crate::simd::{Real, Simd};
 
+use super::block::SETS;
 use super::each::{TIME_CONSTANTS, judged};
 use super::loops::Plants;
 use super::measured::Measured;
 use super::rounds::measure;
-use super::sets::{Outcome, of as number};
+use super::sets::{Measures, Outcome, of as number};
 use super::through::Job;
 use super::trace::{Trace, of};
 use super::view::View;
@@ -24,7 +25,11 @@ pub(super) struct MetricsJob<'a> {
 }
 
 impl Job for MetricsJob<'_> {
-    type Found = (Metrics, Outcome);
+    type Found = Measures;
+
+    fn done(found: &Measures) -> usize {
+        found.outcomes.iter().flatten().count()
+    }
 
     #[inline(always)]
     fn found<S: Simd, const P: usize>(
@@ -33,7 +38,7 @@ impl Job for MetricsJob<'_> {
         run: &mut dyn Run<S>,
         members: &[usize],
         trace: &mut Trace<S>,
-        found: &mut Vec<Option<Self::Found>>,
+        found: &mut Vec<Self::Found>,
     ) {
         let zero = loops.d.constant(0.0);
         let mut steady = zero;
@@ -60,17 +65,13 @@ impl Job for MetricsJob<'_> {
             steady = is_known.select(steady, last);
         }
         let first = loops.first_output;
-        let mut lanes: Vec<Measured> = members
-            .iter()
-            .enumerate()
-            .map(|(lane, _)| {
-                let first = of(&first, lane);
-                let levels = Levels::new(first, of(&steady, lane), &self.criteria);
-                Measured::new(levels, first)
-            })
-            .collect();
+        let levels: [Levels; SETS] = std::array::from_fn(|lane| {
+            let lane = lane.min(zero.numbers().len() - 1);
+            Levels::new(of(&first, lane), of(&steady, lane), &self.criteria)
+        });
+        let mut measured = Measured::new(&levels, first, members.len());
         while runs {
-            measure(&View { loops, trace }, &mut lanes);
+            measure(&View { loops, trace }, &mut measured);
             runs = run.advance(trace);
             if runs {
                 close(loops, trace);
@@ -78,33 +79,31 @@ impl Job for MetricsJob<'_> {
         }
         let lost = run.lost().select(1.0, zero);
         let unfit = run.unfit().select(1.0, zero);
-        let begin = found.len();
+        let mut measures = Measures::new();
         let mut radius = zero;
         let mut is_doubtful = false;
-        for (lane, measured) in lanes.into_iter().enumerate() {
+        let wait = loops.wait();
+        for (lane, (&set, levels)) in members.iter().zip(&levels).enumerate() {
             if of(&unfit, lane) > 0.0 {
-                found.push(None);
+                measures.push(&Metrics::UNKNOWN, None);
                 continue;
             }
             if of(&lost, lane) > 0.0 {
-                found.push(Some((Metrics::UNKNOWN, Outcome::Diverged)));
+                measures.push(&Metrics::UNKNOWN, Some(Outcome::Diverged));
                 continue;
             }
             let ahead = of(&loops.ahead, lane);
-            let levels = measured.levels;
-            let mut record = measured.finished().record;
+            let mut record = measured.record(lane);
             for time in [&mut record.top.1, &mut record.bottom.1] {
                 *time = (*time - ahead).max(0.0);
             }
             record.risen = (since(record.risen.0, ahead), since(record.risen.1, ahead));
             record.inside_since = since(record.inside_since, ahead);
             record.unsettled_until -= ahead;
-            let stays = record.stays_settled(self.span, of(&loops.wait(), lane));
-            let (metrics, mut outcome) = judged(record.metrics(&levels), stays);
+            let stays = record.stays_settled(self.span, of(&wait, lane));
+            let (metrics, mut outcome) = judged(record.metrics(levels), stays);
             let inside = self.span - metrics.settling_time;
-            let slowest = members
-                .get(lane)
-                .map_or(0.0, |&set| number(self.slowest, set));
+            let slowest = number(self.slowest, set);
             if outcome == Outcome::Ok && TIME_CONSTANTS * slowest > inside {
                 outcome = Outcome::Doubtful;
             }
@@ -113,25 +112,23 @@ impl Job for MetricsJob<'_> {
                 let sample_time = of(&loops.sample_time, lane);
                 radius.numbers_mut()[lane] = libm::exp(-TIME_CONSTANTS * sample_time / inside);
             }
-            found.push(Some((metrics, outcome)));
+            measures.push(&metrics, Some(outcome));
         }
-        if !is_doubtful {
-            return;
-        }
-        let decay = run.decay(radius);
-        let (yes, no) = (decay.yes.select(1.0, zero), decay.no.select(1.0, zero));
-        for (lane, found) in found.iter_mut().skip(begin).enumerate() {
-            if let Some((_, outcome)) = found
-                && *outcome == Outcome::Doubtful
-                && of(&radius, lane) > 0.0
-            {
+        if is_doubtful {
+            let decay = run.decay(radius);
+            let (yes, no) = (decay.yes.select(1.0, zero), decay.no.select(1.0, zero));
+            for (lane, outcome) in measures.outcomes.iter_mut().enumerate() {
+                if *outcome != Some(Outcome::Doubtful) || of(&radius, lane) <= 0.0 {
+                    continue;
+                }
                 if of(&yes, lane) > 0.0 {
-                    *outcome = Outcome::Ok;
+                    *outcome = Some(Outcome::Ok);
                 } else if of(&no, lane) > 0.0 {
-                    *outcome = Outcome::Unsettled;
+                    *outcome = Some(Outcome::Unsettled);
                 }
             }
         }
+        found.push(measures);
     }
 }
 

@@ -16,6 +16,8 @@ mod block;
 mod decay;
 mod delayed;
 mod each;
+mod extremes;
+mod levels;
 mod loops;
 mod measured;
 mod metrics;
@@ -32,9 +34,10 @@ mod trace;
 mod transition;
 mod view;
 mod walk;
+mod window;
 
 #[cfg(test)]
 mod tests;
 
-pub use sets::{Outcome, Sets};
+pub use sets::{Measures, Outcome, Sets};
 pub use sweep::{metrics, responses};

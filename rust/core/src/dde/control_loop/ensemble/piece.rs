@@ -8,15 +8,29 @@
 
 use crate::dde::control_loop::level_crossings::crossings;
 use crate::dde::control_loop::series::{DEGREE, Series};
-use crate::simd::{Mask, Real, Simd};
+use crate::simd::{Mask, Outlined, Real, Simd};
 
 use super::trace::of;
 
-/// Degree of the shorter series: 0.25^13/13! is below 1e-17.
-pub(super) const SHORT: usize = 12;
-
-/// Degree of the longer series: 1/20! is below 1e-18.
+/// Largest degree of a series.
 pub(super) const LONG: usize = 20;
+
+/// Degrees of the series for the rate of the plant times the length of a part: reach^n/n! of the
+/// next power is below 1e-17.
+const DEGREES: [(f64, usize); 6] = [
+    (0.05, 8),
+    (0.12, 10),
+    (0.25, 12),
+    (0.35, 13),
+    (0.5, 15),
+    (0.7, 16),
+];
+
+/// The degree for the rate of the plant times the length of a part, at most 1.
+pub(super) fn degree_for(reach: f64) -> usize {
+    let degree = DEGREES.iter().find(|(most, _)| reach <= *most);
+    degree.map_or(LONG, |(_, degree)| *degree)
+}
 
 /// Limit on the steps towards a zero: bisection alone takes no more.
 const MOST_STEPS: u32 = 64;
@@ -33,20 +47,37 @@ pub(super) struct Piece<S: Simd> {
     pub(super) degree: usize,
 }
 
-/// What is known of the extrema inside of the pieces.
-pub(super) struct Extrema<S: Simd> {
-    /// Pieces that have none.
-    pub(super) has_none: Mask<S>,
-    /// 1 for pieces that have one.
-    pub(super) has_one: Real<S>,
+/// What is wanted of the pieces.
+pub(super) struct Asked<S: Simd> {
+    /// The pieces that count, and those of them of which a crossing is wanted, not an extremum.
+    pub(super) is_open: Mask<S>,
+    pub(super) crosses: Mask<S>,
+    /// Where the output crosses this level before `high`.
+    pub(super) level: Real<S>,
+    pub(super) high: Real<S>,
+}
+
+/// What the pieces show.
+pub(super) struct Shown<S: Simd> {
+    /// The pieces that have one extremum in (0, 1).
+    pub(super) has_one: Mask<S>,
     /// Where it is, and the output there.
     pub(super) at: Real<S>,
     pub(super) output: Real<S>,
-    /// 1 for pieces of which this is not known.
-    pub(super) is_unknown: Real<S>,
+    /// The pieces of which the extrema are not known.
+    pub(super) is_unknown: Mask<S>,
+    /// Where the output crosses the level; NaN where it may turn before.
+    pub(super) crossing: Real<S>,
 }
 
 impl<S: Simd> Piece<S> {
+    pub(super) fn new(zero: Real<S>) -> Self {
+        Self {
+            terms: [zero; LONG + 1],
+            degree: 0,
+        }
+    }
+
     #[inline(always)]
     pub(super) fn at(&self, sigma: Real<S>) -> Real<S> {
         let mut sum = sigma.constant(0.0);
@@ -56,42 +87,49 @@ impl<S: Simd> Piece<S> {
         sum
     }
 
-    /// Extrema in (0, 1), where all pieces in `wanted` count.
+    /// Extrema in (0, 1), and crossings of a level where there are none. `sought` is filled with
+    /// the polynomials whose zeros these are.
     #[inline(always)]
-    pub(super) fn extrema(&self, wanted: Mask<S>) -> Extrema<S> {
+    fn shown(&self, sought: &mut Self, asked: &Asked<S>) -> Shown<S> {
         let zero = self.terms[0].constant(0.0);
-        let mut slope = self.terms;
         let (mut sum, mut least, mut most) = (zero, zero, zero);
         let (mut bend, mut lowest, mut highest) = (zero, zero, zero);
         for j in 1..=self.degree {
-            slope[j - 1] = self.terms[j] * j as f64;
-            sum = sum + slope[j - 1];
+            let slope = self.terms[j] * j as f64;
+            sum = sum + slope;
             (least, most) = (least.min(sum), most.max(sum));
             if j > 1 {
-                bend = slope[j - 1].mul_add((j - 1) as f64, bend);
+                bend = slope.mul_add((j - 1) as f64, bend);
                 (lowest, highest) = (lowest.min(bend), highest.max(bend));
             }
         }
-        let turns = wanted & least.lt(0.0) & most.gt(0.0);
+        let turns = asked.is_open & least.lt(0.0) & most.gt(0.0);
         let bends = lowest.lt(0.0) & highest.gt(0.0);
-        let (first, last) = (slope[0], sum);
+        let (first, last) = (self.terms[1], sum);
         let changes = (first.lt(0.0) & last.gt(0.0)) | (first.gt(0.0) & last.lt(0.0));
         let has_one = turns & !bends & changes;
-        let mut at = zero;
-        if has_one.any() {
-            let slope = Self {
-                terms: slope,
-                degree: self.degree - 1,
-            };
-            at = slope.zero(zero, zero, zero.constant(1.0), has_one);
-        }
         let is_unknown = turns & bends;
-        Extrema {
-            has_none: !(has_one | is_unknown),
-            has_one: has_one.select(1.0, zero),
+        let is_simple = asked.crosses & !(has_one | is_unknown);
+        let turns_there = has_one & !asked.crosses;
+        let wanted = turns_there | is_simple;
+        let mut at = zero;
+        if wanted.any() {
+            sought.degree = self.degree;
+            for j in 0..self.degree {
+                let slope = self.terms[j + 1] * (j + 1) as f64;
+                sought.terms[j] = is_simple.select(self.terms[j], slope);
+            }
+            sought.terms[self.degree] = is_simple.select(self.terms[self.degree], zero);
+            let level = is_simple.select(asked.level, zero);
+            let high = is_simple.select(asked.high, zero.constant(1.0));
+            at = sought.zero(level, zero, high, wanted);
+        }
+        Shown {
+            has_one,
             at,
             output: self.at(at),
-            is_unknown: is_unknown.select(1.0, zero),
+            is_unknown,
+            crossing: is_simple.select(at, zero.constant(f64::NAN)),
         }
     }
 
@@ -142,6 +180,22 @@ impl<S: Simd> Piece<S> {
             *c = of(term, lane);
         }
         series
+    }
+}
+
+/// See [`Piece::shown`].
+pub(super) struct Solve<'a, S: Simd> {
+    pub(super) piece: &'a Piece<S>,
+    pub(super) sought: &'a mut Piece<S>,
+    pub(super) asked: Asked<S>,
+}
+
+impl<S: Simd> Outlined for Solve<'_, S> {
+    type Output = Shown<S>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        self.piece.shown(self.sought, &self.asked)
     }
 }
 

@@ -1,7 +1,9 @@
 //! Loops of one structure, one set of numbers for each.
 
+use super::block::SETS;
 use crate::Error;
 use crate::dde::control_loop::linear_loop::LinearLoop;
+use crate::dde::control_loop::metrics::Metrics;
 use crate::dde::control_loop::row::{Row, width};
 
 /// Outcome of one set.
@@ -19,6 +21,54 @@ pub enum Outcome {
     /// Inside its settling band at the end, but not long or close enough for the response itself to
     /// show that it stays there.
     Doubtful = 4,
+}
+
+/// Metrics and outcomes of some sets.
+#[derive(Debug, Clone)]
+pub struct Measures {
+    /// The metrics in the order of their fields, one for each set.
+    pub metrics: [[f64; SETS]; 9],
+    /// Outcomes; none of sets that have to run one by one.
+    pub(super) outcomes: [Option<Outcome>; SETS],
+    /// How many sets.
+    pub(super) count: usize,
+}
+
+impl Measures {
+    /// Of no set yet.
+    pub(super) fn new() -> Self {
+        Self {
+            metrics: [[f64::NAN; SETS]; 9],
+            outcomes: [None; SETS],
+            count: 0,
+        }
+    }
+
+    /// Append those of a set, without an outcome if it has to run alone.
+    #[inline]
+    pub(super) fn push(&mut self, metrics: &Metrics, outcome: Option<Outcome>) {
+        for (column, metric) in self.metrics.iter_mut().zip(metrics.to_array()) {
+            if let Some(place) = column.get_mut(self.count) {
+                *place = metric;
+            }
+        }
+        if let Some(place) = self.outcomes.get_mut(self.count) {
+            *place = outcome;
+        }
+        self.count += 1;
+    }
+
+    /// The metrics of one of the sets.
+    #[cfg(test)]
+    pub(super) fn of(&self, place: usize) -> Metrics {
+        Metrics::from_array(self.metrics.map(|column| column[place]))
+    }
+
+    /// Outcomes, refused where there is none.
+    pub fn outcomes(&self) -> impl Iterator<Item = Outcome> {
+        let outcomes = self.outcomes.iter().take(self.count);
+        outcomes.map(|outcome| outcome.unwrap_or(Outcome::Refused))
+    }
 }
 
 /// Loops of one structure, each at rest at zero when its reference steps to `amplitude`.

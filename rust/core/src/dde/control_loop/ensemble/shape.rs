@@ -7,11 +7,11 @@
 use std::collections::BTreeMap;
 
 use crate::Error;
-use crate::dde::control_loop::row::Row;
+use crate::dde::control_loop::row::{Row, width};
 use crate::dde::control_loop::sampled::Timing;
 use crate::memory::push;
 
-use super::piece::{LONG, SHORT};
+use super::piece::{LONG, degree_for};
 use super::sets::{Sets, of};
 use super::trace::{SAMPLES, delays};
 use super::transition;
@@ -27,9 +27,6 @@ const MOST_ELEMENTS: f64 = 1e5;
 
 /// Most parts of one half of a sample.
 const MOST_PARTS: f64 = 64.0;
-
-/// Largest rate of the plant times the length of a part for the shorter series.
-const SHORT_REACH: f64 = 0.25;
 
 /// Largest direct gain from the delayed command to the command of a continuous loop in a block: the
 /// rate of its signals grows beyond all bounds towards 1.
@@ -107,6 +104,8 @@ pub(super) struct Shapes<'a> {
     varying: Vec<(usize, &'a [f64])>,
     /// The row of the last loop.
     row: Vec<f64>,
+    /// Are the numbers that are the same for all finite, but for the limit?
+    is_finite: bool,
     /// What follows from A, C and E, where these are the same for all.
     shared: Option<Plant>,
 }
@@ -131,14 +130,19 @@ impl<'a> Shapes<'a> {
             .filter(|(_, entry)| entry.len() != 1)
             .map(|(place, entry)| (place, *entry))
             .collect();
+        let n = sets.states();
+        let row = sets.row(0);
+        let shared = sets.entries().iter().take(width(n) - 1);
         let mut shapes = Self {
             sets,
             plant,
             varying,
-            row: sets.row(0),
+            row,
+            is_finite: shared
+                .filter(|entry| entry.len() == 1)
+                .all(|entry| entry.iter().all(|number| number.is_finite())),
             shared: None,
         };
-        let n = sets.states();
         let is_plant = |place: usize| {
             place < n * n || (n * n + n..n * n + 2 * n).contains(&place) || {
                 (n * n + 3 * n..n * n + 4 * n).contains(&place)
@@ -152,28 +156,34 @@ impl<'a> Shapes<'a> {
 
     /// The shape of a loop in a block for `span` seconds of output; none if it runs alone.
     fn of(&mut self, set: usize, span: f64) -> Option<Shape> {
+        let n = self.sets.states();
+        let mut fits = self.is_finite && (1..=MOST_STATES).contains(&n);
         for &(place, entry) in &self.varying {
+            let value = of(entry, set);
             if let Some(number) = self.row.get_mut(place) {
-                *number = of(entry, set);
+                *number = value;
             }
+            fits &= value.is_finite() || place + 1 == width(n);
         }
-        let row = Row::new(self.sets.states(), &self.row).ok()?;
-        let (last, finite) = self.row.split_last()?;
-        let fits = finite.iter().all(|number| number.is_finite())
-            && *last > 0.0
-            && (1..=MOST_STATES).contains(&row.b.len());
-        if fits && !row.is_sampled() {
-            return continuous(&row, span);
-        }
-        let is_timed = row.delay >= 0.0
-            && row.sample_time > 0.0
-            && (span + row.delay) / row.sample_time < MOST_SAMPLES;
-        if !fits || !is_timed {
+        let &[.., d, _, delay, sample_time, limit] = &*self.row else {
+            return None;
+        };
+        fits &= limit > 0.0;
+        if !fits {
             return None;
         }
-        let plant = self.shared.unwrap_or_else(|| plant_of(&row, self.plant));
-        let timing = Timing::new(row.delay, row.sample_time);
-        if plant.norm * row.sample_time > transition::MOST {
+        if sample_time == 0.0 {
+            return continuous(&Row::new(n, &self.row).ok()?, span);
+        }
+        if !(delay >= 0.0 && sample_time > 0.0 && span + delay < MOST_SAMPLES * sample_time) {
+            return None;
+        }
+        let plant = match self.shared {
+            Some(plant) => plant,
+            None => plant_of(&Row::new(n, &self.row).ok()?, self.plant),
+        };
+        let timing = Timing::new(delay, sample_time);
+        if plant.norm * sample_time > transition::MOST {
             return None;
         }
         let (early, late) = if plant.is_curved {
@@ -186,19 +196,15 @@ impl<'a> Shapes<'a> {
         if early.max(late) > MOST_PARTS {
             return None;
         }
-        let longest = (timing.early / early.max(1.0)).max(timing.late / late);
         Some(Shape {
             is_continuous: false,
             samples: u32::try_from(timing.samples).ok()?,
             early: early as u8,
             late: late as u8,
-            jumps: row.d != 0.0,
+            jumps: d != 0.0,
             is_curved: plant.is_curved,
-            degree: if plant.is_curved && plant.rate * longest > SHORT_REACH {
-                LONG
-            } else {
-                SHORT
-            } as u8,
+            // The same for all delays, so that more loops share a block.
+            degree: degree_for((plant.rate * sample_time).min(1.0)) as u8,
             is_first: plant.is_first,
             is_pushed: plant.is_pushed,
         })

@@ -1,203 +1,145 @@
 //! The chunks of a trace in which something that counts may happen, in all loops at once.
 
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Outlined, Real, Simd, outlined};
 
-use super::block::{Column, SETS};
 use super::measured::Measured;
-use super::trace::Trace;
+use super::trace::{CHUNK, Trace};
 use super::view::View;
 
-/// A chunk for each loop, negative where nothing happens.
-#[derive(Clone, Copy)]
-pub(super) struct Chunks(Column);
+/// An extremum counts if it may exceed the one known by this share of the step: rounding errors of
+/// a settled output are below it.
+const ROUNDING: f64 = 1e-13;
 
-impl Chunks {
-    /// The chunk of a loop.
-    #[inline]
-    pub(super) fn of(&self, lane: usize) -> Option<usize> {
-        let chunk = self.0.get(lane).copied().unwrap_or(-1.0);
-        (chunk >= 0.0).then_some(chunk as usize)
-    }
-}
+/// The first and the last of several chunks: the first one is the greater where there are none.
+pub(super) type Range<S> = (Real<S>, Real<S>);
 
-/// The first and the last of several chunks.
-pub(super) type Range = (Chunks, Chunks);
-
-/// Chunks of the trace of each loop in which its output may change the record.
-pub(super) struct Spots {
+/// Chunks of the trace of each loop in which its output may change the record, negative for none.
+pub(super) struct Spots<S: Simd> {
     /// Parts of each run.
-    pub(super) parts: [usize; SETS],
-    /// Greatest corner, if it is greater than all before, and its chunk.
-    pub(super) most: Column,
-    pub(super) top: Chunks,
-    pub(super) least: Column,
-    pub(super) bottom: Chunks,
+    pub(super) parts: Real<S>,
+    /// Greatest corner, and its chunk if it is greater than all before.
+    pub(super) most: Real<S>,
+    pub(super) top: Real<S>,
+    pub(super) least: Real<S>,
+    pub(super) bottom: Real<S>,
     /// First chunks in which the levels of the rise may be reached.
-    pub(super) rise: [Chunks; 2],
+    pub(super) rise: [Real<S>; 2],
     /// Last chunks in which the output may be outside of the band, and of the quiet band.
-    pub(super) outside: Chunks,
-    pub(super) quiet: Chunks,
+    pub(super) outside: Real<S>,
+    pub(super) quiet: Real<S>,
     /// Chunks in which the output may exceed its corners.
-    pub(super) may_top: Range,
-    pub(super) may_bottom: Range,
-    pub(super) may_dip: Range,
+    pub(super) may_top: Range<S>,
+    pub(super) may_bottom: Range<S>,
+    /// Least corner after the first chunk in which the rise may end, or after a rise in an earlier
+    /// trace, times the sign of the step, and the part from which the output may be less.
+    pub(super) dip: Real<S>,
+    pub(super) dip_from: Real<S>,
     /// Differences of outputs that do not count.
-    pub(super) tolerance: Column,
-}
-
-/// A number of a chunk in each lane, −1 for none.
-struct Place<S: Simd>(Real<S>);
-
-impl<S: Simd> Place<S> {
-    fn none(like: Real<S>) -> Self {
-        Self(like.constant(-1.0))
-    }
-
-    /// The chunk where `here` is true, in the place of earlier ones.
-    #[inline(always)]
-    fn last(&mut self, here: Mask<S>, chunk: f64) {
-        self.0 = here.select(chunk, self.0);
-    }
-
-    /// The first chunk where `here` is true.
-    #[inline(always)]
-    fn first(&mut self, here: Mask<S>, chunk: f64) {
-        self.0 = (here & self.0.lt(0.0)).select(chunk, self.0);
-    }
-
-    #[inline(always)]
-    fn listed(&self) -> Chunks {
-        Chunks(numbers(self.0))
-    }
+    pub(super) tolerance: Real<S>,
+    /// The output at the end of the trace of each loop.
+    pub(super) last: Real<S>,
 }
 
 pub(super) fn spots<S: Simd, const P: usize>(
     view: &View<'_, S, P>,
-    lanes: &[Measured],
-    rounding: f64,
-) -> Spots {
+    measured: &Measured<S>,
+) -> Spots<S> {
     let look = Look {
-        zero: view.loops.d.constant(0.0),
         trace: view.trace,
-        jumps: view.loops.is_direct,
-        lanes,
-        rounding,
+        measured,
     };
-    outlined(look.zero.simd(), look)
+    outlined(view.loops.zero.simd(), look)
 }
 
 /// See [`spots`].
 struct Look<'a, S: Simd> {
-    zero: Real<S>,
     trace: &'a Trace<S>,
-    /// May the output jump over the end of the rise?
-    jumps: bool,
-    lanes: &'a [Measured],
-    rounding: f64,
+    measured: &'a Measured<S>,
 }
 
 impl<S: Simd> Outlined for Look<'_, S> {
-    type Output = Spots;
+    type Output = Spots<S>;
 
     #[inline(always)]
-    fn run(self) -> Spots {
-        let Self {
-            zero,
-            trace,
-            jumps,
-            lanes,
-            rounding,
-        } = self;
-        let sign = column(zero, lanes, |m| m.levels.sign);
-        let steady = column(zero, lanes, |m| m.levels.steady);
-        let (band, quiet_band) = (
-            column(zero, lanes, |m| m.levels.band),
-            column(zero, lanes, |m| m.levels.quiet_band),
-        );
-        let levels = [
-            column(zero, lanes, |m| m.levels.rise.0),
-            column(zero, lanes, |m| m.levels.rise.1),
-        ];
-        let has_risen = column(zero, lanes, |m| m.record.risen.1).ge(0.0);
-        let (mut most, mut least) = (
-            column(zero, lanes, |m| m.record.top.0),
-            column(zero, lanes, |m| m.record.bottom.0),
-        );
-        let none = || Place::none(zero);
-        let (mut top, mut bottom, mut outside, mut quiet) = (none(), none(), none(), none());
-        let mut rise = [none(), none()];
-        let chunks = || trace.chunks.iter().enumerate();
-        for (number, chunk) in chunks() {
+    fn run(self) -> Spots<S> {
+        let Self { trace, measured } = self;
+        let Measured {
+            sign,
+            steady,
+            band,
+            quiet_band,
+            levels,
+            ..
+        } = *measured;
+        let zero = sign.constant(0.0);
+        let has_risen = measured.risen[1].ge(0.0);
+        let parts = trace.count + trace.is_cut.select(1.0, zero);
+        let per_chunk = (CHUNK * trace.per_sample) as f64;
+        let (mut most, mut least) = (measured.top.0, measured.bottom.0);
+        let (none, never) = (zero.constant(-1.0), zero.constant(f64::INFINITY));
+        let (mut top, mut bottom, mut outside, mut quiet) = (none, none, none, none);
+        // How many chunks end below the levels of the rise, and the best output of all of them.
+        let (mut rise, mut best) = ([zero; 2], -never);
+        let (mut is_risen, mut dip) = (has_risen, never);
+        for (number, chunk) in trace.chunks.iter().enumerate() {
             let number = number as f64;
             let (higher, lower) = (chunk.most.gt(most), chunk.least.lt(least));
             most = higher.select(chunk.most, most);
             least = lower.select(chunk.least, least);
-            top.last(higher, number);
-            bottom.last(lower, number);
+            top = higher.select(number, top);
+            bottom = lower.select(number, bottom);
             let far = (chunk.most - steady).max(steady - chunk.least) + chunk.bulge;
-            outside.last(far.gt(band), number);
-            quiet.last(far.gt(quiet_band), number);
-            let best = (chunk.most * sign).max(chunk.least * sign) + chunk.bulge;
+            outside = far.gt(band).select(number, outside);
+            quiet = far.gt(quiet_band).select(number, quiet);
+            let (one, other) = (chunk.most * sign, chunk.least * sign);
+            // After the end of a run, chunks repeat its last whole corner.
+            let counts = is_risen & parts.gt(number * per_chunk);
+            dip = counts.select(dip.min(one.min(other)), dip);
+            best = best.max(one.max(other) + chunk.bulge);
             for (rise, level) in rise.iter_mut().zip(&levels) {
-                rise.first(best.ge(*level), number);
+                *rise = best.lt(*level).select(*rise + 1.0, *rise);
+            }
+            is_risen = has_risen | best.ge(levels[1]);
+        }
+        let count = trace.chunks.len() as f64;
+        for rise in &mut rise {
+            *rise = rise.lt(count).select(*rise, none);
+        }
+        let size = most.abs().max(least.abs()).max(steady.abs()) * ROUNDING;
+        let mut extremes = [(never, none); 2];
+        if trace.is_curved {
+            for (number, chunk) in trace.chunks.iter().enumerate() {
+                let here = zero.constant(number as f64);
+                let may = [
+                    (chunk.most + chunk.bulge).gt(most + size),
+                    (chunk.least - chunk.bulge).lt(least - size),
+                ];
+                for ((first, last), may) in extremes.iter_mut().zip(may) {
+                    *first = may.select(here, never).min(*first);
+                    *last = may.select(here, *last);
+                }
             }
         }
-        let size = most.abs().max(least.abs()).max(steady.abs()) * rounding;
-        let mut extremes = [(none(), none()), (none(), none()), (none(), none())];
-        let risen_to = if jumps {
-            zero.constant(f64::INFINITY)
-        } else {
-            levels[1]
-        };
-        let dip = has_risen.select(column(zero, lanes, Measured::dip), risen_to);
-        let begin = has_risen.select(0.0, rise[1].0);
-        for (number, chunk) in chunks() {
-            let number = number as f64;
-            let worst = (chunk.most * sign).min(chunk.least * sign) - chunk.bulge;
-            let may = [
-                (chunk.most + chunk.bulge).gt(most + size),
-                (chunk.least - chunk.bulge).lt(least - size),
-                worst.lt(dip) & begin.ge(0.0) & begin.le(number),
-            ];
-            for ((first, last), may) in extremes.iter_mut().zip(may) {
-                first.first(may, number);
-                last.last(may, number);
-            }
+        let mut last = zero;
+        for (lane, place) in last.numbers_mut().iter_mut().enumerate() {
+            *place = trace.output(lane, trace.parts(lane));
         }
-        let [tops, bottoms, dips] = &extremes;
+        let [may_top, may_bottom] = extremes;
         Spots {
-            parts: std::array::from_fn(|lane| trace.parts(lane)),
-            most: numbers(most),
-            top: top.listed(),
-            least: numbers(least),
-            bottom: bottom.listed(),
-            rise: [rise[0].listed(), rise[1].listed()],
-            outside: outside.listed(),
-            quiet: quiet.listed(),
-            may_top: (tops.0.listed(), tops.1.listed()),
-            may_bottom: (bottoms.0.listed(), bottoms.1.listed()),
-            may_dip: (dips.0.listed(), dips.1.listed()),
-            tolerance: numbers(size),
+            parts,
+            most,
+            top,
+            least,
+            bottom,
+            rise,
+            outside,
+            quiet,
+            may_top,
+            may_bottom,
+            dip,
+            dip_from: never,
+            tolerance: size,
+            last,
         }
     }
-}
-
-/// A number of each lane.
-#[inline(always)]
-fn column<S: Simd>(zero: Real<S>, lanes: &[Measured], number: fn(&Measured) -> f64) -> Real<S> {
-    let mut column = zero;
-    for (place, measured) in column.numbers_mut().iter_mut().zip(lanes) {
-        *place = number(measured);
-    }
-    column
-}
-
-/// The lanes as a column.
-#[inline(always)]
-fn numbers<S: Simd>(lanes: Real<S>) -> Column {
-    let mut column = [-1.0; SETS];
-    for (place, number) in column.iter_mut().zip(lanes.numbers()) {
-        *place = *number;
-    }
-    column
 }

@@ -6,7 +6,7 @@ use super::block::{Column, Members, SETS};
 use super::each;
 use super::metrics::MetricsJob;
 use super::responses::ResponsesJob;
-use super::sets::{Outcome, Sets, of};
+use super::sets::{Measures, Outcome, Sets, of};
 use super::shape::{Shapes, plant_states};
 use super::through::{Job, through};
 use crate::dde::control_loop::metrics::{Criteria, Metrics};
@@ -18,7 +18,7 @@ const SWEEP: &str = "the sweep";
 
 /// Results held for each thread before they are written to their places: enough to keep it busy,
 /// and few enough for its cache.
-const AT_ONCE: usize = 1 << 11;
+const AT_ONCE: usize = 1 << 10;
 
 /// Tasks for each thread, so that all threads end at about the same time.
 const TASKS: usize = 4;
@@ -29,16 +29,33 @@ const BLOCKS: usize = 32;
 /// Upper limit on the values of responses held at a time (bounds memory to a share of the result).
 const VALUES_AT_ONCE: usize = 1 << 22;
 
+/// What receives the results of a sweep.
+trait Kept<J: Job> {
+    /// The result of a set that runs alone.
+    type Single: Send;
+
+    /// Keep the results of the first of `members`, and append to `left` those that have to run
+    /// alone. Returns how many they are.
+    fn lanes(
+        &mut self,
+        members: &[usize],
+        found: J::Found,
+        left: &mut Vec<usize>,
+    ) -> Result<usize, Error>;
+
+    fn single(&mut self, set: usize, found: Self::Single);
+}
+
 impl Sets<'_> {
-    /// Process all sets, blocks with `job` and single sets with `alone`. `keep` receives every set
-    /// with its result; at most `at_once` results are held before.
-    fn each<J: Job>(
+    /// Process all sets, blocks with `job` and single sets with `alone`; at most `at_once` results
+    /// are held before they are kept.
+    fn each<J: Job, K: Kept<J>>(
         &self,
         (span, at_once): (f64, usize),
         task: &Task,
         job: &J,
-        alone: impl Fn(usize) -> Result<J::Found, Error> + Sync,
-        mut keep: impl FnMut(usize, J::Found),
+        alone: impl Fn(usize) -> Result<K::Single, Error> + Sync,
+        kept: &mut K,
     ) -> Result<(), Error> {
         let (alike, mut left) = Shapes::new(self)?.sorted(span)?;
         let plant = plant_states(self);
@@ -47,24 +64,34 @@ impl Sets<'_> {
         for (shape, sets) in &alike {
             blocks.extend(sets.chunks(SETS).map(|members| (*shape, members)));
         }
+        // Results of each task, in the same memory for all groups.
+        let tasks = match rayon::current_num_threads() {
+            1 => 1,
+            threads => TASKS * threads,
+        };
+        let mut results: Vec<Vec<J::Found>> = Vec::new();
         for group in blocks.chunks(at_once.div_ceil(SETS)) {
-            let work = |blocks: &[Members<'_>]| {
+            let work = |(blocks, found): (&[Members<'_>], &mut Vec<J::Found>)| {
                 task.check()?;
                 let columns = blocks.iter().map(|(shape, _)| shape.columns()).max();
                 room::<Column>(SWEEP, columns.unwrap_or(0))?;
-                let found = through(self, plant, blocks, span, job);
-                task.advance(found.iter().flatten().count() as u64);
-                Ok(found)
+                through(self, plant, blocks, (span, job), found);
+                task.advance(found.iter().map(|found| J::done(found) as u64).sum());
+                Ok(())
             };
-            let tasks = TASKS * rayon::current_num_threads();
             let share = group.len().div_ceil(tasks).clamp(1, BLOCKS);
-            let found: Result<Vec<_>, Error> = group.par_chunks(share).map(work).collect();
-            let members = group.iter().flat_map(|(_, sets)| sets.iter());
-            let found = found?.into_iter().flatten();
-            for (set, found) in members.zip(found) {
-                match found {
-                    Some(found) => keep(*set, found),
-                    None => push(SWEEP, &mut left, *set)?,
+            results.resize_with(group.len().div_ceil(share), Vec::new);
+            let shares = group.par_chunks(share).zip(&mut results);
+            shares.map(work).collect::<Result<(), Error>>()?;
+            let mut found = results.iter_mut().flat_map(|found| found.drain(..));
+            for (_, members) in group {
+                let mut members = *members;
+                while !members.is_empty() {
+                    let Some(found) = found.next() else {
+                        break;
+                    };
+                    let count = kept.lanes(members, found, &mut left)?;
+                    members = members.get(count..).unwrap_or_default();
                 }
             }
         }
@@ -76,17 +103,85 @@ impl Sets<'_> {
                 Ok(found)
             };
             let found: Result<Vec<_>, Error> = group.par_iter().map(work).collect();
-            group
-                .iter()
-                .zip(found?)
-                .for_each(|(set, found)| keep(*set, found));
+            for (set, found) in group.iter().zip(found?) {
+                kept.single(*set, found);
+            }
         }
         Ok(())
     }
 }
 
-/// Measure every response from its start to `span` seconds after it; `keep` receives the metrics of
-/// each set, in any order.
+/// A function that receives metrics.
+struct Receiver<F>(F);
+
+impl<F: FnMut(&[usize], &Measures)> Kept<MetricsJob<'_>> for Receiver<F> {
+    type Single = (Metrics, Outcome);
+
+    fn lanes(
+        &mut self,
+        members: &[usize],
+        found: Measures,
+        left: &mut Vec<usize>,
+    ) -> Result<usize, Error> {
+        let count = found.count.min(members.len());
+        for (&set, outcome) in members.iter().zip(&found.outcomes).take(count) {
+            if outcome.is_none() {
+                push(SWEEP, left, set)?;
+            }
+        }
+        (self.0)(members.get(..count).unwrap_or_default(), &found);
+        Ok(count)
+    }
+
+    fn single(&mut self, set: usize, (metrics, outcome): Self::Single) {
+        let mut measures = Measures::new();
+        measures.push(&metrics, Some(outcome));
+        (self.0)(&[set], &measures);
+    }
+}
+
+/// Outputs of all sets, a row a set.
+struct Rows {
+    outputs: Vec<f64>,
+    outcomes: Vec<Outcome>,
+    length: usize,
+}
+
+impl Kept<ResponsesJob<'_>> for Rows {
+    type Single = (Vec<f64>, Outcome);
+
+    fn lanes(
+        &mut self,
+        members: &[usize],
+        found: Vec<Option<Self::Single>>,
+        left: &mut Vec<usize>,
+    ) -> Result<usize, Error> {
+        let count = found.len();
+        for (&set, found) in members.iter().zip(found) {
+            match found {
+                Some(found) => self.single(set, found),
+                None => push(SWEEP, left, set)?,
+            }
+        }
+        Ok(count)
+    }
+
+    fn single(&mut self, set: usize, (values, outcome): Self::Single) {
+        let places = set * self.length..(set + 1) * self.length;
+        if let Some(row) = self.outputs.get_mut(places)
+            && values.len() == self.length
+        {
+            row.copy_from_slice(&values);
+        }
+        if let Some(place) = self.outcomes.get_mut(set) {
+            *place = outcome;
+        }
+    }
+}
+
+/// Measure every response from its start to `span` seconds after it; `keep` receives sets, which
+/// increase, with their metrics. It receives each set once with its outcome; those that it receives
+/// as refused before were found not to fit into a block.
 ///
 /// `steady` holds the steady state of each set, or one for all, NaN where its last output is to
 /// count as that; `slowest` the slowest time constant of its plant and controller.
@@ -96,7 +191,7 @@ pub fn metrics(
     span: f64,
     criteria: &Criteria,
     task: &Task,
-    mut keep: impl FnMut(usize, &Metrics, Outcome),
+    keep: impl FnMut(&[usize], &Measures),
 ) -> Result<(), Error> {
     let job = MetricsJob {
         steady,
@@ -112,7 +207,7 @@ pub fn metrics(
             let numbers = (of(steady, set), of(slowest, set));
             each::metrics(sets, set, numbers, span, criteria, task)
         },
-        |set, (metrics, outcome)| keep(set, &metrics, outcome),
+        &mut Receiver(keep),
     )
 }
 
@@ -124,8 +219,11 @@ pub fn responses(
     task: &Task,
 ) -> Result<(Vec<f64>, Vec<Outcome>), Error> {
     let length = times.len();
-    let mut outputs = filled(SWEEP, f64::NAN, sets.len().saturating_mul(length))?;
-    let mut outcomes = filled(SWEEP, Outcome::Refused, sets.len())?;
+    let mut rows = Rows {
+        outputs: filled(SWEEP, f64::NAN, sets.len().saturating_mul(length))?,
+        outcomes: filled(SWEEP, Outcome::Refused, sets.len())?,
+        length,
+    };
     let span = times.last().copied().unwrap_or(0.0);
     sets.each(
         (
@@ -135,16 +233,7 @@ pub fn responses(
         task,
         &ResponsesJob { times },
         |set| each::response(sets, set, times, task),
-        |set, (values, outcome)| {
-            if let Some(row) = outputs.get_mut(set * length..(set + 1) * length)
-                && values.len() == length
-            {
-                row.copy_from_slice(&values);
-            }
-            if let Some(place) = outcomes.get_mut(set) {
-                *place = outcome;
-            }
-        },
+        &mut rows,
     )?;
-    Ok((outputs, outcomes))
+    Ok((rows.outputs, rows.outcomes))
 }

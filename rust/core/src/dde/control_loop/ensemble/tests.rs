@@ -109,8 +109,10 @@ fn all_metrics(
         span,
         &CRITERIA,
         &Task::new(),
-        |set, metrics, outcome| {
-            found[set] = (*metrics, outcome);
+        |sets, measures| {
+            for (lane, (&set, outcome)) in sets.iter().zip(measures.outcomes()).enumerate() {
+                found[set] = (measures.of(lane), outcome);
+            }
         },
     )?;
     Ok(found)
@@ -200,6 +202,15 @@ fn states(row: &[f64]) -> usize {
     (1..8)
         .find(|&n| crate::dde::control_loop::row::width(n) == row.len())
         .unwrap_or_default()
+}
+
+/// The later chunks of a trace repeated the last whole corner of a run that had ended: a dip.
+#[test]
+fn a_run_that_ends_before_its_neighbour_has_no_dip_after_its_end() {
+    let plant = (vec![0.0], vec![1.0], 0.0);
+    let controller = (vec![], vec![], vec![], vec![], 0.3);
+    let rows = [0.436, 0.028].map(|delay| row(&plant, &controller, delay, 0.0, 0.4));
+    assert_eq!(unlike(&rows, false, 0.5), None);
 }
 
 /// The first set whose metrics differ from those of the code for single loops.

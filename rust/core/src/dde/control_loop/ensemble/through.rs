@@ -4,7 +4,7 @@ use pulp::WithSimd;
 
 use crate::simd::{Instructions, Outlined, Real, Simd, outlined};
 
-use super::block::{Block, Members};
+use super::block::{Block, Members, SETS};
 use super::delayed::{Delayed, Steps};
 use super::loops::{Loops, Plants};
 use super::sets::Sets;
@@ -13,53 +13,61 @@ use super::walk::{Run, Walk};
 
 /// What is done with the loops of two vectors.
 pub(super) trait Job: Sync {
+    /// The results of some sets.
     type Found: Send;
 
-    /// Append the results of the lanes of `members`, none for those that have to run alone.
+    /// For how many sets there are results.
+    fn done(found: &Self::Found) -> usize;
+
+    /// Append the results of the lanes of `members`.
     fn found<S: Simd, const P: usize>(
         &self,
         plants: &Plants<S, P>,
         run: &mut dyn Run<S>,
         members: &[usize],
         trace: &mut Trace<S>,
-        found: &mut Vec<Option<Self::Found>>,
+        found: &mut Vec<Self::Found>,
     );
 }
 
-struct Through<'a, J> {
+struct Through<'a, J: Job> {
     sets: &'a Sets<'a>,
     plant: usize,
     blocks: &'a [Members<'a>],
     span: f64,
     job: &'a J,
+    found: &'a mut Vec<J::Found>,
 }
 
-/// Do `job` with all members of `blocks` for `span` seconds of each output, in their order. The
-/// output depends on the first `plant` states alone.
+/// Do `job` with all members of `blocks` for `span` seconds of each output, and append the results
+/// in their order. The output depends on the first `plant` states alone.
 pub(super) fn through<J: Job>(
     sets: &Sets<'_>,
     plant: usize,
     blocks: &[Members<'_>],
-    span: f64,
-    job: &J,
-) -> Vec<Option<J::Found>> {
+    (span, job): (f64, &J),
+    found: &mut Vec<J::Found>,
+) {
     Instructions::chosen().run(Through {
         sets,
         plant,
         blocks,
         span,
         job,
-    })
+        found,
+    });
 }
 
 impl<J: Job> WithSimd for Through<'_, J> {
-    type Output = Vec<Option<J::Found>>;
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+    fn with_simd<S: Simd>(self, simd: S) {
         let zero = Real::splat(simd, 0.0);
         let mut trace = Trace::new(zero);
-        let mut found = Vec::with_capacity(self.blocks.iter().map(|(_, sets)| sets.len()).sum());
+        let found = self.found;
+        let pairs = SETS / (2 * S::F64_LANES);
+        found.reserve(self.blocks.len() * pairs);
         for &(shape, members) in self.blocks {
             let Some(block) = Block::new(self.sets, (shape, members)) else {
                 continue;
@@ -75,28 +83,27 @@ impl<J: Job> WithSimd for Through<'_, J> {
                 };
                 if block.shape.is_continuous {
                     match self.sets.states() {
-                        1 => lanes.step::<1>(&mut trace, &mut found),
-                        2 => lanes.step::<2>(&mut trace, &mut found),
-                        3 => lanes.step::<3>(&mut trace, &mut found),
-                        _ => lanes.step::<4>(&mut trace, &mut found),
+                        1 => lanes.step::<1>(&mut trace, found),
+                        2 => lanes.step::<2>(&mut trace, found),
+                        3 => lanes.step::<3>(&mut trace, found),
+                        _ => lanes.step::<4>(&mut trace, found),
                     }
                     continue;
                 }
                 match (self.sets.states(), self.plant) {
-                    (1, _) => lanes.run::<1, 1>(&mut trace, &mut found),
-                    (2, 1) => lanes.run::<2, 1>(&mut trace, &mut found),
-                    (2, _) => lanes.run::<2, 2>(&mut trace, &mut found),
-                    (3, 1) => lanes.run::<3, 1>(&mut trace, &mut found),
-                    (3, 2) => lanes.run::<3, 2>(&mut trace, &mut found),
-                    (3, _) => lanes.run::<3, 3>(&mut trace, &mut found),
-                    (_, 1) => lanes.run::<4, 1>(&mut trace, &mut found),
-                    (_, 2) => lanes.run::<4, 2>(&mut trace, &mut found),
-                    (_, 3) => lanes.run::<4, 3>(&mut trace, &mut found),
-                    _ => lanes.run::<4, 4>(&mut trace, &mut found),
+                    (1, _) => lanes.run::<1, 1>(&mut trace, found),
+                    (2, 1) => lanes.run::<2, 1>(&mut trace, found),
+                    (2, _) => lanes.run::<2, 2>(&mut trace, found),
+                    (3, 1) => lanes.run::<3, 1>(&mut trace, found),
+                    (3, 2) => lanes.run::<3, 2>(&mut trace, found),
+                    (3, _) => lanes.run::<3, 3>(&mut trace, found),
+                    (_, 1) => lanes.run::<4, 1>(&mut trace, found),
+                    (_, 2) => lanes.run::<4, 2>(&mut trace, found),
+                    (_, 3) => lanes.run::<4, 3>(&mut trace, found),
+                    _ => lanes.run::<4, 4>(&mut trace, found),
                 }
             }
         }
-        found
     }
 }
 
@@ -112,11 +119,7 @@ struct Pair<'a, S, J> {
 
 impl<S: Simd, J: Job> Pair<'_, S, J> {
     /// Sampled loops.
-    fn run<const N: usize, const P: usize>(
-        &self,
-        trace: &mut Trace<S>,
-        found: &mut Vec<Option<J::Found>>,
-    ) {
+    fn run<const N: usize, const P: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
         let made: Made<'_, S, N, P> = Made {
             simd: self.simd,
             block: self.block,
@@ -128,7 +131,7 @@ impl<S: Simd, J: Job> Pair<'_, S, J> {
     }
 
     /// Continuous loops.
-    fn step<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<Option<J::Found>>) {
+    fn step<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
         let loops: Delayed<S, N> = Delayed::new(self.simd, self.block, self.pair, self.span);
         self.process(&loops.plants, &mut Steps::new(&loops), trace, found);
     }
@@ -138,7 +141,7 @@ impl<S: Simd, J: Job> Pair<'_, S, J> {
         plants: &Plants<S, P>,
         run: &mut dyn Run<S>,
         trace: &mut Trace<S>,
-        found: &mut Vec<Option<J::Found>>,
+        found: &mut Vec<J::Found>,
     ) {
         let job = Done {
             job: self.job,
@@ -176,7 +179,7 @@ struct Done<'a, S: Simd, J: Job, const P: usize> {
     run: &'a mut dyn Run<S>,
     members: &'a [usize],
     trace: &'a mut Trace<S>,
-    found: &'a mut Vec<Option<J::Found>>,
+    found: &'a mut Vec<J::Found>,
 }
 
 impl<S: Simd, J: Job, const P: usize> Outlined for Done<'_, S, J, P> {

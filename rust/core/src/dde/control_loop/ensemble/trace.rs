@@ -13,6 +13,9 @@ pub(super) const SAMPLES: usize = 256;
 /// enough for the cache of a core.
 const PARTS: usize = 128;
 
+/// Parts that are read at once: those of a chunk of samples with two parts.
+pub(super) const WINDOW: usize = 8;
+
 /// Delays in a trace of continuous loops, each of which has so many parts: whole chunks.
 pub(super) fn delays(parts: usize) -> usize {
     (PARTS / parts).next_multiple_of(CHUNK).max(CHUNK)
@@ -38,8 +41,13 @@ pub(super) struct Trace<S: Simd> {
     pub(super) samples: usize,
     /// Corners of one sample.
     pub(super) per_sample: usize,
-    /// Output before the first corner.
-    pub(super) begin: Real<S>,
+    /// The number, within a sample, of the part that is the jump of the output; of no part if there
+    /// is none.
+    pub(super) jump: usize,
+    /// Is the output not a line on every part?
+    pub(super) is_curved: bool,
+    pub(super) is_continuous: bool,
+    /// The output before the first corner, and those at all corners.
     pub(super) outputs: Vec<Lanes<S>>,
     /// States of the plant at samples, one after the other, if the output is curved.
     pub(super) states: Vec<Real<S>>,
@@ -66,8 +74,10 @@ impl<S: Simd> Trace<S> {
             first: 0,
             samples: 0,
             per_sample: 1,
-            begin: zero,
-            outputs: Vec::new(),
+            jump: usize::MAX,
+            is_curved: false,
+            is_continuous: false,
+            outputs: vec![zero.lanes(); WINDOW + 1],
             states: Vec::new(),
             bulges: Vec::new(),
             commands: Vec::new(),
@@ -82,15 +92,38 @@ impl<S: Simd> Trace<S> {
     #[inline(always)]
     pub(super) fn restart(&mut self, first: usize, begin: Real<S>) {
         self.chunks.clear();
-        (self.first, self.samples, self.begin) = (first, 0, begin);
+        (self.first, self.samples) = (first, 0);
+        if let Some(place) = self.outputs.first_mut() {
+            *place = begin.lanes();
+        }
         self.count = begin.constant(0.0);
         self.is_cut = self.count.lt(0.0);
+    }
+
+    /// The sample of a part, and its number within the sample.
+    #[inline]
+    pub(super) fn split(&self, part: usize) -> (usize, usize) {
+        match self.per_sample {
+            1 => (part, 0),
+            2 => (part / 2, part % 2),
+            corners => (part / corners, part % corners),
+        }
+    }
+
+    /// The place of the bulge of a part; none of a jump.
+    #[inline]
+    pub(super) fn bulge_of(&self, part: usize) -> Option<usize> {
+        if self.is_continuous {
+            return Some(part);
+        }
+        let (sample, number) = self.split(part);
+        (number != self.jump).then_some(sample)
     }
 
     /// Parts of the run of a loop in the trace.
     #[inline]
     pub(super) fn parts(&self, lane: usize) -> usize {
-        let cut = self.is_cut.select(1.0, self.begin.constant(0.0));
+        let cut = self.is_cut.select(1.0, self.count.constant(0.0));
         (of(&self.count, lane) + of(&cut, lane)) as usize
     }
 
@@ -103,7 +136,7 @@ impl<S: Simd> Trace<S> {
                 *number = new(*number);
             }
         };
-        let place = part * Self::WIDTH + lane;
+        let place = (part + 1) * Self::WIDTH + lane;
         if let Some(place) = flat_mut::<S>(&mut self.outputs).get_mut(place) {
             *place = output;
         }
@@ -116,20 +149,9 @@ impl<S: Simd> Trace<S> {
     /// The output of `lane` before (0) or at the end of a part (from 1 on).
     #[inline]
     pub(super) fn output(&self, lane: usize, place: usize) -> f64 {
-        let Some(corner) = place.checked_sub(1) else {
-            return of(&self.begin, lane);
-        };
         let outputs = flat::<S>(&self.outputs);
-        let output = outputs.get(corner * Self::WIDTH + lane);
+        let output = outputs.get(place * Self::WIDTH + lane);
         output.copied().unwrap_or(f64::NAN)
-    }
-
-    /// By how much an output of sample (or part) number `place` may exceed its corners.
-    #[inline]
-    pub(super) fn bulge(&self, lane: usize, place: usize) -> f64 {
-        let bulges = flat::<S>(&self.bulges);
-        let bulge = bulges.get(place * Self::WIDTH + lane);
-        bulge.copied().unwrap_or(0.0)
     }
 
     /// The polynomial of a part that has so many terms.

@@ -12,9 +12,10 @@ use crate::dde::limits::slack;
 use crate::simd::{Mask, Outlined, Real, Simd, flat, outlined};
 
 use super::loops::Plants;
-use super::piece::{LONG, Piece};
+use super::piece::Piece;
 use super::trace::{CHUNK, Trace, of};
 use super::transition::row;
+use super::window::shared;
 
 /// A trace with its loops.
 pub(super) struct View<'a, S: Simd, const P: usize> {
@@ -29,27 +30,45 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         CHUNK * self.trace.per_sample
     }
 
-    /// The sample of a part, and its number within the sample.
-    #[inline]
-    fn split(&self, part: usize) -> (usize, usize) {
-        match self.trace.per_sample {
-            1 => (part, 0),
-            2 => (part / 2, part % 2),
-            corners => (part / corners, part % corners),
+    /// The samples of parts, and their numbers within these.
+    #[inline(always)]
+    fn split(&self, parts: Real<S>) -> (Real<S>, Real<S>) {
+        let corners = self.trace.per_sample as f64;
+        if self.trace.per_sample == 1 {
+            return (parts, parts.constant(0.0));
         }
+        // The quotient of the middle of the part is far from whole numbers beside its error.
+        let samples = ((parts + 0.5) * (1.0 / corners) - 0.5).nearest();
+        (samples, parts - samples * corners)
     }
 
-    /// Time of a place.
-    #[inline]
-    pub(super) fn time(&self, lane: usize, place: usize) -> f64 {
-        let end = of(&self.loops.end, lane);
-        self.begin(lane, place).min(end)
+    /// Times of places.
+    #[inline(always)]
+    pub(super) fn times(&self, places: Real<S>) -> Real<S> {
+        let (samples, numbers) = self.split(places);
+        let mut offset = places.constant(0.0);
+        for (number, part) in self.loops.parts.iter().enumerate().skip(1) {
+            offset = numbers.eq(number as f64).select(part.offset, offset);
+        }
+        let time = self.loops.sample_time * (samples + self.trace.first as f64) + offset;
+        time.smaller(self.loops.end)
+    }
+
+    /// Lengths of parts; zero for jumps.
+    #[inline(always)]
+    pub(super) fn lengths(&self, parts: Real<S>) -> Real<S> {
+        let (_, numbers) = self.split(parts);
+        let mut length = parts.constant(0.0);
+        for (number, part) in self.loops.parts.iter().enumerate() {
+            length = numbers.eq(number as f64).select(part.length, length);
+        }
+        length
     }
 
     /// Time at which a part begins.
     #[inline]
     fn begin(&self, lane: usize, part: usize) -> f64 {
-        let (sample, number) = self.split(part);
+        let (sample, number) = self.trace.split(part);
         let sample = (self.trace.first + sample) as f64;
         let offset = self.loops.parts.get(number);
         of(&self.loops.sample_time, lane) * sample
@@ -59,34 +78,19 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
     /// Length of a part; zero for a jump.
     #[inline]
     pub(super) fn length(&self, lane: usize, part: usize) -> f64 {
-        let (_, number) = self.split(part);
+        let (_, number) = self.trace.split(part);
         let part = self.loops.parts.get(number);
         part.map_or(0.0, |part| of(&part.length, lane))
     }
 
-    /// By how much the output may exceed its values at both ends of a part.
-    #[inline]
-    pub(super) fn bulge(&self, lane: usize, part: usize) -> f64 {
-        if !self.loops.is_curved {
-            return 0.0;
-        }
-        let (sample, number) = self.split(part);
-        if self
-            .loops
-            .parts
-            .get(number)
-            .is_some_and(|part| part.is_jump)
-        {
-            return 0.0;
-        }
-        let is_continuous = self.loops.is_continuous;
-        self.trace
-            .bulge(lane, if is_continuous { part } else { sample })
-    }
-
-    /// The output on one part of each loop, zero where none is asked for.
-    pub(super) fn piece(&self, parts: &[Option<usize>]) -> Piece<S> {
-        outlined(self.loops.d.simd(), PieceOf { view: self, parts })
+    /// Make `piece` the output on one part of each loop in `wanted`, any polynomial of the others.
+    pub(super) fn piece(&self, parts: Real<S>, wanted: Mask<S>, piece: &mut Piece<S>) {
+        let made = PieceOf {
+            view: self,
+            parts: wanted.select(parts, parts.constant(-1.0)),
+            piece,
+        };
+        outlined(self.loops.d.simd(), made);
     }
 
     /// The part of a time, and σ in it; none if it is not in the trace.
@@ -130,22 +134,24 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         let zero = self.loops.d.constant(0.0);
         let is_cut = self.trace.is_cut;
         let (mut first, mut last, mut into) = (zero, zero, zero);
-        let mut parts = vec![None; zero.numbers().len()];
+        let mut parts = zero;
         let marks = is_cut.select(1.0, zero);
-        for (lane, place) in parts.iter_mut().enumerate() {
-            if of(&marks, lane) == 0.0 {
+        for (lane, &mark) in marks.numbers().iter().enumerate() {
+            if mark == 0.0 {
                 continue;
             }
             let part = of(&self.trace.count, lane) as usize;
             let length = self.length(lane, part);
             let share = (of(&self.loops.end, lane) - self.begin(lane, part)) / length;
-            *place = Some(part);
+            parts.numbers_mut()[lane] = part as f64;
             first.numbers_mut()[lane] = self.trace.output(lane, part);
             last.numbers_mut()[lane] = self.trace.output(lane, part + 1);
             into.numbers_mut()[lane] = share.clamp(0.0, 1.0);
         }
         let output = if self.loops.is_curved {
-            self.piece(&parts).at(into)
+            let mut piece = Piece::new(zero);
+            self.piece(parts, is_cut, &mut piece);
+            piece.at(into)
         } else {
             (last - first).mul_add(into, first)
         };
@@ -156,21 +162,43 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
 /// See [`View::piece`].
 struct PieceOf<'a, S: Simd, const P: usize> {
     view: &'a View<'a, S, P>,
-    parts: &'a [Option<usize>],
+    /// Negative where none is wanted.
+    parts: Real<S>,
+    piece: &'a mut Piece<S>,
 }
 
 impl<S: Simd, const P: usize> PieceOf<'_, S, P> {
+    /// The states and commands of sampled loops, and the numbers of the parts within their samples.
+    #[inline(always)]
+    fn gather(&self, x: &mut [Real<S>; P], [before, after, numbers]: [&mut Real<S>; 3]) {
+        let trace = self.view.trace;
+        for (lane, &part) in self.parts.numbers().iter().enumerate() {
+            if part < 0.0 {
+                continue;
+            }
+            let (sample, number) = trace.split(part as usize);
+            let states = trace.states.get(sample * P..(sample + 1) * P);
+            let states = states.unwrap_or_default();
+            for (x, state) in x.iter_mut().zip(states) {
+                x.numbers_mut()[lane] = of(state, lane);
+            }
+            if let Some([one, two]) = trace.commands.get(sample..sample + 2) {
+                before.numbers_mut()[lane] = of(one, lane);
+                after.numbers_mut()[lane] = of(two, lane);
+            }
+            numbers.numbers_mut()[lane] = number as f64;
+        }
+    }
+
     /// The polynomials that continuous loops leave in their trace.
     #[inline(always)]
-    fn stored(&self, zero: Real<S>) -> Piece<S> {
-        let mut piece = Piece {
-            terms: [zero; LONG + 1],
-            degree: self.view.loops.degree,
-        };
-        for (lane, &part) in self.parts.iter().enumerate() {
-            let Some(part) = part else {
+    fn stored(self) {
+        let piece = self.piece;
+        for (lane, &part) in self.parts.numbers().iter().enumerate() {
+            if part < 0.0 {
                 continue;
-            };
+            }
+            let part = part as usize;
             let stored = self.view.trace.polynomial(part, piece.degree + 1);
             let numbers = flat::<S>(stored)
                 .iter()
@@ -182,40 +210,36 @@ impl<S: Simd, const P: usize> PieceOf<'_, S, P> {
                 }
             }
         }
-        piece
     }
 }
 
 impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
-    type Output = Piece<S>;
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> Piece<S> {
+    fn run(self) {
         let (view, loops) = (self.view, self.view.loops);
         let zero = loops.d.constant(0.0);
+        self.piece.degree = loops.degree;
         if loops.is_continuous {
-            return self.stored(zero);
+            self.stored();
+            return;
         }
+        let wanted = self.parts.ge(0.0);
         let (mut x, mut before, mut after, mut numbers) = ([zero; P], zero, zero, zero);
-        for (lane, &part) in self.parts.iter().enumerate() {
-            let Some(part) = part else {
-                continue;
-            };
-            let (sample, number) = view.split(part);
-            let put = |into: &mut Real<S>, number: f64| {
-                if let Some(place) = into.numbers_mut().get_mut(lane) {
-                    *place = number;
-                }
-            };
+        // Neighbours often have the same part.
+        if let Some(part) = shared(self.parts, wanted) {
+            let (sample, number) = view.trace.split(part as usize);
             let states = view.trace.states.get(sample * P..(sample + 1) * P);
-            for (x, from) in x.iter_mut().zip(states.unwrap_or_default()) {
-                put(x, of(from, lane));
+            if let (Some(states), Some(&[one, two])) =
+                (states, view.trace.commands.get(sample..sample + 2))
+            {
+                x.copy_from_slice(states);
+                (before, after) = (one, two);
             }
-            if let Some([one, two]) = view.trace.commands.get(sample..sample + 2) {
-                put(&mut before, of(one, lane));
-                put(&mut after, of(two, lane));
-            }
-            put(&mut numbers, number as f64);
+            numbers = zero.constant(number as f64);
+        } else {
+            self.gather(&mut x, [&mut before, &mut after, &mut numbers]);
         }
         let sample = x;
         let (mut w, mut h) = (before, zero);
@@ -235,24 +259,20 @@ impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
                 }
             }
         }
-        let mut piece = Piece {
-            terms: [zero; LONG + 1],
-            degree: loops.degree,
-        };
+        let piece = self.piece;
         piece.terms[0] = row(&loops.c, &x, loops.d * w);
         let mut v = x;
         for i in 0..P {
             v[i] = row(&loops.a[i], &x, loops.b[i].mul_add(w, loops.e[i])) * h;
         }
-        piece.terms[1] = row(&loops.c, &v, zero);
+        piece.terms[1] = loops.seen(&v);
         for j in 2..=piece.degree {
             let factor = h * (1.0 / j as f64);
             let old = v;
             for i in 0..P {
                 v[i] = row(&loops.a[i], &old, zero) * factor;
             }
-            piece.terms[j] = row(&loops.c, &v, zero);
+            piece.terms[j] = loops.seen(&v);
         }
-        piece
     }
 }

@@ -88,7 +88,11 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             let history = trace.samples..=trace.samples + loops.samples;
             trace.commands.copy_within(history, 0);
         }
-        longer(&mut trace.outputs, SAMPLES * trace.per_sample, zero.lanes());
+        longer(
+            &mut trace.outputs,
+            1 + SAMPLES * trace.per_sample,
+            zero.lanes(),
+        );
         if loops.is_curved {
             longer(&mut trace.states, SAMPLES * P, zero);
             longer(&mut trace.bulges, SAMPLES, zero.lanes());
@@ -167,7 +171,8 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                     }
                 }
             }
-            let corners = sample * trace.per_sample..(sample + 1) * trace.per_sample;
+            let first_corner = 1 + sample * trace.per_sample;
+            let corners = first_corner..first_corner + trace.per_sample;
             let Some((last, places)) = trace
                 .outputs
                 .get_mut(corners)
@@ -200,10 +205,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 }
             }
             x = step.apply(&x, before, after);
-            output = x[0];
-            if !loops.is_first {
-                output = row(&loops.c, &first(&x), loops.zero);
-            }
+            output = loops.seen(&first(&x));
             if loops.is_direct {
                 output = loops.d.mul_add(after, output);
             }
@@ -289,6 +291,8 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
             .take(history)
             .for_each(|u| *u = zero);
         trace.per_sample = plants.parts.len();
+        (trace.jump, trace.is_curved) = (plants.jump, plants.is_curved);
+        trace.is_continuous = false;
     }
 
     fn advance(&mut self, trace: &mut Trace<S>) -> bool {

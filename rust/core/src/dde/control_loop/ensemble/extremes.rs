@@ -1,0 +1,217 @@
+//! Extrema of the outputs: at corners, inside of parts, and after the rise.
+
+use crate::simd::{Mask, Real, Simd, outlined};
+
+use super::piece::turns;
+use super::search::Search;
+use super::trace::of;
+use super::window::{EndsAt, EndsAway, Exceeds, Hit, Least};
+
+impl<S: Simd, const P: usize> Search<'_, S, P> {
+    /// Extremes at corners, and the end of unrest.
+    #[inline(always)]
+    pub(super) fn corners(&mut self) {
+        let counts = self.measured.counts;
+        let nan = self.view.loops.d.constant(f64::NAN);
+        for is_top in [true, false] {
+            let (chunk, value) = if is_top {
+                (self.spots.top, self.spots.most)
+            } else {
+                (self.spots.bottom, self.spots.least)
+            };
+            let wanted = counts & chunk.ge(0.0);
+            if !wanted.any() {
+                continue;
+            }
+            let range = self.chunks(chunk, chunk);
+            let hit = self.seek::<_, false>(wanted, range, EndsAt(value));
+            let time = hit.here.select(self.view.times(hit.part + 1.0), nan);
+            let extreme = if is_top {
+                &mut self.measured.top
+            } else {
+                &mut self.measured.bottom
+            };
+            extreme.0 = wanted.select(value, extreme.0);
+            extreme.1 = wanted.select(time, extreme.1);
+        }
+        let wanted = counts & self.spots.quiet.ge(0.0);
+        if wanted.any() {
+            let range = self.chunks(self.spots.quiet, self.spots.quiet);
+            let test = EndsAway {
+                steady: self.measured.steady,
+                band: self.measured.quiet_band,
+            };
+            let hit = self.seek::<_, true>(wanted, range, test);
+            // Otherwise it is the corner before the chunk that is outside.
+            let begin = range.0.smaller(self.spots.parts);
+            let time = self.view.times(hit.here.select(hit.part + 1.0, begin));
+            self.measured.unsettled_until = wanted.select(time, self.measured.unsettled_until);
+        }
+    }
+
+    /// Extremes inside of parts.
+    #[inline(always)]
+    pub(super) fn extremes(&mut self) {
+        let counts = self.measured.counts;
+        let one = self.view.loops.d.constant(1.0);
+        let turns = self.turns();
+        for is_top in [true, false] {
+            let (first, last) = if is_top {
+                self.spots.may_top
+            } else {
+                self.spots.may_bottom
+            };
+            let mut wanted = counts & first.le(last);
+            let (mut begin, end) = self.chunks(first, last);
+            while wanted.any() {
+                let (sign, most) = if is_top {
+                    (one, self.measured.top.0)
+                } else {
+                    (-one, -self.measured.bottom.0)
+                };
+                let bar = most + self.spots.tolerance;
+                let hit = self.seek::<_, false>(wanted, (begin, end), Exceeds { sign, bar, turns });
+                wanted = hit.here;
+                if !wanted.any() {
+                    break;
+                }
+                begin = hit.part + 1.0;
+                let shown = self.shown(hit.part, wanted, (one.lt(0.0), one));
+                let until = self.until(hit.part);
+                let has_one = wanted & shown.has_one & shown.at.le(until);
+                self.take_extremes(hit.part, shown.at, shown.output, has_one);
+                if shown.is_unknown.any() {
+                    self.take_all(hit.part, until, shown.is_unknown);
+                }
+            }
+        }
+    }
+
+    /// Take up extrema of the loops in `here`.
+    #[inline(always)]
+    fn take_extremes(&mut self, part: Real<S>, sigma: Real<S>, output: Real<S>, here: Mask<S>) {
+        if !here.any() {
+            return;
+        }
+        let time = self.time_in(part, sigma);
+        let measured = &mut *self.measured;
+        let higher = here & output.gt(measured.top.0);
+        measured.top.0 = higher.select(output, measured.top.0);
+        measured.top.1 = higher.select(time, measured.top.1);
+        let lower = here & output.lt(measured.bottom.0);
+        measured.bottom.0 = lower.select(output, measured.bottom.0);
+        measured.bottom.1 = lower.select(time, measured.bottom.1);
+    }
+
+    /// Take up all extrema of the loops in `here`, one after the other.
+    #[inline(always)]
+    fn take_all(&mut self, part: Real<S>, until: Real<S>, here: Mask<S>) {
+        let zero = part.constant(0.0);
+        let mut marks = here.select(1.0, zero);
+        for lane in 0..zero.numbers().len() {
+            if of(&marks, lane) == 0.0 {
+                continue;
+            }
+            marks = zero;
+            marks.numbers_mut()[lane] = 1.0;
+            let series = self.series(lane);
+            for sigma in turns(&series) {
+                if sigma <= of(&until, lane) {
+                    let (at, output) = (zero.constant(sigma), zero.constant(series.at(sigma)));
+                    self.take_extremes(part, at, output, marks.gt(0.0));
+                }
+            }
+            marks = here.select(1.0, zero);
+        }
+    }
+
+    /// The least corner after the end of the rise in a part, with an output there.
+    #[inline(always)]
+    pub(super) fn after_rise(&mut self, hit: &Hit<S>, done: Mask<S>, value: Real<S>) {
+        if !done.any() {
+            return;
+        }
+        let parts = self.spots.parts;
+        let chunk = self.spots.rise[1];
+        let end = self.chunks(chunk, chunk).1;
+        // The chunks after the one in which the level may be reached first are known together.
+        let is_there = hit.part.lt(end);
+        let least = Least {
+            trace: self.view.trace,
+            window: self.window,
+            wanted: done,
+            begin: hit.part,
+            end: is_there.select(end, parts),
+            sign: self.measured.sign,
+        };
+        let least = outlined(value.simd(), least).smaller(value);
+        let dip = is_there.select(least.smaller(self.spots.dip), least);
+        self.measured.dip = done.select(dip, self.measured.dip);
+        self.spots.dip_from = done.select(hit.part + 1.0, self.spots.dip_from);
+    }
+
+    /// Outputs after the rise that are less than at all corners.
+    #[inline(always)]
+    pub(super) fn dips(&mut self) {
+        let risen = self.measured.risen[1];
+        let mut begin = self.spots.dip_from;
+        let (sign, parts) = (self.measured.sign, self.spots.parts);
+        let mut wanted = self.measured.counts & risen.eq(risen) & begin.lt(parts);
+        while wanted.any() {
+            let bar = self.measured.dip - self.spots.tolerance;
+            let (from, to) = self.next_dip(begin, bar);
+            let (from, to) = (from.larger(begin), to.smaller(parts));
+            let test = Exceeds {
+                sign: -sign,
+                bar: -bar,
+                turns: self.turns(),
+            };
+            let hit = self.seek::<_, false>(wanted, (from, to), test);
+            begin = hit.here.select(hit.part + 1.0, to);
+            wanted = wanted & begin.lt(parts);
+            if !hit.here.any() {
+                continue;
+            }
+            let shown = self.shown(hit.part, hit.here, (sign.lt(-2.0), sign));
+            let until = self.until(hit.part);
+            let has_one = hit.here & shown.has_one & shown.at.le(until);
+            let dip = self.measured.dip;
+            let lower = dip.smaller(shown.output * sign);
+            self.measured.dip = has_one.select(lower, dip);
+            let unknown = hit.here & shown.is_unknown;
+            if unknown.any() {
+                let marks = unknown.select(1.0, dip.constant(0.0));
+                for lane in 0..marks.numbers().len() {
+                    if of(&marks, lane) == 0.0 {
+                        continue;
+                    }
+                    let series = self.series(lane);
+                    for sigma in turns(&series) {
+                        if sigma <= of(&until, lane) {
+                            let output = of(&sign, lane) * series.at(sigma);
+                            let dip = &mut self.measured.dip.numbers_mut()[lane];
+                            *dip = dip.min(output);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The parts of the first chunk with parts at or after `begin` whose outputs may be below a bar;
+    /// none and the end of the trace, where there is no such chunk.
+    #[inline(always)]
+    fn next_dip(&self, begin: Real<S>, bar: Real<S>) -> (Real<S>, Real<S>) {
+        let trace = self.view.trace;
+        let per_chunk = self.view.per_chunk() as f64;
+        let sign = self.measured.sign;
+        let mut next = begin.constant(trace.chunks.len() as f64);
+        for (number, chunk) in trace.chunks.iter().enumerate().rev() {
+            let number = number as f64;
+            let worst = (chunk.most * sign).min(chunk.least * sign) - chunk.bulge;
+            let is_after = begin.lt((number + 1.0) * per_chunk);
+            next = (worst.lt(bar) & is_after).select(number, next);
+        }
+        self.chunks(next, next)
+    }
+}
