@@ -2,12 +2,9 @@
 
 use crate::simd::{Real, Simd};
 
-use super::sets::{Sets, of};
+use super::sets::{SETS, Sets, of};
 use super::shape::Shape;
 use super::transition::Matrix;
-
-/// Number of loops in a block: two vectors of the widest instruction set.
-pub(super) const SETS: usize = 16;
 
 /// One number for each loop of a block.
 pub(super) type Column = [f64; SETS];

@@ -3,7 +3,7 @@
 use crate::dde::control_loop::metrics::{Levels, Record};
 use crate::simd::{Mask, Real, Simd};
 
-use super::block::SETS;
+use super::sets::SETS;
 use super::trace::of;
 
 /// What is known of responses.

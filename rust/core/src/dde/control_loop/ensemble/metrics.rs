@@ -3,12 +3,11 @@
 use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics};
 use crate::simd::{Real, Simd};
 
-use super::block::SETS;
 use super::each::{TIME_CONSTANTS, judged};
 use super::loops::Plants;
 use super::measured::Measured;
 use super::rounds::measure;
-use super::sets::{Measures, Outcome, of as number};
+use super::sets::{Measures, Outcome, SETS, of as number};
 use super::through::Job;
 use super::trace::{Trace, of};
 use super::view::View;

@@ -1,10 +1,12 @@
 //! Loops of one structure, one set of numbers for each.
 
-use super::block::SETS;
 use crate::Error;
 use crate::dde::control_loop::linear_loop::LinearLoop;
 use crate::dde::control_loop::metrics::Metrics;
 use crate::dde::control_loop::row::{Row, width};
+
+/// Number of loops in a block: two vectors of the widest instruction set.
+pub(super) const SETS: usize = 16;
 
 /// Outcome of one set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

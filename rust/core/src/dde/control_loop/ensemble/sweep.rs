@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::block::{Column, Members, SETS};
+use super::block::{Column, Members};
 use super::each;
 use super::metrics::MetricsJob;
 use super::responses::ResponsesJob;
-use super::sets::{Measures, Outcome, Sets, of};
+use super::sets::{Measures, Outcome, SETS, Sets, of};
 use super::shape::{Shapes, plant_states};
 use super::through::{Job, through};
 use crate::dde::control_loop::metrics::{Criteria, Metrics};

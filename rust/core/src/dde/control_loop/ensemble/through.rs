@@ -4,10 +4,10 @@ use pulp::WithSimd;
 
 use crate::simd::{Instructions, Outlined, Real, Simd, outlined};
 
-use super::block::{Block, Members, SETS};
+use super::block::{Block, Members};
 use super::delayed::{Delayed, Steps};
 use super::loops::{Loops, Plants};
-use super::sets::Sets;
+use super::sets::{SETS, Sets};
 use super::trace::Trace;
 use super::walk::{Run, Walk};
 
