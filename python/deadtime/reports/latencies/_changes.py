@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from deadtime._base.plain import plain
+from deadtime.reports.latencies._elsewhere import TWO_SIDED
 from deadtime.reports.latencies._latency import Latency
 
 #: Probability below which a difference counts as real.
 REAL = 0.05
-
-#: Half of a 95 % interval, in standard errors.
-TWO_SIDED = 1.96
 
 
 @dataclass(frozen=True)
