@@ -7,8 +7,9 @@
 //!
 //!   x_{j+1} = h (A x_j + B w_j)/(j + 1),  u_j = K x_j + L w_j,  with E r and M r added for j = 0.
 //!
-//! Where the last coefficients are not negligible, elements become half as long from there on; a loop
-//! that needs more than [`MOST_PARTS`] of them is left to [`super::delayed`]. The code is
+//! For one integrator and m = 1 they have a closed form ([`super::slopes`]). Where the last coefficients
+//! are not negligible, elements become half as long from there on; a loop that needs more than
+//! [`MOST_PARTS`] of them, or leaves its closed form, is left to [`super::delayed`]. The code is
 //! compiled for each instruction set: all operations are rounded one by one, in one order, and have
 //! the same bits in each.
 
@@ -27,6 +28,7 @@ use super::delayed::Orders;
 use super::effort::watch;
 use super::pieces::{REPORTED, SMOOTH};
 use super::polynomial::{LANES, Polynomial};
+use super::slopes::Slopes;
 use super::values_at_times::ValuesAtTimes;
 
 /// Largest number of elements in a delay.
@@ -179,16 +181,20 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
             input_breaks,
         } = self.found;
         let mut parts = self.parts;
-        let mut lengths = Lengths::new(self.delay, parts, self.b[0]);
-        let is_integrator = N == 1 && self.a[0][0] == 0.0;
+        let mut lengths = Lengths::new(self.delay, parts);
         // Output and command at one time follow from the state then.
         let from_state = N == 1 && self.l == 0.0 && self.d == 0.0;
+        let slope = |u: f64| self.b[0] * u + self.forcing[0];
+        let mut slopes = (from_state && parts == 1 && self.a[0][0] == 0.0)
+            .then(|| Slopes::new(self.k[0] * self.b[0], self.delay, slope(self.command)));
         let is_one = std::ptr::eq(outputs.times(), inputs.times());
         let mut commands = vec![Polynomial::constant(self.command); parts];
         let mut x = [Polynomial::constant(0.0); N];
         let mut state = self.state;
-        let (mut slot, mut before) = (0, parts - 1);
+        let mut slot = 0;
         let mut arriving = SMOOTH;
+        // The command on the element before, if it was constant.
+        let mut kept = Some(self.command);
         let mut element = 0;
         while !(outputs.is_done() && inputs.is_done()) {
             watch(element, self.task)?;
@@ -196,8 +202,8 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
             let next = (element + 1) as f64 * self.delay / parts as f64;
             let end = next - slack(next, self.delay);
             let w = &commands[slot];
-            if is_integrator {
-                x[0].integrate(state[0], w, &lengths.gains, lengths.h * self.forcing[0]);
+            if let Some(slopes) = &slopes {
+                slopes.integrate(&mut x[0], state[0]);
             } else {
                 expand(
                     &mut x,
@@ -214,25 +220,44 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
                 is_sound &= x.trim();
             }
             if !is_sound {
-                if 2 * parts > MOST_PARTS {
+                if slopes.is_some() || 2 * parts > MOST_PARTS {
                     return Ok(false);
                 }
                 commands = halved(&commands);
-                (parts, slot, before, element) = (2 * parts, 2 * slot, 2 * before + 1, 2 * element);
-                lengths = Lengths::new(self.delay, parts, self.b[0]);
+                (parts, slot, element) = (2 * parts, 2 * slot, 2 * element);
+                lengths = Lengths::new(self.delay, parts);
                 continue;
             }
             for (x, state) in x.iter().zip(&mut state) {
                 *state = x.end();
             }
-            let mut u = Polynomial::constant(self.constant);
-            for (k, x) in self.k.iter().zip(&x) {
-                u.add(*k, x);
-            }
-            if self.l != 0.0 {
-                u.add(self.l, w);
-            }
-            let h = lengths.h;
+            let inverse = lengths.inverse;
+            let (u, is_constant) = if let Some(slopes) = &mut slopes {
+                let u = self.constant + self.k[0] * x[0].coefficient(0);
+                slopes.push(slope(u));
+                (u, self.k[0] == 0.0 || x[0].is_constant())
+            } else {
+                let mut u = Polynomial::constant(self.constant);
+                for (k, x) in self.k.iter().zip(&x) {
+                    u.add(*k, x);
+                }
+                if self.l != 0.0 {
+                    u.add(self.l, w);
+                }
+                if !from_state {
+                    let mut y = Polynomial::constant(0.0);
+                    for (c, x) in self.c.iter().zip(&x) {
+                        y.add(*c, x);
+                    }
+                    if self.d != 0.0 {
+                        y.add(self.d, w);
+                    }
+                    outputs.fill(t, inverse, end, |sigmas| y.at(sigmas));
+                    inputs.fill(t, inverse, end, |sigmas| u.at(sigmas));
+                }
+                commands[slot] = u;
+                (u.coefficient(0), u.is_constant())
+            };
             if from_state {
                 // Arguments by value that are changed were changed for their caller as well by
                 // rustc 1.89 to 1.95, without optimisation across functions.
@@ -249,25 +274,16 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
                     command
                 };
                 if is_one {
-                    outputs.fill_both(inputs, t, h, end, |sigmas| {
+                    outputs.fill_both(inputs, t, inverse, end, |sigmas| {
                         let x = x[0].at(sigmas);
                         (output(&x), command(&x))
                     });
                 } else {
-                    outputs.fill(t, h, end, |sigmas| output(&x[0].at(sigmas)));
-                    inputs.fill(t, h, end, |sigmas| command(&x[0].at(sigmas)));
+                    outputs.fill(t, inverse, end, |sigmas| output(&x[0].at(sigmas)));
+                    inputs.fill(t, inverse, end, |sigmas| command(&x[0].at(sigmas)));
                 }
-            } else {
-                let mut y = Polynomial::constant(0.0);
-                for (c, x) in self.c.iter().zip(&x) {
-                    y.add(*c, x);
-                }
-                if self.d != 0.0 {
-                    y.add(self.d, w);
-                }
-                outputs.fill(t, h, end, |sigmas| y.at(sigmas));
-                inputs.fill(t, h, end, |sigmas| u.at(sigmas));
             }
+            let still = is_constant.then_some(u);
             if slot == 0 {
                 let jumps = element == 0;
                 if self.orders.of_output(arriving, jumps) <= REPORTED && outputs.reaches(t) {
@@ -278,15 +294,14 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
                     input_breaks.push(t);
                 }
                 // Where one constant continues as itself, nothing breaks a delay later.
-                arriving = if order <= REPORTED && u.is_constant() && u == commands[before] {
+                arriving = if order <= REPORTED && is_constant && still == kept {
                     SMOOTH
                 } else {
                     order
                 };
             }
-            check_growth(&state, u.coefficient(0), next)?;
-            commands[slot] = u;
-            before = slot;
+            kept = still;
+            check_growth(&state, u, next)?;
             slot += 1;
             if slot == parts {
                 slot = 0;
@@ -299,23 +314,21 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
 
 /// What follows from the length of elements.
 struct Lengths {
-    h: f64,
+    /// 1/h.
+    inverse: f64,
     /// h/(j + 1).
     factors: [f64; DEGREE],
-    /// The same times B of the first state.
-    gains: [f64; DEGREE],
 }
 
 impl Lengths {
     #[inline(always)]
-    fn new(delay: f64, parts: usize, b: f64) -> Self {
+    fn new(delay: f64, parts: usize) -> Self {
         let h = delay / parts as f64;
-        let (mut factors, mut gains) = ([0.0; DEGREE], [0.0; DEGREE]);
-        for (j, (factor, gain)) in factors.iter_mut().zip(&mut gains).enumerate() {
-            *factor = h / (j + 1) as f64;
-            *gain = *factor * b;
+        let factors = std::array::from_fn(|j| h / (j + 1) as f64);
+        Self {
+            inverse: 1.0 / h,
+            factors,
         }
-        Self { h, factors, gains }
     }
 }
 
@@ -360,141 +373,4 @@ fn expand<const N: usize>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::delayed;
-    use super::*;
-    use crate::dde::Equations;
-    use proptest::prelude::*;
-
-    const DELAY: f64 = 0.3;
-
-    fn found(
-        plant: &LinearLoop,
-        start: &Start,
-        times: [&[f64]; 2],
-        instructions: Option<Instructions>,
-    ) -> Option<Trajectory> {
-        let reference = Reference::step(0.2, 1.0).unwrap();
-        let task = Task::new();
-        let mut requested = RequestedOutput::new(times[0], times[1], 0.0).unwrap();
-        let Some(instructions) = instructions else {
-            return Some(delayed::run(plant, start, &reference, requested, &task).unwrap());
-        };
-        let is_stored = run(
-            instructions,
-            plant,
-            start,
-            &reference,
-            &mut requested,
-            &task,
-        );
-        is_stored.unwrap().then_some(requested.trajectory)
-    }
-
-    /// Largest of the values and one.
-    fn size(values: &[f64]) -> f64 {
-        values.iter().fold(1.0, |most, value| most.max(value.abs()))
-    }
-
-    fn apart(a: &[f64], b: &[f64]) -> f64 {
-        assert_eq!(a.len(), b.len());
-        a.iter()
-            .zip(b)
-            .fold(0.0, |m, (a, b)| f64::max(m, (a - b).abs()))
-    }
-
-    proptest! {
-        /// The general method gives the same response, and every instruction set the same bits.
-        #[test]
-        fn it_is_the_response_of_the_general_method(
-            n in 1_usize..=3,
-            numbers in prop::collection::vec(-2.0..2.0_f64, 32),
-            (is_integrator, is_direct, is_same, parts) in (any::<bool>(), any::<bool>(), any::<bool>(), 0.5..4.0),
-        ) {
-            let at = |first: usize, count: usize| numbers[first..first + count].to_vec();
-            let mut a: Vec<f64> = at(0, n * n).iter().map(|a| a * parts).collect();
-            if is_integrator && n == 1 {
-                a[0] = 0.0;
-            }
-            let equations = Equations {
-                a,
-                b: at(9, n),
-                e: at(12, n),
-                k: at(15, n),
-                c: at(18, n),
-                l: if is_direct { 0.4 * numbers[21] } else { 0.0 },
-                m: numbers[22],
-                d: if is_direct { numbers[23] } else { 0.0 },
-                impulse: 0.0,
-            };
-            let plant = LinearLoop::new(equations, DELAY, None, None).unwrap();
-            let start = Start { state: at(24, n), command: numbers[27], ..Start::default() };
-            let times: Vec<f64> = (0..=40).map(|i| 0.05 * f64::from(i)).collect();
-            let later: Vec<f64> = times.iter().map(|t| t + DELAY).collect();
-            let times = [if is_same { &times[..] } else { &later[..] }, &times[..]];
-            let truth = found(&plant, &start, times, None).unwrap();
-            // What is rounded grows like a state that starts elsewhere, though the response need not.
-            let mut rounding = [1e-14 * size(&truth.outputs), 1e-14 * size(&truth.inputs)];
-            for i in 0..n {
-                let mut moved = start.clone();
-                moved.state[i] += 1e-14;
-                let moved = found(&plant, &moved, times, None).unwrap();
-                rounding[0] += apart(&moved.outputs, &truth.outputs);
-                rounding[1] += apart(&moved.inputs, &truth.inputs);
-            }
-            let mut bits = None;
-            for instructions in Instructions::available() {
-                let Some(here) = found(&plant, &start, times, Some(instructions)) else {
-                    prop_assert!(bits.is_none());
-                    continue;
-                };
-                prop_assert!(apart(&here.outputs, &truth.outputs) < 10.0 * rounding[0]);
-                prop_assert!(apart(&here.inputs, &truth.inputs) < 10.0 * rounding[1]);
-                prop_assert_eq!(here.output_breaks.len(), truth.output_breaks.len());
-                prop_assert_eq!(here.input_breaks.len(), truth.input_breaks.len());
-                let breaks = apart(&here.output_breaks, &truth.output_breaks);
-                prop_assert!(breaks < 1e-14 * size(&truth.output_breaks));
-                let found = [here.outputs, here.inputs].map(|values| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
-                let first = bits.get_or_insert(found.clone());
-                prop_assert_eq!(&found, first);
-            }
-        }
-    }
-
-    #[test]
-    fn what_moves_or_jumps_later_is_left_to_the_general_method() {
-        let equations = |impulse| Equations {
-            a: vec![0.0],
-            b: vec![1.0],
-            e: vec![0.0],
-            k: vec![-1.3],
-            m: 1.3,
-            c: vec![1.0],
-            impulse,
-            ..Equations::default()
-        };
-        let start = Start {
-            state: vec![0.0],
-            ..Start::default()
-        };
-        let is_stored = |impulse, limit, reference: Reference| {
-            let plant = LinearLoop::new(equations(impulse), DELAY, None, limit).unwrap();
-            let mut requested = RequestedOutput::new(&[0.0, 1.0], &[], 0.0).unwrap();
-            let chosen = Instructions::chosen();
-            run(
-                chosen,
-                &plant,
-                &start,
-                &reference,
-                &mut requested,
-                &Task::new(),
-            )
-            .unwrap()
-        };
-        let jump = |time| Reference::new(0.0, vec![time], vec![1.0]).unwrap();
-        assert!(is_stored(0.0, None, jump(0.0)));
-        assert!(!is_stored(0.0, None, jump(0.5)));
-        assert!(!is_stored(0.1, None, jump(0.0)));
-        assert!(!is_stored(0.0, Some(1.0), jump(0.0)));
-    }
-}
+mod tests;

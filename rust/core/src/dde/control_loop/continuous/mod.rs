@@ -22,6 +22,7 @@ mod pieces;
 mod polynomial;
 mod run;
 mod saturation;
+mod slopes;
 mod values_at_times;
 
 pub(crate) use run::run;

@@ -54,17 +54,14 @@ impl Polynomial {
         self.terms[REST..] == [0.0; DEGREE]
     }
 
-    /// Become the integral of w from `first` on, each power of w with its gain; `slope` is added to
-    /// the first of them.
+    /// Become `first` + Σ_j g_j v_j σ^{j+1}.
     #[inline(always)]
-    pub(super) fn integrate(&mut self, first: f64, w: &Self, gains: &[f64; DEGREE], slope: f64) {
-        let integrands = &w.terms[FIRST..FIRST + DEGREE];
-        for ((term, w), gain) in self.terms[REST..].iter_mut().zip(integrands).zip(gains) {
-            *term = w * gain;
+    pub(super) fn integrate(&mut self, first: f64, gains: &[f64; DEGREE], slopes: &[f64; DEGREE]) {
+        for ((term, gain), slope) in self.terms[REST..].iter_mut().zip(gains).zip(slopes) {
+            *term = gain * slope;
         }
         self.terms[FIRST] = first;
-        self.terms[REST] += slope;
-        self.pairs = (w.pairs + 1).min(PAIRS);
+        self.pairs = (self.pairs + 1).min(PAIRS);
     }
 
     /// Add `gain` times another one.

@@ -42,17 +42,18 @@ impl<'t> ValuesAtTimes<'t> {
         self.times.last().is_some_and(|&last| t <= last)
     }
 
-    /// Store the values at all times before `end`; they are `values` of (time − `start`)/`length`.
+    /// Store the values at all times before `end`; they are `values` of
+    /// (time − `start`) `inverse`, `inverse` that of the length of the element.
     #[inline(always)]
     pub(super) fn fill(
         &mut self,
         start: f64,
-        length: f64,
+        inverse: f64,
         end: f64,
         values: impl Fn(&Block) -> Block,
     ) {
         while self.times.get(self.done).is_some_and(|time| *time < end) {
-            let (sigmas, count) = self.block(start, length, end);
+            let (sigmas, count) = self.block(start, inverse, end);
             self.put(values(&sigmas), count);
         }
     }
@@ -63,12 +64,12 @@ impl<'t> ValuesAtTimes<'t> {
         &mut self,
         other: &mut Self,
         start: f64,
-        length: f64,
+        inverse: f64,
         end: f64,
         values: impl Fn(&Block) -> (Block, Block),
     ) {
         while self.times.get(self.done).is_some_and(|time| *time < end) {
-            let (sigmas, count) = self.block(start, length, end);
+            let (sigmas, count) = self.block(start, inverse, end);
             let (mine, others) = values(&sigmas);
             self.put(mine, count);
             other.put(others, count);
@@ -77,7 +78,7 @@ impl<'t> ValuesAtTimes<'t> {
 
     /// The local coordinates of the next times, and how many are before `end`.
     #[inline(always)]
-    fn block(&self, start: f64, length: f64, end: f64) -> (Block, usize) {
+    fn block(&self, start: f64, inverse: f64, end: f64) -> (Block, usize) {
         let left = &self.times[self.done..];
         let mut block = [f64::INFINITY; LANES];
         match left.first_chunk() {
@@ -87,7 +88,7 @@ impl<'t> ValuesAtTimes<'t> {
         let mut count = 0;
         for time in &mut block {
             count += usize::from(*time < end);
-            *time = (*time - start) / length;
+            *time = (*time - start) * inverse;
         }
         (block, count)
     }
