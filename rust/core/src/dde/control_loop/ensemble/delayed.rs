@@ -20,7 +20,7 @@ use super::loops::{Part, Plants};
 use super::piece::LONG;
 use super::trace::{CHUNK, Summary, Trace, delays};
 use super::transition::{Map, row};
-use super::walk::{Ends, Run, is_sound, longer};
+use super::walk::{Ends, Run, are_sound, longer};
 
 /// Upper bounds on σ − σ^j for j from 2 on: σ^j c stays within c times this of its chord.
 const CHORDS: [f64; LONG - 1] = [
@@ -170,7 +170,10 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
                 } else {
                     loops.sample_time * self.number as f64
                 };
-                self.lost = self.lost | (begin.lt(loops.end) & !is_sound(&self.x, zero));
+                // The first coefficient of the new polynomial of the command is its value there.
+                let u = trace.commands.get((number - 1) * terms).copied();
+                let sound = are_sound(&self.x) & are_sound(&[u.unwrap_or(zero)]);
+                self.lost = self.lost | (begin.lt(loops.end) & !sound);
                 self.output = row(&loops.c, &self.x, zero);
                 if let (Some(output), Some(place)) =
                     (trace.outputs.get_mut(part + 1), trace.bulges.get_mut(part))

@@ -5,14 +5,15 @@ use crate::simd::{Mask, Real, Simd, outlined};
 use super::piece::turns;
 use super::search::Search;
 use super::trace::of;
-use super::window::{EndsAt, EndsAway, Exceeds, Hit, Least};
+use super::window::{EndsAt, Exceeds, Hit, Least, Strays};
 
 impl<S: Simd, const P: usize> Search<'_, S, P> {
     /// Extremes at corners, and the end of unrest.
     #[inline(always)]
     pub(super) fn corners(&mut self) {
         let counts = self.measured.counts;
-        let nan = self.view.loops.d.constant(f64::NAN);
+        let zero = self.view.loops.zero;
+        let nan = zero.constant(f64::NAN);
         for is_top in [true, false] {
             let (chunk, value) = if is_top {
                 (self.spots.top, self.spots.most)
@@ -34,18 +35,17 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
             extreme.0 = wanted.select(value, extreme.0);
             extreme.1 = wanted.select(time, extreme.1);
         }
-        let wanted = counts & self.spots.quiet.ge(0.0);
+        let chunk = self.spots.restless;
+        let wanted = counts & chunk.ge(0.0);
         if wanted.any() {
-            let range = self.chunks(self.spots.quiet, self.spots.quiet);
-            let test = EndsAway {
+            let test = Strays {
                 steady: self.measured.steady,
                 band: self.measured.quiet_band,
             };
+            let range = (zero, self.chunks(chunk, chunk).1);
             let hit = self.seek::<_, true>(wanted, range, test);
-            // Otherwise it is the corner before the chunk that is outside.
-            let begin = range.0.smaller(self.spots.parts);
-            let time = self.view.times(hit.here.select(hit.part + 1.0, begin));
-            self.measured.unsettled_until = wanted.select(time, self.measured.unsettled_until);
+            let time = self.view.times(hit.part + 1.0);
+            self.measured.unsettled_until = hit.here.select(time, self.measured.unsettled_until);
         }
     }
 

@@ -6,7 +6,7 @@ use crate::simd::{Mask, Real, Simd};
 
 use super::search::{Passing, Search};
 use super::trace::of;
-use super::window::{Leaves, Reaches};
+use super::window::{Reaches, Strays};
 
 impl<S: Simd, const P: usize> Search<'_, S, P> {
     /// When a level of the rise is reached.
@@ -82,7 +82,7 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         self.measured.inside_since = outside.select(nan, self.measured.inside_since);
         wanted = wanted & !outside;
         while wanted.any() {
-            let test = Leaves { steady, band };
+            let test = Strays { steady, band };
             let hit = self.seek::<_, true>(wanted, (zero, end), test);
             wanted = hit.here;
             if !wanted.any() {

@@ -67,6 +67,8 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) sample_time: Real<S>,
     /// Time by which the output is read ahead.
     pub(super) ahead: Real<S>,
+    /// The time after which a loop reacts to its own output.
+    pub(super) wait: Real<S>,
     /// Time at which the run ends.
     pub(super) end: Real<S>,
     pub(super) parts: Vec<Part<S, P>>,
@@ -215,11 +217,8 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         let shape = block.shape;
         let push = block.column::<S, N>(simd, N * N + N, pair);
         let limit = block.number(simd, Number::Limit, pair);
-        let ahead = if block.is_ahead {
-            block.number(simd, Number::Delay, pair)
-        } else {
-            zero
-        };
+        let delay = block.number(simd, Number::Delay, pair);
+        let ahead = if block.is_ahead { delay } else { zero };
         Self {
             samples: shape.samples as usize,
             is_continuous: shape.is_continuous,
@@ -236,6 +235,7 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             is_limited: limit.lt(f64::INFINITY).any(),
             sample_time,
             ahead,
+            wait: delay + block.number(simd, Number::SampleTime, pair),
             end: ahead + span,
             parts: Vec::with_capacity(shape.corners()),
             corners: Vec::with_capacity(shape.corners()),
@@ -276,16 +276,6 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             x[0]
         } else {
             row(&self.c, x, self.zero)
-        }
-    }
-
-    /// The time after which a loop reacts to its own output.
-    #[inline(always)]
-    pub(super) fn wait(&self) -> Real<S> {
-        if self.is_continuous {
-            self.sample_time
-        } else {
-            self.sample_time * (self.samples + 2) as f64
         }
     }
 

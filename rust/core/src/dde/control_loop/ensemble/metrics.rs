@@ -81,7 +81,6 @@ impl Job for MetricsJob<'_> {
         let mut measures = Measures::new();
         let mut radius = zero;
         let mut is_doubtful = false;
-        let wait = loops.wait();
         for (lane, (&set, levels)) in members.iter().zip(&levels).enumerate() {
             if of(&unfit, lane) > 0.0 {
                 measures.push(&Metrics::UNKNOWN, None);
@@ -99,7 +98,7 @@ impl Job for MetricsJob<'_> {
             record.risen = (since(record.risen.0, ahead), since(record.risen.1, ahead));
             record.inside_since = since(record.inside_since, ahead);
             record.unsettled_until -= ahead;
-            let stays = record.stays_settled(self.span, of(&wait, lane));
+            let stays = record.stays_settled(self.span, of(&loops.wait, lane));
             let (metrics, mut outcome) = judged(record.metrics(levels), stays);
             let inside = self.span - metrics.settling_time;
             let slowest = number(self.slowest, set);

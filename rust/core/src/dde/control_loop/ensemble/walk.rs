@@ -145,9 +145,6 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             };
             let before = commands.first().copied().unwrap_or(loops.zero);
             let u = row(k, &x, feedback.l.mul_add(before, loops.command));
-            if ENDS {
-                lost = lost | (now.lt(loops.end) & !is_sound(&x, u));
-            }
             let w = u.min(limit).max(lowest);
             if let Some(place) = commands.last_mut() {
                 *place = w;
@@ -205,6 +202,14 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 }
             }
             x = step.apply(&x, before, after);
+            let next = loops.sample_time * (number + 1) as f64;
+            let (mut u_sound, mut x_sound) = (are_sound(&[u]), are_sound(&x));
+            if ENDS {
+                // Nothing after the end counts.
+                u_sound = u_sound | now.ge(loops.end);
+                x_sound = x_sound | next.gt(loops.end);
+            }
+            lost = lost | !(u_sound & x_sound);
             output = loops.seen(&first(&x));
             if loops.is_direct {
                 output = loops.d.mul_add(after, output);
@@ -215,8 +220,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             *last = output.lanes();
             number += 1;
             if ENDS {
-                let end = loops.sample_time * number as f64;
-                ends.corner(&mut summary, output, begin, end);
+                ends.corner(&mut summary, output, begin, next);
             } else {
                 summary.most = summary.most.max(output);
                 summary.least = summary.least.min(output);
@@ -228,7 +232,6 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         } else {
             trace.count = trace.count + (CHUNK * trace.per_sample) as f64;
             self.inside = output;
-            lost = lost | !is_sound(&x, loops.zero);
         }
         (self.x, self.output, self.number, self.lost) = (x, output, number, lost);
         trace.samples = first_sample + CHUNK;
@@ -236,12 +239,12 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
     }
 }
 
-/// Are all states, and `u`, within all limits?
+/// Are all numbers within the limit on those of a response?
 #[inline(always)]
-pub(super) fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
-    let mut sound = u.abs().le(DIVERGED);
-    for x in x {
-        sound = sound & x.abs().le(DIVERGED);
+pub(super) fn are_sound<S: Simd, const N: usize>(numbers: &[Real<S>; N]) -> Mask<S> {
+    let mut sound = numbers[0].abs().le(DIVERGED);
+    for number in numbers.iter().skip(1) {
+        sound = sound & number.abs().le(DIVERGED);
     }
     sound
 }
