@@ -95,8 +95,6 @@ pub(super) struct Steps<'a, S: Simd, const N: usize> {
     inside: Real<S>,
     /// Number of the next sample.
     number: usize,
-    /// Does the run include a sample at its end?
-    is_closed: bool,
     lost: Mask<S>,
     /// The loops whose command may have exceeded its limit.
     limited: Mask<S>,
@@ -111,7 +109,6 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             output: zero,
             inside: zero,
             number: 0,
-            is_closed: false,
             lost: loops.plants.no_lane,
             limited: loops.plants.no_lane,
         }
@@ -152,6 +149,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             is_cut: trace.is_cut,
             inside: self.inside,
             run_end: loops.end,
+            latest: loops.latest,
         };
         for _ in 0..CHUNK {
             let now = loops.sample_time * self.number as f64;
@@ -252,12 +250,9 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
 }
 
 impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
-    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool) {
+    fn begin(&mut self, trace: &mut Trace<S>) {
         let loops = self.loops;
-        *self = Self {
-            is_closed,
-            ..Self::new(loops)
-        };
+        *self = Self::new(loops);
         let plants = &loops.plants;
         trace.per_sample = plants.parts.len();
         (trace.jump, trace.is_curved) = (plants.jump, true);
@@ -271,8 +266,9 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
         outlined(self.output.simd(), Advance { steps: self, trace })
     }
 
+    #[inline(always)]
     fn is_over(&self) -> bool {
-        self.loops.plants.are_over(self.number, self.is_closed) || !(!self.limited).any()
+        self.loops.plants.are_over(self.number) || !(!self.limited).any()
     }
 
     fn unfit(&self) -> Mask<S> {

@@ -105,14 +105,11 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
                 done = done | enters | leaves;
                 let unknown = (enters | leaves) & !sigma.eq(sigma);
                 if unknown.any() {
-                    let marks = unknown.select(1.0, zero);
-                    for lane in 0..marks.numbers().len() {
-                        if of(&marks, lane) > 0.0 {
-                            let until = of(&until, lane);
-                            let bounds = (of(&(steady - band), lane), of(&(steady + band), lane));
-                            let last = last_entry(&self.series(lane), bounds, until);
-                            sigma.numbers_mut()[lane] = last.unwrap_or(until);
-                        }
+                    for lane in unknown.lanes() {
+                        let until = of(&until, lane);
+                        let bounds = (of(&(steady - band), lane), of(&(steady + band), lane));
+                        let last = last_entry(&self.series(lane), bounds, until);
+                        sigma.numbers_mut()[lane] = last.unwrap_or(until);
                     }
                 }
                 time = curved.select(self.time_in(hit.part, sigma), time);

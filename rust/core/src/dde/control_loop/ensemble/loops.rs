@@ -71,6 +71,8 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) wait: Real<S>,
     /// Time at which the run ends.
     pub(super) end: Real<S>,
+    /// The end and rounding errors: what happens up to this time belongs to the run.
+    pub(super) latest: Real<S>,
     pub(super) parts: Vec<Part<S, P>>,
     /// All corners of a sample but the last one.
     pub(super) corners: Vec<Corner<S, P>>,
@@ -172,7 +174,7 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
     #[inline(always)]
     fn run(self) {
         let plants = self.0;
-        let zero = plants.d.constant(0.0);
+        let zero = plants.zero;
         let slope = along(&plants.c, &plants.a);
         let (mut most, mut longest) = ([zero; P], zero);
         for part in &plants.parts {
@@ -219,6 +221,7 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         let limit = block.number(simd, Number::Limit, pair);
         let delay = block.number(simd, Number::Delay, pair);
         let ahead = if block.is_ahead { delay } else { zero };
+        let end = ahead + span;
         Self {
             samples: shape.samples as usize,
             is_continuous: shape.is_continuous,
@@ -236,7 +239,8 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             sample_time,
             ahead,
             wait: delay + block.number(simd, Number::SampleTime, pair),
-            end: ahead + span,
+            end,
+            latest: (end + sample_time).mul_add(32.0 * f64::EPSILON, end),
             parts: Vec::with_capacity(shape.corners()),
             corners: Vec::with_capacity(shape.corners()),
             first_output: zero,
@@ -255,18 +259,11 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         }
     }
 
-    /// Are the runs of all loops over before sample `number`? `is_closed` runs include a sample at
-    /// their end.
+    /// Are the runs of all loops over before sample `number`? One at the end belongs to the run.
     #[inline(always)]
-    pub(super) fn are_over(&self, number: usize, is_closed: bool) -> bool {
+    pub(super) fn are_over(&self, number: usize) -> bool {
         let now = self.sample_time * number as f64;
-        !if is_closed {
-            // Rounding errors do not part the last sample from the end.
-            let rounding = (self.end + self.sample_time) * (32.0 * f64::EPSILON);
-            now.le(self.end + rounding).any()
-        } else {
-            now.lt(self.end).any()
-        }
+        !now.le(self.latest).any()
     }
 
     /// C x.

@@ -73,7 +73,7 @@ impl<S: Simd> Outlined for Look<'_, S> {
         } = *measured;
         let zero = sign.constant(0.0);
         let has_risen = measured.risen[1].ge(0.0);
-        let parts = trace.count + trace.is_cut.select(1.0, zero);
+        let parts = trace.parts();
         let per_chunk = (CHUNK * trace.per_sample) as f64;
         let (mut most, mut least) = (measured.top.0, measured.bottom.0);
         let (none, never) = (zero.constant(-1.0), zero.constant(f64::INFINITY));
@@ -121,10 +121,6 @@ impl<S: Simd> Outlined for Look<'_, S> {
                 }
             }
         }
-        let mut last = zero;
-        for (lane, place) in last.numbers_mut().iter_mut().enumerate() {
-            *place = trace.output(lane, trace.parts(lane));
-        }
         let [may_top, may_bottom] = extremes;
         Spots {
             parts,
@@ -140,7 +136,7 @@ impl<S: Simd> Outlined for Look<'_, S> {
             dip,
             dip_from: never,
             tolerance: size,
-            last,
+            last: trace.last(zero),
         }
     }
 }

@@ -103,15 +103,15 @@ impl<S: Simd> Test<S> for EndsAt<S> {
 pub(super) struct Exceeds<S: Simd> {
     pub(super) sign: Real<S>,
     pub(super) bar: Real<S>,
-    /// The output has no extremum in a part on which it changes by more bulges.
-    pub(super) turns: f64,
+    /// The output has no extremum in a part on which it changes by more than so many bulges.
+    pub(super) most_change: f64,
 }
 
 impl<S: Simd> Test<S> for Exceeds<S> {
     #[inline(always)]
     fn holds(&self, first: Real<S>, last: Real<S>, bulge: Real<S>) -> Mask<S> {
         let most = (first * self.sign).max(last * self.sign) + bulge;
-        let may_turn = (last - first).abs().le(bulge * self.turns);
+        let may_turn = (last - first).abs().le(bulge * self.most_change);
         most.gt(self.bar) & may_turn & bulge.gt(0.0)
     }
 }
