@@ -237,6 +237,39 @@ def test_what_grows_without_bound_says_so():
     assert dtm.sweep(lagging, {"Kp": np.array([1.0, 1e3])}, 400.0).status.tolist() == [0, 2]
 
 
+def test_a_command_beyond_all_limits_diverges_wherever_its_run_ends():
+    # 20 whole samples, a run that ends inside one, and neighbours of which one ends earlier.
+    sample_times = np.array([0.5, 0.065, 0.4])
+    for place in (slice(0, 1), slice(1, 2), slice(None)):
+        times = sample_times[place]
+        found = dtm.sweep(DRONE, {"Kp": np.full(len(times), 1e160), "sample_time": times}, 10.0)
+        assert (found.status == dtm.loops.SweepStatus.DIVERGED).all()
+    smooth = DRONE.replace(sample_time=None, limit=None)
+    found = dtm.sweep(smooth, {"Kp": np.array([1e160]), "gain": np.array([1e-160])}, 10.0)
+    assert found.status[0] == dtm.loops.SweepStatus.DIVERGED
+    with pytest.raises(ValueError, match="exceeds 1e150"):
+        smooth.replace(Kp=1e160, gain=1e-160).simulate([0.0, 1.0])
+
+
+@pytest.mark.parametrize("lags", [[0.3], [0.3, 0.1, 0.1, 0.1, 0.1]])
+@pytest.mark.parametrize("delay", [0.1, 3 * 0.05, 0.12])
+def test_a_jump_at_the_end_of_a_run_counts(lags, delay):
+    # The output jumps as soon as the first command arrives. With five states, loops run alone.
+    numerator = [0.4 * lags[0], 1.0]
+    for lag in lags[1:]:
+        numerator = np.polymul(numerator, [0.5 * lag, 1.0])
+    denominator = np.array([1.0])
+    for lag in lags:
+        denominator = np.polymul(denominator, [lag, 1.0])
+    plant = dtm.RationalPlant(list(numerator), list(denominator))
+    loop = dtm.ControlLoop(plant, dtm.P(0.5), delay=delay, sample_time=0.05)
+    end = round(delay, 2)
+    found = dtm.sweep(loop, {"Kp": [0.5]}, end)
+    jump = loop.step_response([0.0, end]).outputs[-1]
+    assert found["peak"][0] == jump > 0.0
+    assert found["peak_time"][0] == pytest.approx(end, abs=1e-12)
+
+
 def test_endless_work_is_refused_for_its_set_alone():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
     found = dtm.sweep(loop, {"delay": np.array([0.3, 1e-8])}, 10.0)

@@ -88,7 +88,7 @@ class SweepStatus(IntEnum):
     constants of the closed loop: the settling time is NaN, and so is the rise time if the output
     did not rise through the step. An unstable loop with a bounded output is among these."""
     DIVERGED = 2
-    """The response exceeded 1e150 before the end: all values are NaN."""
+    """The response or its command exceeded 1e150 before the end: all values are NaN."""
     REFUSED = 3
     """Not simulated, because a loop with these numbers cannot be simulated or would take far too
     much work: all values are NaN."""

@@ -255,6 +255,16 @@ impl<S: Simd> Mask<S> {
     }
 }
 
+impl<S: Simd> Mask<S> {
+    /// The lanes in which it is true.
+    #[inline(always)]
+    pub(crate) fn lanes(self) -> impl Iterator<Item = usize> {
+        let marks = self.select(1.0, Real::splat(self.simd, 0.0));
+        let is_true = move |&lane: &usize| marks.numbers().get(lane).is_some_and(|&m| m > 0.0);
+        (0..2 * S::F64_LANES).filter(is_true)
+    }
+}
+
 impl<S: Simd> BitAnd for Mask<S> {
     type Output = Self;
 

@@ -63,7 +63,11 @@ impl StepMetrics {
             return;
         }
         let from = ((self.start - start) / length).max(0.0);
-        let to = ((self.end - start) / length).min(end);
+        let mut to = ((self.end - start) / length).min(end);
+        // A polynomial that begins at the end may begin with a jump.
+        if start <= self.end + slack(self.end, self.end) {
+            to = to.max(0.0);
+        }
         if from > to || from.is_nan() || to.is_nan() {
             return;
         }

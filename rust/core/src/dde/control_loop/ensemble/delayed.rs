@@ -20,7 +20,7 @@ use super::loops::{Part, Plants};
 use super::piece::LONG;
 use super::trace::{CHUNK, Summary, Trace, delays};
 use super::transition::{Map, row};
-use super::walk::{Ends, Run, is_sound, longer};
+use super::walk::{Ends, Run, are_sound, longer};
 
 /// Upper bounds on σ − σ^j for j from 2 on: σ^j c stays within c times this of its chord.
 const CHORDS: [f64; LONG - 1] = [
@@ -95,8 +95,6 @@ pub(super) struct Steps<'a, S: Simd, const N: usize> {
     inside: Real<S>,
     /// Number of the next sample.
     number: usize,
-    /// Does the run include a sample at its end?
-    is_closed: bool,
     lost: Mask<S>,
     /// The loops whose command may have exceeded its limit.
     limited: Mask<S>,
@@ -111,7 +109,6 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             output: zero,
             inside: zero,
             number: 0,
-            is_closed: false,
             lost: loops.plants.no_lane,
             limited: loops.plants.no_lane,
         }
@@ -152,6 +149,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             is_cut: trace.is_cut,
             inside: self.inside,
             run_end: loops.end,
+            latest: loops.latest,
         };
         for _ in 0..CHUNK {
             let now = loops.sample_time * self.number as f64;
@@ -170,7 +168,10 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
                 } else {
                     loops.sample_time * self.number as f64
                 };
-                self.lost = self.lost | (begin.lt(loops.end) & !is_sound(&self.x, zero));
+                // The first coefficient of the new polynomial of the command is its value there.
+                let u = trace.commands.get((number - 1) * terms).copied();
+                let sound = are_sound(&self.x) & are_sound(&[u.unwrap_or(zero)]);
+                self.lost = self.lost | (begin.lt(loops.end) & !sound);
                 self.output = row(&loops.c, &self.x, zero);
                 if let (Some(output), Some(place)) =
                     (trace.outputs.get_mut(part + 1), trace.bulges.get_mut(part))
@@ -249,12 +250,9 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
 }
 
 impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
-    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool) {
+    fn begin(&mut self, trace: &mut Trace<S>) {
         let loops = self.loops;
-        *self = Self {
-            is_closed,
-            ..Self::new(loops)
-        };
+        *self = Self::new(loops);
         let plants = &loops.plants;
         trace.per_sample = plants.parts.len();
         (trace.jump, trace.is_curved) = (plants.jump, true);
@@ -268,8 +266,9 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
         outlined(self.output.simd(), Advance { steps: self, trace })
     }
 
+    #[inline(always)]
     fn is_over(&self) -> bool {
-        self.loops.plants.are_over(self.number, self.is_closed) || !(!self.limited).any()
+        self.loops.plants.are_over(self.number) || !(!self.limited).any()
     }
 
     fn unfit(&self) -> Mask<S> {

@@ -2,17 +2,16 @@
 
 use crate::simd::{Mask, Real, Simd, outlined};
 
-use super::piece::turns;
 use super::search::Search;
-use super::trace::of;
-use super::window::{EndsAt, EndsAway, Exceeds, Hit, Least};
+use super::window::{EndsAt, Exceeds, Hit, Least, Strays};
 
 impl<S: Simd, const P: usize> Search<'_, S, P> {
     /// Extremes at corners, and the end of unrest.
     #[inline(always)]
     pub(super) fn corners(&mut self) {
         let counts = self.measured.counts;
-        let nan = self.view.loops.d.constant(f64::NAN);
+        let zero = self.view.loops.zero;
+        let nan = zero.constant(f64::NAN);
         for is_top in [true, false] {
             let (chunk, value) = if is_top {
                 (self.spots.top, self.spots.most)
@@ -34,18 +33,17 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
             extreme.0 = wanted.select(value, extreme.0);
             extreme.1 = wanted.select(time, extreme.1);
         }
-        let wanted = counts & self.spots.quiet.ge(0.0);
+        let chunk = self.spots.restless;
+        let wanted = counts & chunk.ge(0.0);
         if wanted.any() {
-            let range = self.chunks(self.spots.quiet, self.spots.quiet);
-            let test = EndsAway {
+            let test = Strays {
                 steady: self.measured.steady,
                 band: self.measured.quiet_band,
             };
+            let range = (zero, self.chunks(chunk, chunk).1);
             let hit = self.seek::<_, true>(wanted, range, test);
-            // Otherwise it is the corner before the chunk that is outside.
-            let begin = range.0.smaller(self.spots.parts);
-            let time = self.view.times(hit.here.select(hit.part + 1.0, begin));
-            self.measured.unsettled_until = wanted.select(time, self.measured.unsettled_until);
+            let time = self.view.times(hit.part + 1.0);
+            self.measured.unsettled_until = hit.here.select(time, self.measured.unsettled_until);
         }
     }
 
@@ -53,8 +51,8 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
     #[inline(always)]
     pub(super) fn extremes(&mut self) {
         let counts = self.measured.counts;
-        let one = self.view.loops.d.constant(1.0);
-        let turns = self.turns();
+        let one = self.view.loops.zero.constant(1.0);
+        let most_change = self.most_change();
         for is_top in [true, false] {
             let (first, last) = if is_top {
                 self.spots.may_top
@@ -70,7 +68,15 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
                     (-one, -self.measured.bottom.0)
                 };
                 let bar = most + self.spots.tolerance;
-                let hit = self.seek::<_, false>(wanted, (begin, end), Exceeds { sign, bar, turns });
+                let hit = self.seek::<_, false>(
+                    wanted,
+                    (begin, end),
+                    Exceeds {
+                        sign,
+                        bar,
+                        most_change,
+                    },
+                );
                 wanted = hit.here;
                 if !wanted.any() {
                     break;
@@ -78,51 +84,25 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
                 begin = hit.part + 1.0;
                 let shown = self.shown(hit.part, wanted, (one.lt(0.0), one));
                 let until = self.until(hit.part);
-                let has_one = wanted & shown.has_one & shown.at.le(until);
-                self.take_extremes(hit.part, shown.at, shown.output, has_one);
-                if shown.is_unknown.any() {
-                    self.take_all(hit.part, until, shown.is_unknown);
+                self.take(hit.part, shown.at, shown.extremum(wanted, until));
+                for (at, output) in self.others(&shown, wanted, until) {
+                    self.take(hit.part, at, output);
                 }
             }
         }
     }
 
-    /// Take up extrema of the loops in `here`.
+    /// Take up extrema at `sigma` of parts; NaN where there is none.
     #[inline(always)]
-    fn take_extremes(&mut self, part: Real<S>, sigma: Real<S>, output: Real<S>, here: Mask<S>) {
-        if !here.any() {
+    fn take(&mut self, part: Real<S>, sigma: Real<S>, output: Real<S>) {
+        let (top, bottom) = (self.measured.top, self.measured.bottom);
+        let (higher, lower) = (output.gt(top.0), output.lt(bottom.0));
+        if !(higher | lower).any() {
             return;
         }
         let time = self.time_in(part, sigma);
-        let measured = &mut *self.measured;
-        let higher = here & output.gt(measured.top.0);
-        measured.top.0 = higher.select(output, measured.top.0);
-        measured.top.1 = higher.select(time, measured.top.1);
-        let lower = here & output.lt(measured.bottom.0);
-        measured.bottom.0 = lower.select(output, measured.bottom.0);
-        measured.bottom.1 = lower.select(time, measured.bottom.1);
-    }
-
-    /// Take up all extrema of the loops in `here`, one after the other.
-    #[inline(always)]
-    fn take_all(&mut self, part: Real<S>, until: Real<S>, here: Mask<S>) {
-        let zero = part.constant(0.0);
-        let mut marks = here.select(1.0, zero);
-        for lane in 0..zero.numbers().len() {
-            if of(&marks, lane) == 0.0 {
-                continue;
-            }
-            marks = zero;
-            marks.numbers_mut()[lane] = 1.0;
-            let series = self.series(lane);
-            for sigma in turns(&series) {
-                if sigma <= of(&until, lane) {
-                    let (at, output) = (zero.constant(sigma), zero.constant(series.at(sigma)));
-                    self.take_extremes(part, at, output, marks.gt(0.0));
-                }
-            }
-            marks = here.select(1.0, zero);
-        }
+        self.measured.top = (higher.select(output, top.0), higher.select(time, top.1));
+        self.measured.bottom = (lower.select(output, bottom.0), lower.select(time, bottom.1));
     }
 
     /// The least corner after the end of the rise in a part, with an output there.
@@ -164,7 +144,7 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
             let test = Exceeds {
                 sign: -sign,
                 bar: -bar,
-                turns: self.turns(),
+                most_change: self.most_change(),
             };
             let hit = self.seek::<_, false>(wanted, (from, to), test);
             begin = hit.here.select(hit.part + 1.0, to);
@@ -174,27 +154,11 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
             }
             let shown = self.shown(hit.part, hit.here, (sign.lt(-2.0), sign));
             let until = self.until(hit.part);
-            let has_one = hit.here & shown.has_one & shown.at.le(until);
-            let dip = self.measured.dip;
-            let lower = dip.smaller(shown.output * sign);
-            self.measured.dip = has_one.select(lower, dip);
-            let unknown = hit.here & shown.is_unknown;
-            if unknown.any() {
-                let marks = unknown.select(1.0, dip.constant(0.0));
-                for lane in 0..marks.numbers().len() {
-                    if of(&marks, lane) == 0.0 {
-                        continue;
-                    }
-                    let series = self.series(lane);
-                    for sigma in turns(&series) {
-                        if sigma <= of(&until, lane) {
-                            let output = of(&sign, lane) * series.at(sigma);
-                            let dip = &mut self.measured.dip.numbers_mut()[lane];
-                            *dip = dip.min(output);
-                        }
-                    }
-                }
+            let mut dip = (shown.extremum(hit.here, until) * sign).smaller(self.measured.dip);
+            for (_, output) in self.others(&shown, hit.here, until) {
+                dip = (output * sign).smaller(dip);
             }
+            self.measured.dip = dip;
         }
     }
 

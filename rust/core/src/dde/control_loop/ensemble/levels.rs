@@ -6,7 +6,7 @@ use crate::simd::{Mask, Real, Simd};
 
 use super::search::{Passing, Search};
 use super::trace::of;
-use super::window::{Leaves, Reaches};
+use super::window::{Reaches, Strays};
 
 impl<S: Simd, const P: usize> Search<'_, S, P> {
     /// When a level of the rise is reached.
@@ -82,7 +82,7 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         self.measured.inside_since = outside.select(nan, self.measured.inside_since);
         wanted = wanted & !outside;
         while wanted.any() {
-            let test = Leaves { steady, band };
+            let test = Strays { steady, band };
             let hit = self.seek::<_, true>(wanted, (zero, end), test);
             wanted = hit.here;
             if !wanted.any() {
@@ -105,14 +105,11 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
                 done = done | enters | leaves;
                 let unknown = (enters | leaves) & !sigma.eq(sigma);
                 if unknown.any() {
-                    let marks = unknown.select(1.0, zero);
-                    for lane in 0..marks.numbers().len() {
-                        if of(&marks, lane) > 0.0 {
-                            let until = of(&until, lane);
-                            let bounds = (of(&(steady - band), lane), of(&(steady + band), lane));
-                            let last = last_entry(&self.series(lane), bounds, until);
-                            sigma.numbers_mut()[lane] = last.unwrap_or(until);
-                        }
+                    for lane in unknown.lanes() {
+                        let until = of(&until, lane);
+                        let bounds = (of(&(steady - band), lane), of(&(steady + band), lane));
+                        let last = last_entry(&self.series(lane), bounds, until);
+                        sigma.numbers_mut()[lane] = last.unwrap_or(until);
                     }
                 }
                 time = curved.select(self.time_in(hit.part, sigma), time);

@@ -67,8 +67,12 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) sample_time: Real<S>,
     /// Time by which the output is read ahead.
     pub(super) ahead: Real<S>,
+    /// The time after which a loop reacts to its own output.
+    pub(super) wait: Real<S>,
     /// Time at which the run ends.
     pub(super) end: Real<S>,
+    /// The end and rounding errors: what happens up to this time belongs to the run.
+    pub(super) latest: Real<S>,
     pub(super) parts: Vec<Part<S, P>>,
     /// All corners of a sample but the last one.
     pub(super) corners: Vec<Corner<S, P>>,
@@ -170,7 +174,7 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
     #[inline(always)]
     fn run(self) {
         let plants = self.0;
-        let zero = plants.d.constant(0.0);
+        let zero = plants.zero;
         let slope = along(&plants.c, &plants.a);
         let (mut most, mut longest) = ([zero; P], zero);
         for part in &plants.parts {
@@ -215,11 +219,9 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         let shape = block.shape;
         let push = block.column::<S, N>(simd, N * N + N, pair);
         let limit = block.number(simd, Number::Limit, pair);
-        let ahead = if block.is_ahead {
-            block.number(simd, Number::Delay, pair)
-        } else {
-            zero
-        };
+        let delay = block.number(simd, Number::Delay, pair);
+        let ahead = if block.is_ahead { delay } else { zero };
+        let end = ahead + span;
         Self {
             samples: shape.samples as usize,
             is_continuous: shape.is_continuous,
@@ -236,7 +238,9 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             is_limited: limit.lt(f64::INFINITY).any(),
             sample_time,
             ahead,
-            end: ahead + span,
+            wait: delay + block.number(simd, Number::SampleTime, pair),
+            end,
+            latest: (end + sample_time).mul_add(32.0 * f64::EPSILON, end),
             parts: Vec::with_capacity(shape.corners()),
             corners: Vec::with_capacity(shape.corners()),
             first_output: zero,
@@ -255,18 +259,11 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         }
     }
 
-    /// Are the runs of all loops over before sample `number`? `is_closed` runs include a sample at
-    /// their end.
+    /// Are the runs of all loops over before sample `number`? One at the end belongs to the run.
     #[inline(always)]
-    pub(super) fn are_over(&self, number: usize, is_closed: bool) -> bool {
+    pub(super) fn are_over(&self, number: usize) -> bool {
         let now = self.sample_time * number as f64;
-        !if is_closed {
-            // Rounding errors do not part the last sample from the end.
-            let rounding = (self.end + self.sample_time) * (32.0 * f64::EPSILON);
-            now.le(self.end + rounding).any()
-        } else {
-            now.lt(self.end).any()
-        }
+        !now.le(self.latest).any()
     }
 
     /// C x.
@@ -276,16 +273,6 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             x[0]
         } else {
             row(&self.c, x, self.zero)
-        }
-    }
-
-    /// The time after which a loop reacts to its own output.
-    #[inline(always)]
-    pub(super) fn wait(&self) -> Real<S> {
-        if self.is_continuous {
-            self.sample_time
-        } else {
-            self.sample_time * (self.samples + 2) as f64
         }
     }
 

@@ -1,7 +1,7 @@
 //! The metrics of all loops of two vectors.
 
 use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics};
-use crate::simd::{Real, Simd};
+use crate::simd::Simd;
 
 use super::each::{TIME_CONSTANTS, judged};
 use super::loops::Plants;
@@ -39,27 +39,24 @@ impl Job for MetricsJob<'_> {
         trace: &mut Trace<S>,
         found: &mut Vec<Self::Found>,
     ) {
-        let zero = loops.d.constant(0.0);
+        let zero = loops.zero;
         let mut steady = zero;
         for (lane, place) in steady.numbers_mut().iter_mut().enumerate() {
             *place = members
                 .get(lane)
                 .map_or(0.0, |&set| number(self.steady, set));
         }
-        run.begin(trace, false);
-        let mut runs = run.advance(trace);
-        close(loops, trace);
+        run.begin(trace);
+        let mut runs = advance(loops, run, trace);
         let is_known = steady.eq(steady);
         if (!is_known).any() {
-            let mut last = last_output(trace, zero);
+            let mut last = trace.last(zero);
             if !run.is_over() {
-                while run.advance(trace) {
-                    close(loops, trace);
-                    last = last_output(trace, last);
+                while advance(loops, run, trace) {
+                    last = trace.last(last);
                 }
-                run.begin(trace, false);
-                runs = run.advance(trace);
-                close(loops, trace);
+                run.begin(trace);
+                runs = advance(loops, run, trace);
             }
             steady = is_known.select(steady, last);
         }
@@ -71,17 +68,13 @@ impl Job for MetricsJob<'_> {
         let mut measured = Measured::new(&levels, first, members.len());
         while runs {
             measure(&View { loops, trace }, &mut measured);
-            runs = run.advance(trace);
-            if runs {
-                close(loops, trace);
-            }
+            runs = advance(loops, run, trace);
         }
         let lost = run.lost().select(1.0, zero);
         let unfit = run.unfit().select(1.0, zero);
         let mut measures = Measures::new();
         let mut radius = zero;
         let mut is_doubtful = false;
-        let wait = loops.wait();
         for (lane, (&set, levels)) in members.iter().zip(&levels).enumerate() {
             if of(&unfit, lane) > 0.0 {
                 measures.push(&Metrics::UNKNOWN, None);
@@ -99,7 +92,7 @@ impl Job for MetricsJob<'_> {
             record.risen = (since(record.risen.0, ahead), since(record.risen.1, ahead));
             record.inside_since = since(record.inside_since, ahead);
             record.unsettled_until -= ahead;
-            let stays = record.stays_settled(self.span, of(&wait, lane));
+            let stays = record.stays_settled(self.span, of(&loops.wait, lane));
             let (metrics, mut outcome) = judged(record.metrics(levels), stays);
             let inside = self.span - metrics.settling_time;
             let slowest = number(self.slowest, set);
@@ -141,28 +134,19 @@ fn since(time: f64, ahead: f64) -> f64 {
     }
 }
 
-/// Store the outputs at the ends of runs that end inside a part.
-fn close<S: Simd, const P: usize>(loops: &Plants<S, P>, trace: &mut Trace<S>) {
-    if !trace.is_cut.any() {
-        return;
-    }
-    let (output, is_cut) = View { loops, trace }.cut();
-    let marks = is_cut.select(1.0, output.constant(0.0));
-    for lane in 0..marks.numbers().len() {
-        if of(&marks, lane) > 0.0 {
+/// Run on, and store the outputs at the ends of runs that end inside a part.
+#[inline(always)]
+fn advance<S: Simd, const P: usize>(
+    loops: &Plants<S, P>,
+    run: &mut dyn Run<S>,
+    trace: &mut Trace<S>,
+) -> bool {
+    let runs = run.advance(trace);
+    if runs && trace.is_cut.any() {
+        let output = View { loops, trace }.cut();
+        for lane in trace.is_cut.lanes() {
             trace.set_last(lane, of(&output, lane));
         }
     }
-}
-
-/// The last output of the runs in a trace; `before` where it holds none.
-fn last_output<S: Simd>(trace: &Trace<S>, before: Real<S>) -> Real<S> {
-    let mut last = before;
-    for (lane, place) in last.numbers_mut().iter_mut().enumerate() {
-        let parts = trace.parts(lane);
-        if parts > 0 {
-            *place = trace.output(lane, parts);
-        }
-    }
-    last
+    runs
 }

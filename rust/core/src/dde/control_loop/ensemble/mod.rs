@@ -8,9 +8,9 @@
 //! by polynomials only where the bound says that they matter ([`rounds`]). Sets whose delays hold
 //! the same number of whole samples share a block ([`shape`]), so that its lanes read their delayed
 //! commands from the same index. Continuous loops with a delay run in lanes as long as their
-//! command stays within its limit, by the method of steps ([`delayed`]). All other sets are run one by one by the code for single loops
-//! ([`each`]). The result of a set has the same bits for any neighbours, number of threads and
-//! instruction set.
+//! command stays within its limit, by the method of steps ([`delayed`]). All other sets are run one
+//! by one by the code for single loops ([`each`]). The result of a set has the same bits for any
+//! neighbours, number of threads and instruction set.
 
 mod block;
 mod decay;

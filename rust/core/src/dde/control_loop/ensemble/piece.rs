@@ -70,6 +70,16 @@ pub(super) struct Shown<S: Simd> {
     pub(super) crossing: Real<S>,
 }
 
+impl<S: Simd> Shown<S> {
+    /// The outputs at the extrema, before `until`, of the pieces in `wanted` that have one; NaN of
+    /// the others.
+    #[inline(always)]
+    pub(super) fn extremum(&self, wanted: Mask<S>, until: Real<S>) -> Real<S> {
+        let here = wanted & self.has_one & self.at.le(until);
+        here.select(self.output, until.constant(f64::NAN))
+    }
+}
+
 impl<S: Simd> Piece<S> {
     pub(super) fn new(zero: Real<S>) -> Self {
         Self {

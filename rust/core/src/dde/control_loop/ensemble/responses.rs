@@ -1,6 +1,6 @@
 //! Outputs of all loops of two vectors at given times.
 
-use crate::simd::{Real, Simd};
+use crate::simd::Simd;
 
 use super::loops::Plants;
 use super::piece::Piece;
@@ -31,12 +31,12 @@ impl Job for ResponsesJob<'_> {
         trace: &mut Trace<S>,
         found: &mut Vec<Self::Found>,
     ) {
-        let zero = loops.d.constant(0.0);
+        let zero = loops.zero;
         let mut outputs: Vec<Vec<f64>> = members
             .iter()
             .map(|_| Vec::with_capacity(self.times.len()))
             .collect();
-        run.begin(trace, true);
+        run.begin(trace);
         let mut piece = Piece::new(zero);
         let mut runs = true;
         while runs {
@@ -59,7 +59,7 @@ impl Job for ResponsesJob<'_> {
                 if !is_due {
                     break;
                 }
-                let values = self.values(&view, parts, sigma, &mut piece);
+                let values = view.outputs((parts, sigma), parts.ge(0.0), &mut piece);
                 for (lane, outputs) in outputs.iter_mut().enumerate() {
                     if of(&parts, lane) >= 0.0 {
                         outputs.push(of(&values, lane));
@@ -79,34 +79,5 @@ impl Job for ResponsesJob<'_> {
             }
         });
         found.push(outputs.collect());
-    }
-}
-
-impl ResponsesJob<'_> {
-    /// The outputs of each loop at `sigma` of a part.
-    #[inline(always)]
-    fn values<S: Simd, const P: usize>(
-        &self,
-        view: &View<'_, S, P>,
-        parts: Real<S>,
-        sigma: Real<S>,
-        piece: &mut Piece<S>,
-    ) -> Real<S> {
-        if view.loops.is_curved {
-            view.piece(parts, parts.ge(0.0), piece);
-            return piece.at(sigma);
-        }
-        let (mut first, mut last) = (sigma, sigma);
-        for (lane, &part) in parts.numbers().iter().enumerate() {
-            if part < 0.0 {
-                continue;
-            }
-            let part = part as usize;
-            first.numbers_mut()[lane] = view.trace.output(lane, part);
-            last.numbers_mut()[lane] = view.trace.output(lane, part + 1);
-        }
-        sigma
-            .gt(0.0)
-            .select((last - first).mul_add(sigma, first), first)
     }
 }

@@ -45,9 +45,9 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         outlined(begin.simd(), seek)
     }
 
-    /// See [`Exceeds::turns`].
+    /// See [`Exceeds::most_change`].
     #[inline(always)]
-    pub(super) fn turns(&self) -> f64 {
+    pub(super) fn most_change(&self) -> f64 {
         if self.view.loops.is_continuous {
             // Their bulges are no bounds on y″.
             f64::INFINITY
@@ -110,9 +110,7 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         if !is_last.any() {
             return one;
         }
-        let length = self.view.lengths(part);
-        let share = (self.view.times(part + 1.0) - self.view.times(part)) / length;
-        is_last.select(share.smaller(one), one)
+        is_last.select(self.view.until(part), one)
     }
 
     /// Time of a part at σ.
@@ -130,7 +128,7 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         (end - begin).mul_add(share, begin)
     }
 
-    /// The loops in `wanted` with an extremum inside of a part that passes a test.
+    /// The loops in `wanted` with an extremum inside of a part that passes a test, which NaN does not.
     #[inline(always)]
     pub(super) fn passes(
         &self,
@@ -139,28 +137,38 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         until: Real<S>,
         passing: &impl Passing<S>,
     ) -> Mask<S> {
-        let mut passes = wanted & shown.has_one & shown.at.le(until) & passing.holds(shown.output);
-        let unknown = wanted & shown.is_unknown;
-        if unknown.any() {
-            let zero = until.constant(0.0);
-            let marks = unknown.select(1.0, zero);
-            let mut more = zero;
-            for lane in 0..zero.numbers().len() {
-                if of(&marks, lane) == 0.0 {
-                    continue;
-                }
-                let series = self.series(lane);
-                for sigma in turns(&series) {
-                    let output = zero.constant(series.at(sigma));
-                    let holds = passing.holds(output).select(1.0, zero);
-                    if sigma <= of(&until, lane) && of(&holds, lane) > 0.0 {
-                        more.numbers_mut()[lane] = 1.0;
-                    }
-                }
-            }
-            passes = passes | more.gt(0.0);
+        let mut passes = passing.holds(shown.extremum(wanted, until));
+        for (_, output) in self.others(shown, wanted, until) {
+            passes = passes | passing.holds(output);
         }
         passes
+    }
+
+    /// σ and output of the extrema of the loops in `wanted` that are not known otherwise, one after
+    /// the other; NaN in all other lanes.
+    #[inline(always)]
+    pub(super) fn others(
+        &self,
+        shown: &Shown<S>,
+        wanted: Mask<S>,
+        until: Real<S>,
+    ) -> Vec<(Real<S>, Real<S>)> {
+        let mut found = Vec::new();
+        let unknown = wanted & shown.is_unknown;
+        if !unknown.any() {
+            return found;
+        }
+        for lane in unknown.lanes() {
+            let series = self.series(lane);
+            for sigma in turns(&series) {
+                if sigma <= of(&until, lane) {
+                    let mut output = until.constant(f64::NAN);
+                    output.numbers_mut()[lane] = series.at(sigma);
+                    found.push((until.constant(sigma), output));
+                }
+            }
+        }
+        found
     }
 
     /// Where the pieces of the loops in `wanted` first cross a level.
@@ -175,12 +183,9 @@ impl<S: Simd, const P: usize> Search<'_, S, P> {
         let mut sigma = shown.crossing;
         let unknown = wanted & !sigma.eq(sigma);
         if unknown.any() {
-            let marks = unknown.select(1.0, sigma.constant(0.0));
-            for lane in 0..marks.numbers().len() {
-                if of(&marks, lane) > 0.0 {
-                    let first = first_crossing(&self.series(lane), of(&level, lane));
-                    sigma.numbers_mut()[lane] = first.unwrap_or(of(&until, lane));
-                }
+            for lane in unknown.lanes() {
+                let first = first_crossing(&self.series(lane), of(&level, lane));
+                sigma.numbers_mut()[lane] = first.unwrap_or(of(&until, lane));
             }
         }
         sigma

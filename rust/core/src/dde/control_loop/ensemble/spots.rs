@@ -26,7 +26,7 @@ pub(super) struct Spots<S: Simd> {
     pub(super) rise: [Real<S>; 2],
     /// Last chunks in which the output may be outside of the band, and of the quiet band.
     pub(super) outside: Real<S>,
-    pub(super) quiet: Real<S>,
+    pub(super) restless: Real<S>,
     /// Chunks in which the output may exceed its corners.
     pub(super) may_top: Range<S>,
     pub(super) may_bottom: Range<S>,
@@ -73,11 +73,11 @@ impl<S: Simd> Outlined for Look<'_, S> {
         } = *measured;
         let zero = sign.constant(0.0);
         let has_risen = measured.risen[1].ge(0.0);
-        let parts = trace.count + trace.is_cut.select(1.0, zero);
+        let parts = trace.parts();
         let per_chunk = (CHUNK * trace.per_sample) as f64;
         let (mut most, mut least) = (measured.top.0, measured.bottom.0);
         let (none, never) = (zero.constant(-1.0), zero.constant(f64::INFINITY));
-        let (mut top, mut bottom, mut outside, mut quiet) = (none, none, none, none);
+        let (mut top, mut bottom, mut outside, mut restless) = (none, none, none, none);
         // How many chunks end below the levels of the rise, and the best output of all of them.
         let (mut rise, mut best) = ([zero; 2], -never);
         let (mut is_risen, mut dip) = (has_risen, never);
@@ -88,13 +88,14 @@ impl<S: Simd> Outlined for Look<'_, S> {
             least = lower.select(chunk.least, least);
             top = higher.select(number, top);
             bottom = lower.select(number, bottom);
+            // After the end of a run, chunks repeat its last whole corner, and their bulges are those
+            // of what follows.
+            let runs = parts.gt(number * per_chunk);
             let far = (chunk.most - steady).max(steady - chunk.least) + chunk.bulge;
-            outside = far.gt(band).select(number, outside);
-            quiet = far.gt(quiet_band).select(number, quiet);
+            outside = (runs & far.gt(band)).select(number, outside);
+            restless = (runs & far.gt(quiet_band)).select(number, restless);
             let (one, other) = (chunk.most * sign, chunk.least * sign);
-            // After the end of a run, chunks repeat its last whole corner.
-            let counts = is_risen & parts.gt(number * per_chunk);
-            dip = counts.select(dip.min(one.min(other)), dip);
+            dip = (runs & is_risen).select(dip.min(one.min(other)), dip);
             best = best.max(one.max(other) + chunk.bulge);
             for (rise, level) in rise.iter_mut().zip(&levels) {
                 *rise = best.lt(*level).select(*rise + 1.0, *rise);
@@ -120,10 +121,6 @@ impl<S: Simd> Outlined for Look<'_, S> {
                 }
             }
         }
-        let mut last = zero;
-        for (lane, place) in last.numbers_mut().iter_mut().enumerate() {
-            *place = trace.output(lane, trace.parts(lane));
-        }
         let [may_top, may_bottom] = extremes;
         Spots {
             parts,
@@ -133,13 +130,13 @@ impl<S: Simd> Outlined for Look<'_, S> {
             bottom,
             rise,
             outside,
-            quiet,
+            restless,
             may_top,
             may_bottom,
             dip,
             dip_from: never,
             tolerance: size,
-            last,
+            last: trace.last(zero),
         }
     }
 }

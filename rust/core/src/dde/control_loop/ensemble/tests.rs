@@ -380,6 +380,27 @@ fn a_run_that_is_over_keeps_its_record_in_later_traces() {
     }
 }
 
+/// What a run does after its end, while its neighbour still runs, is no unrest: an unstable mode,
+/// which the input hardly excites, is larger by then.
+#[test]
+fn a_run_is_as_quiet_beside_any_neighbour() {
+    let growing = |sample_time: f64| -> Vec<f64> {
+        let a = [-5.0, 0.0, 0.0, 3.0];
+        let vectors = [5.0, 3e-9, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0];
+        let numbers = [0.0, 1.0, 0.0, 0.0, 0.0, sample_time, f64::INFINITY];
+        a.into_iter().chain(vectors).chain(numbers).collect()
+    };
+    let rows = [growing(0.2), growing(0.15)];
+    for rows in [&rows[..1], &rows] {
+        let columns = columns(rows);
+        let entries: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let sets = Sets::new(2, rows.len(), &entries, 1.0, false);
+        let found = sets.and_then(|sets| all_metrics(&sets, (&[1.0], &[0.0]), 4.0));
+        let outcomes: Vec<Outcome> = found.into_iter().flatten().map(|(_, o)| o).collect();
+        assert_eq!(outcomes.first(), Some(&Outcome::Ok));
+    }
+}
+
 /// Arithmetic with forty digits lies between both codes here, and moves as far if the gains are
 /// moved by 1e-15 of themselves.
 #[test]

@@ -120,11 +120,23 @@ impl<S: Simd> Trace<S> {
         (number != self.jump).then_some(sample)
     }
 
-    /// Parts of the run of a loop in the trace.
-    #[inline]
-    pub(super) fn parts(&self, lane: usize) -> usize {
-        let cut = self.is_cut.select(1.0, self.count.constant(0.0));
-        (of(&self.count, lane) + of(&cut, lane)) as usize
+    /// Parts of the runs in the trace.
+    #[inline(always)]
+    pub(super) fn parts(&self) -> Real<S> {
+        self.count + self.is_cut.select(1.0, self.count.constant(0.0))
+    }
+
+    /// The outputs at the ends of the runs in the trace; `before` where it holds none.
+    #[inline(always)]
+    pub(super) fn last(&self, before: Real<S>) -> Real<S> {
+        let (parts, mut last) = (self.parts(), before);
+        for (lane, place) in last.numbers_mut().iter_mut().enumerate() {
+            let parts = of(&parts, lane) as usize;
+            if parts > 0 {
+                *place = self.output(lane, parts);
+            }
+        }
+        last
     }
 
     /// Store the output at the end of a run that ends inside a part.

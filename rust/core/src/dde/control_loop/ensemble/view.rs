@@ -75,12 +75,32 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
             + offset.map_or(0.0, |part| of(&part.offset, lane))
     }
 
-    /// Length of a part; zero for a jump.
-    #[inline]
-    pub(super) fn length(&self, lane: usize, part: usize) -> f64 {
-        let (_, number) = self.trace.split(part);
-        let part = self.loops.parts.get(number);
-        part.map_or(0.0, |part| of(&part.length, lane))
+    /// σ at the ends of parts, inside of which the runs may end.
+    #[inline(always)]
+    pub(super) fn until(&self, parts: Real<S>) -> Real<S> {
+        let time = self.times(parts + 1.0) - self.times(parts);
+        (time / self.lengths(parts)).smaller(1.0)
+    }
+
+    /// The outputs at `sigma` of a part of each loop in `wanted`.
+    #[inline(always)]
+    pub(super) fn outputs(
+        &self,
+        (parts, sigma): (Real<S>, Real<S>),
+        wanted: Mask<S>,
+        piece: &mut Piece<S>,
+    ) -> Real<S> {
+        if self.loops.is_curved {
+            self.piece(parts, wanted, piece);
+            return piece.at(sigma);
+        }
+        let (mut first, mut last) = (sigma, sigma);
+        for lane in wanted.lanes() {
+            let part = of(&parts, lane) as usize;
+            first.numbers_mut()[lane] = self.trace.output(lane, part);
+            last.numbers_mut()[lane] = self.trace.output(lane, part + 1);
+        }
+        (last - first).mul_add(sigma, first)
     }
 
     /// Make `piece` the output on one part of each loop in `wanted`, any polynomial of the others.
@@ -128,34 +148,12 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         Some((part, share))
     }
 
-    /// The outputs at the ends of the runs that end inside a part, and the lanes of these.
+    /// The outputs at the ends of the runs that end inside a part.
     #[inline(always)]
-    pub(super) fn cut(&self) -> (Real<S>, Mask<S>) {
-        let zero = self.loops.d.constant(0.0);
-        let is_cut = self.trace.is_cut;
-        let (mut first, mut last, mut into) = (zero, zero, zero);
-        let mut parts = zero;
-        let marks = is_cut.select(1.0, zero);
-        for (lane, &mark) in marks.numbers().iter().enumerate() {
-            if mark == 0.0 {
-                continue;
-            }
-            let part = of(&self.trace.count, lane) as usize;
-            let length = self.length(lane, part);
-            let share = (of(&self.loops.end, lane) - self.begin(lane, part)) / length;
-            parts.numbers_mut()[lane] = part as f64;
-            first.numbers_mut()[lane] = self.trace.output(lane, part);
-            last.numbers_mut()[lane] = self.trace.output(lane, part + 1);
-            into.numbers_mut()[lane] = share.clamp(0.0, 1.0);
-        }
-        let output = if self.loops.is_curved {
-            let mut piece = Piece::new(zero);
-            self.piece(parts, is_cut, &mut piece);
-            piece.at(into)
-        } else {
-            (last - first).mul_add(into, first)
-        };
-        (output, is_cut)
+    pub(super) fn cut(&self) -> Real<S> {
+        let parts = self.trace.count;
+        let place = (parts, self.until(parts));
+        self.outputs(place, self.trace.is_cut, &mut Piece::new(parts))
     }
 }
 
@@ -219,7 +217,7 @@ impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
     #[inline(always)]
     fn run(self) {
         let (view, loops) = (self.view, self.view.loops);
-        let zero = loops.d.constant(0.0);
+        let zero = loops.zero;
         self.piece.degree = loops.degree;
         if loops.is_continuous {
             self.stored();

@@ -15,8 +15,8 @@ use super::transition::row;
 
 /// Runs of loops with any number of states.
 pub(super) trait Run<S: Simd> {
-    /// Begin again, with a sample at the end of the run if that is closed.
-    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool);
+    /// Begin again.
+    fn begin(&mut self, trace: &mut Trace<S>);
 
     /// Run on for as many samples as a trace holds. False, if the runs of all loops are over.
     fn advance(&mut self, trace: &mut Trace<S>) -> bool;
@@ -43,8 +43,6 @@ pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
     inside: Real<S>,
     /// Number of the next sample.
     number: usize,
-    /// Does the run include a sample at its end?
-    is_closed: bool,
     lost: Mask<S>,
 }
 
@@ -58,7 +56,6 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             output: plants.first_output,
             inside: plants.first_output,
             number: 0,
-            is_closed: false,
             lost: plants.no_lane,
         }
     }
@@ -69,20 +66,14 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         self.loops.plants.sample_time * number as f64
     }
 
-    /// Are the runs of all loops over?
-    #[inline(always)]
-    fn ends(&self) -> bool {
-        self.loops.plants.are_over(self.number, self.is_closed)
-    }
-
     /// See [`Run::advance`].
     #[inline(always)]
     fn go_on(&mut self, trace: &mut Trace<S>) -> bool {
         let loops = &self.loops.plants;
-        if self.ends() {
+        if loops.are_over(self.number) {
             return false;
         }
-        let zero = loops.d.constant(0.0);
+        let zero = loops.zero;
         if self.number > 0 {
             // The commands that have not arrived yet.
             let history = trace.samples..=trace.samples + loops.samples;
@@ -98,20 +89,19 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             longer(&mut trace.bulges, SAMPLES, zero.lanes());
         }
         trace.restart(self.number, self.output);
-        while trace.samples < SAMPLES && !self.ends() {
-            let is_whole = self.time(self.number + CHUNK).le(loops.end);
-            if (!is_whole).any() {
+        while trace.samples < SAMPLES && !loops.are_over(self.number) {
+            let is_whole = self.time(self.number + CHUNK).le(loops.latest);
+            if (!is_whole).any() || !self.chunk::<false>(trace) {
                 self.chunk::<true>(trace);
-            } else {
-                self.chunk::<false>(trace);
             }
         }
         true
     }
 
-    /// Advance by [`CHUNK`] samples; if `ENDS`, some run ends within them.
+    /// Advance by [`CHUNK`] samples. Unless `EXACT`, no run may end within them, and this is false
+    /// and does nothing where some response may have exceeded all limits.
     #[inline(always)]
-    fn chunk<const ENDS: bool>(&mut self, trace: &mut Trace<S>) {
+    fn chunk<const EXACT: bool>(&mut self, trace: &mut Trace<S>) -> bool {
         let feedback = self.loops;
         let loops = &feedback.plants;
         let mut summary = Summary {
@@ -124,10 +114,12 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             is_cut: trace.is_cut,
             inside: self.inside,
             run_end: loops.end,
+            latest: loops.latest,
         };
         let is_late = loops.parts.first().is_some_and(|part| part.is_after);
         let (mut x, mut output, mut number) = (self.x, self.output, self.number);
-        let mut lost = self.lost;
+        // The sum of the squares of all states and commands.
+        let (mut lost, mut size) = (self.lost, loops.zero);
         // Copies of few numbers stay in registers while the trace is written; more are read faster
         // where they are.
         let copies = (feedback.k, feedback.step);
@@ -145,9 +137,6 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             };
             let before = commands.first().copied().unwrap_or(loops.zero);
             let u = row(k, &x, feedback.l.mul_add(before, loops.command));
-            if ENDS {
-                lost = lost | (now.lt(loops.end) & !is_sound(&x, u));
-            }
             let w = u.min(limit).max(lowest);
             if let Some(place) = commands.last_mut() {
                 *place = w;
@@ -195,7 +184,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                     output = loops.first_output;
                 }
                 *place = output.lanes();
-                if ENDS {
+                if EXACT {
                     let end = now + corner.offset;
                     ends.corner(&mut summary, output, begin, end);
                     begin = end;
@@ -205,6 +194,13 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 }
             }
             x = step.apply(&x, before, after);
+            let next = loops.sample_time * (number + 1) as f64;
+            if EXACT {
+                let sound = are_sound(&[u]) & (are_sound(&x) | next.gt(loops.latest));
+                lost = lost | (now.le(loops.latest) & !sound);
+            } else {
+                size = row(&x, &x, u.mul_add(u, size));
+            }
             output = loops.seen(&first(&x));
             if loops.is_direct {
                 output = loops.d.mul_add(after, output);
@@ -214,34 +210,36 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             }
             *last = output.lanes();
             number += 1;
-            if ENDS {
-                let end = loops.sample_time * number as f64;
-                ends.corner(&mut summary, output, begin, end);
+            if EXACT {
+                ends.corner(&mut summary, output, begin, next);
             } else {
                 summary.most = summary.most.max(output);
                 summary.least = summary.least.min(output);
             }
         }
-        if ENDS {
+        if EXACT {
             (trace.count, trace.is_cut) = (ends.count, ends.is_cut);
             self.inside = ends.inside;
         } else {
+            if (!size.le(DIVERGED)).any() {
+                return false;
+            }
             trace.count = trace.count + (CHUNK * trace.per_sample) as f64;
             self.inside = output;
-            lost = lost | !is_sound(&x, loops.zero);
         }
         (self.x, self.output, self.number, self.lost) = (x, output, number, lost);
         trace.samples = first_sample + CHUNK;
         trace.chunks.push(summary);
+        true
     }
 }
 
-/// Are all states, and `u`, within all limits?
+/// Are all numbers within the limit on those of a response?
 #[inline(always)]
-pub(super) fn is_sound<S: Simd, const N: usize>(x: &[Real<S>; N], u: Real<S>) -> Mask<S> {
-    let mut sound = u.abs().le(DIVERGED);
-    for x in x {
-        sound = sound & x.abs().le(DIVERGED);
+pub(super) fn are_sound<S: Simd, const N: usize>(numbers: &[Real<S>; N]) -> Mask<S> {
+    let mut sound = numbers[0].abs().le(DIVERGED);
+    for number in numbers.iter().skip(1) {
+        sound = sound & number.abs().le(DIVERGED);
     }
     sound
 }
@@ -252,6 +250,7 @@ pub(super) struct Ends<S: Simd> {
     pub(super) is_cut: Mask<S>,
     pub(super) inside: Real<S>,
     pub(super) run_end: Real<S>,
+    pub(super) latest: Real<S>,
 }
 
 impl<S: Simd> Ends<S> {
@@ -264,10 +263,9 @@ impl<S: Simd> Ends<S> {
         begin: Real<S>,
         end: Real<S>,
     ) {
-        let running = begin.lt(self.run_end);
-        let inside = running & end.le(self.run_end);
+        let inside = end.le(self.latest);
         self.count = inside.select(self.count + 1.0, self.count);
-        self.is_cut = self.is_cut | (running & !inside);
+        self.is_cut = self.is_cut | (begin.lt(self.run_end) & !inside);
         summary.most = inside.select(summary.most.max(output), summary.most);
         summary.least = inside.select(summary.least.min(output), summary.least);
         self.inside = inside.select(output, self.inside);
@@ -275,14 +273,10 @@ impl<S: Simd> Ends<S> {
 }
 
 impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
-    fn begin(&mut self, trace: &mut Trace<S>, is_closed: bool) {
+    fn begin(&mut self, trace: &mut Trace<S>) {
+        *self = Self::new(self.loops);
         let plants = &self.loops.plants;
         let zero = plants.zero;
-        self.x = [zero; N];
-        (self.output, self.inside) = (plants.first_output, plants.first_output);
-        self.number = 0;
-        self.is_closed = is_closed;
-        self.lost = plants.no_lane;
         let history = plants.samples + 1;
         longer(&mut trace.commands, history + SAMPLES, zero);
         trace
@@ -301,7 +295,7 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
     }
 
     fn is_over(&self) -> bool {
-        self.ends()
+        self.loops.plants.are_over(self.number)
     }
 
     fn lost(&self) -> Mask<S> {

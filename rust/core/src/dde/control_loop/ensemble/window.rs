@@ -103,15 +103,15 @@ impl<S: Simd> Test<S> for EndsAt<S> {
 pub(super) struct Exceeds<S: Simd> {
     pub(super) sign: Real<S>,
     pub(super) bar: Real<S>,
-    /// The output has no extremum in a part on which it changes by more bulges.
-    pub(super) turns: f64,
+    /// The output has no extremum in a part on which it changes by more than so many bulges.
+    pub(super) most_change: f64,
 }
 
 impl<S: Simd> Test<S> for Exceeds<S> {
     #[inline(always)]
     fn holds(&self, first: Real<S>, last: Real<S>, bulge: Real<S>) -> Mask<S> {
         let most = (first * self.sign).max(last * self.sign) + bulge;
-        let may_turn = (last - first).abs().le(bulge * self.turns);
+        let may_turn = (last - first).abs().le(bulge * self.most_change);
         most.gt(self.bar) & may_turn & bulge.gt(0.0)
     }
 }
@@ -130,31 +130,17 @@ impl<S: Simd> Test<S> for Reaches<S> {
     }
 }
 
-/// May the end of the part, or the output before it, be farther than this from the steady state?
-pub(super) struct EndsAway<S: Simd> {
+/// May the output be farther than this from the steady state in the part or at its ends?
+pub(super) struct Strays<S: Simd> {
     pub(super) steady: Real<S>,
     pub(super) band: Real<S>,
 }
 
-impl<S: Simd> Test<S> for EndsAway<S> {
-    #[inline(always)]
-    fn holds(&self, _: Real<S>, last: Real<S>, bulge: Real<S>) -> Mask<S> {
-        ((last - self.steady).abs() + bulge).gt(self.band)
-    }
-}
-
-/// Does the part begin outside of the band, or may the output leave it inside of the part?
-pub(super) struct Leaves<S: Simd> {
-    pub(super) steady: Real<S>,
-    pub(super) band: Real<S>,
-}
-
-impl<S: Simd> Test<S> for Leaves<S> {
+impl<S: Simd> Test<S> for Strays<S> {
     #[inline(always)]
     fn holds(&self, first: Real<S>, last: Real<S>, bulge: Real<S>) -> Mask<S> {
         let (first, last) = ((first - self.steady).abs(), (last - self.steady).abs());
-        let may = (first.max(last) + bulge).gt(self.band) & bulge.gt(0.0);
-        first.gt(self.band) | may
+        (first.max(last) + bulge).gt(self.band)
     }
 }
 
