@@ -247,8 +247,10 @@ class NoiseFit:
         )
 
     def moved(self, numbers: PlantNumbers) -> NoiseFit:
-        """The same at other numbers."""
-        return replace(self, numbers=numbers)
+        """The same at other numbers, with the same likelihood."""
+        found = NoiseFit(self.model, self.runs, self.trim, numbers, self.given_gain)
+        found.__dict__["likelihood"] = self.likelihood
+        return found
 
 
 def with_noise(numbers: PlantNumbers, noise: Sequence[RowNoise]) -> PlantNumbers:
@@ -266,11 +268,12 @@ def fit_noise(model: PlantModel, runs: Sequence[FlightRows], first: PlantNumbers
     first = with_noise(first, quiet)
     calms, airs = [first, *_grid(model, runs, first, quiet)[:1]], _grid(model, runs, first, strong)
     for trim in (False, True) if model.integrates else (False,):
-        likelihood = model.likelihood(runs, trim)
+        fit = NoiseFit(model, runs, trim, first)
+        likelihood = fit.likelihood
         calm = min((likelihood.fit(one, ROUGH) for one in calms), key=_objective)
         airy = (with_noise(calm, weak), with_noise(calm, slow), *airs)
         tried = [calm, *(likelihood.fit(one, ROUGH) for one in airy)]
-        found.append(NoiseFit(model, runs, trim, min(tried, key=_objective)))
+        found.append(fit.moved(min(tried, key=_objective)))
     best = min(found, key=_criterion)
     best = min([best, *_with_sensor(best)], key=_criterion_beside_sensor)
     best = without_idle_air(min([best, *_with_scatter(best)], key=_criterion))
@@ -283,7 +286,7 @@ def _without_idle_lags(fit: NoiseFit) -> NoiseFit:
     A search ends at a lag far below the time between rows where the likelihood has a kink over the
     delay; there rows hardly tell lag and delay apart.
     """
-    shortest = SHORTEST * float(np.median(np.diff(fit.runs[0].time)))
+    shortest = SHORTEST * fit.runs[0].row_time
     for place, free in enumerate(fit.model.free_lags if "delay" in fit.model.names else []):
         one = fit.with_gain
         lags = list(one.lags)
@@ -321,7 +324,7 @@ def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
             RowNoise(
                 one.air_time,
                 one.air if keeps_air else 0.0,
-                SENSOR_TIME * float(np.median(np.diff(rows.time))),
+                SENSOR_TIME * rows.row_time,
                 SENSOR,
             )
             for one, rows in zip(best.numbers.noise, best.runs, strict=True)
@@ -334,7 +337,7 @@ def _with_sensor(best: NoiseFit) -> list[NoiseFit]:
 
 def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
     """The fit with scattered times of the rows, and of the commands."""
-    found: list[NoiseFit] = []
+    found = []
     for part in ("stamps", "arrivals"):
         runs, noise = [], []
         for rows, like, one in zip(best.runs, best.parts, best.numbers.noise, strict=True):
@@ -353,8 +356,7 @@ def _with_scatter(best: NoiseFit) -> list[NoiseFit]:
         # No command arrives before it is sent.
         latest = fit.numbers.delay if part == "arrivals" and "delay" in fit.model.names else np.inf
         if all(
-            scatter_of(fit, run, part)
-            < min(latest, MOST_SCATTER * float(np.median(np.diff(rows.time))))
+            scatter_of(fit, run, part) < min(latest, MOST_SCATTER * rows.row_time)
             for run, rows in enumerate(runs)
         ):
             found.append(fit)
@@ -387,7 +389,7 @@ def _criterion_beside_sensor(fit: NoiseFit) -> float:
     It moves the output as a sensor's noise of long correlation does, which may take its place.
     """
     fast = any(
-        noise.air > 0.0 and noise.air_time < FAST * float(np.median(np.diff(rows.time)))
+        noise.air > 0.0 and noise.air_time < FAST * rows.row_time
         for noise, rows in zip(fit.numbers.noise, fit.runs, strict=True)
     )
     return fit.criterion + PRICE_OF_SENSOR * fast
@@ -399,7 +401,7 @@ def airs_of(model: PlantModel, runs: Sequence[FlightRows]) -> list[list[RowNoise
     for a_row, flat, slow in ((STRONG_AIR, STRONG_INPUT, 1.0), (WEAK_AIR, WEAK_INPUT, SLOW)):
         noise = []
         for rows in runs:
-            between = float(np.median(np.diff(rows.time)))
+            between = rows.row_time
             size = a_row / between if model.integrates else flat
             noise.append(RowNoise(slow * AIR_TIME * float(rows.time[-1] - rows.time[0]), size))
         found.append(noise)
@@ -414,7 +416,7 @@ def _grid(
     if "delay" not in model.names:
         return [with_noise(first, noise)]
     likelihood = model.likelihood(runs, False)
-    between = float(np.median(np.diff(rows.time)))
+    between = rows.row_time
     delays = [0.0]
     while delays[-1] < LONGEST * float(rows.time[-1] - rows.time[0]):
         delays.append(delays[-1] + max(GRID_STEP * between, GRID_GROWTH * delays[-1]))
