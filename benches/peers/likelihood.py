@@ -33,7 +33,7 @@ def recording(count: int) -> FlightRows:
     command = np.where(np.sin(0.9 * moment) > 0.0, 1.0, -0.4)
     output = GAIN * ROW * np.cumsum(command) + 0.005 * rng.standard_normal(count)
     used = np.ones(count, dtype=bool)
-    return FlightRows(moment, output, used, moment, command, (), False)
+    return FlightRows(moment, ROW, output, used, moment, command, (), False)
 
 
 def peer_filter(residuals: np.ndarray) -> object:

@@ -53,6 +53,7 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
     recording = recorded(20_000, quiet=12_000)
     rows = FlightRows(
         recording.time,
+        TRUTH.sample_time,
         recording.output,
         np.ones(20_000, dtype=bool),
         recording.time,

@@ -134,7 +134,7 @@ def test_the_posterior_over_a_range_is_that_of_the_batch_likelihood():
         delays=delays.tolist(), layers=[([0.15], 0.0, [0.0] * 41)], gain=(0.0, 300.0), trim=30.0
     )
     last = run(OnlineBank(gaussian), times, output, commands, used)[-1]
-    rows = FlightRows(times, output, used, times, commands, (), True, trim=True)
+    rows = FlightRows(times, ROW, output, used, times, commands, (), True, trim=True)
     batch = FlightLikelihood(
         (1.0,), (1.0, 0.0), [rows], delay=False, gain=True, lags=[False], zero=False,
         longest=1.0, air_behind_lags=True,

@@ -151,7 +151,7 @@ def test_a_recording_whose_derivatives_are_singular_tells_nothing():
         model = SimpleNamespace(
             names=("delay", "lag"), order=[("delay", "delay"), ("lag", "lag 0")]
         )
-        return _covariance(SimpleNamespace(parts=parts, model=model, runs=parts))
+        return _covariance(SimpleNamespace(model=model, runs=parts), parts)
 
     np.testing.assert_allclose(told((4.0, 1.0), (4.0, 1.0)), np.diag([2.0, 0.5]))
     np.testing.assert_allclose(told((4.0, 1.0), (np.inf, np.nan)), np.diag([4.0, 1.0]))

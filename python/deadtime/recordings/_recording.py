@@ -174,6 +174,8 @@ class Recording(ReadOnlyArrays):
             When fewer than 8 samples lie in the window.
         """
         rows = self.rows(start, stop)
+        if rows == slice(0, len(self)) and self.sent is None:
+            return self
         parts: dict[str, Any] = {name: one[rows] for name, one in self._columns().items()}
         if self.sent is not None:
             kept = int(np.searchsorted(self.sent.time, parts["time"][-1], side="right"))

@@ -94,6 +94,19 @@ impl RowNoise {
     }
 }
 
+impl RowNoise {
+    fn noise(&self) -> Noise {
+        Noise {
+            air_time: self.air_time,
+            air: self.air,
+            sensor_time: self.sensor_time,
+            sensor: self.sensor,
+            stamps: self.stamps,
+            arrivals: self.arrivals,
+        }
+    }
+}
+
 /// One set of numbers of plant and noise.
 #[pyclass(frozen, get_all, from_py_object, module = "deadtime._deadtime")]
 #[derive(Clone)]
@@ -142,14 +155,7 @@ impl PlantNumbers {
 
 impl PlantNumbers {
     fn fit(&self) -> Fit {
-        let noise = self.noise.iter().map(|one| Noise {
-            air_time: one.air_time,
-            air: one.air,
-            sensor_time: one.sensor_time,
-            sensor: one.sensor,
-            stamps: one.stamps,
-            arrivals: one.arrivals,
-        });
+        let noise = self.noise.iter().map(RowNoise::noise);
         Fit {
             point: Point {
                 timing: Timing::Delay(self.delay),
@@ -259,6 +265,24 @@ impl FlightLikelihood {
         let point = numbers.fit().point;
         let found = run_here(py, |task| self.model.at(run, &point, task))?;
         Ok(RowLikelihood::new(py, found))
+    }
+
+    /// The likelihood of one recording under each of these noises in the place of its own, without what
+    /// has a value for each row.
+    fn under(
+        &self,
+        py: Python<'_>,
+        run: usize,
+        numbers: &PlantNumbers,
+        noises: Vec<RowNoise>,
+    ) -> PyResult<Vec<RowLikelihood>> {
+        let point = numbers.fit().point;
+        let noises: Vec<Noise> = noises.iter().map(RowNoise::noise).collect();
+        let found = run_here(py, |task| self.model.under(run, &point, &noises, task))?;
+        Ok(found
+            .into_iter()
+            .map(|one| RowLikelihood::new(py, one))
+            .collect())
     }
 
     /// −2 ln L of all recordings.

@@ -191,9 +191,10 @@ def rounding_explains(residuals: Array, rows: FlightRows) -> bool:
 
 def restless_air(fit: NoiseFit, run: int) -> float:
     """How far air that changes within a row moves the output, in deviations of sensor noise."""
-    noise, time = fit.numbers.noise[run], fit.runs[run].time
-    if not fit.model.integrates or noise.air_time > float(np.median(np.diff(time))):
+    noise, rows = fit.numbers.noise[run], fit.runs[run]
+    if not fit.model.integrates or noise.air_time > rows.row_time:
         return 0.0
+    time = rows.time
     moved = noise.air * math.sqrt(2.0 * noise.air_time * float(time[-1] - time[0]))
     return moved / math.hypot(1.0, noise.sensor)
 
@@ -216,7 +217,7 @@ def further_lag(fit: NoiseFit) -> tuple[PlantNumbers, float]:
 
     richer = replace(fit, model=replace(fit.model, extra=fit.model.extra + 1))
     likelihood = richer.likelihood
-    between = float(np.median(np.diff(fit.runs[0].time)))
+    between = fit.runs[0].row_time
     one, long = fit.numbers, is_long(fit.runs)
 
     def behind(lag: float, noise: Sequence[RowNoise]) -> PlantNumbers:

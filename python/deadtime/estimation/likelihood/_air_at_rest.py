@@ -54,7 +54,7 @@ def _over(fit: NoiseFit, run: int, rows: FlightRows, noise: RowNoise, count: int
     part = fit.parts[run]
     if rows.time.size <= count:
         return 1.0
-    between = float(np.median(np.diff(rows.time)))
+    between = rows.row_time
     speed = np.abs(part.rate / part.gain)
     since = rows_since_motion(rows, part, np.arange(count, rows.time.size)) - count
     used = rows.used[count:] & rows.used[:-count]

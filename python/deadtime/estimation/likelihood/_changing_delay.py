@@ -121,7 +121,7 @@ def _scored(fit: NoiseFit, run: int) -> tuple[float, Array]:
     rows, one = fit.runs[run], fit.with_gain
     shapes = _shapes(rows)
     numbers = PlantNumbers(one.delay, one.lags, [one.noise[run]], fit.gain, one.zero)
-    step = STEP * float(np.median(np.diff(rows.time)))
+    step = STEP * rows.row_time
     mean = _residuals(fit, rows, numbers)
     changes = [_with_later(rows, step * shape) for shape in shapes]
     columns = [(mean - _residuals(fit, one, numbers)) / step for one in changes]

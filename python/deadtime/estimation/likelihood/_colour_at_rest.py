@@ -99,7 +99,7 @@ def overshoots(fit: NoiseFit) -> tuple[PlantNumbers, float]:
     model = fit.model
     names = model.names if "zero" in model.names else (*model.names, "zero")
     richer = replace(fit, model=replace(model, extra=model.extra + 1, names=names))
-    one, between = fit.numbers, float(np.median(np.diff(fit.runs[0].time)))
+    one, between = fit.numbers, fit.runs[0].row_time
     found = [
         richer.likelihood.fit(
             PlantNumbers(
@@ -172,7 +172,7 @@ def _columns(fit: NoiseFit, run: int) -> Array:
     names = tuple(name for name in fit.model.names if name != "gain")
     model: PlantModel = replace(fit.model, names=names)
     likelihood = model.likelihood(fit.runs, fit.trim)
-    one, step = fit.with_gain, TIME_STEP * float(np.median(np.diff(fit.runs[run].time)))
+    one, step = fit.with_gain, TIME_STEP * fit.runs[run].row_time
 
     def at(kernel: str, move: float) -> Array:
         lags = list(one.lags)

@@ -12,8 +12,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from deadtime._deadtime import FlightLikelihood, PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._search import LONGEST, NoiseFit
@@ -45,7 +43,7 @@ def unseen_lag(fit: NoiseFit) -> float:
     # Half the distribution of the ratio is at zero.
     wanted = float(special.ndtri(1.0 - SIGNIFICANCE) + special.ndtri(POWER))
     one = fit.numbers
-    between = float(np.median(np.diff(fit.runs[0].time)))
+    between = fit.runs[0].row_time
     longest = min(LONGEST * float(run.time[-1] - run.time[0]) for run in fit.runs)
     richer = replace(fit.model, extra=fit.model.extra + 1).likelihood(fit.runs, fit.trim)
     may_move = "delay" in fit.model.names

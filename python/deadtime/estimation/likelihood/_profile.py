@@ -15,19 +15,19 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime._deadtime import PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._search import (
     PARTS,
     NoiseFit,
     airs_of,
     changed,
-    with_noise,
 )
 from deadtime.estimation.likelihood._start import is_long
 
@@ -190,7 +190,7 @@ class LikelihoodProfile:
         leads = kernel == "total" and ("zero" in self.fit.model.names or self.fit.model.zero > 0.0)
         floor = -math.inf if kernel in ("gain", "zero") or leads else 0.0
         if kernel.startswith("lag"):
-            floor = 1e-3 * float(np.median(np.diff(self.fit.runs[0].time)))
+            floor = 1e-3 * self.fit.runs[0].row_time
         rise = self.rise(name, level)
         reach = max(self.stderr[name] * math.sqrt(rise), 1e-9)
         found, lowest = [], self.centre
@@ -226,13 +226,9 @@ def best_profile(
     return profile
 
 
-def common_covariance(fit: NoiseFit, held: Sequence[int] | None = None) -> Array:
-    """Covariance of the numbers that all recordings share: gain, delay, lags, zero.
-
-    Lags that the rows do not resolve are `held`, by their places in the order of the kernel, or
-    those of this fit.
-    """
-    return _held(_covariance(fit), unresolved_lags(fit) if held is None else held, fit)
+def common_covariance(fit: NoiseFit) -> Array:
+    """Covariance of the numbers that all recordings share: gain, delay, lags, zero."""
+    return _held(_covariance(fit, fit.parts), unresolved_lags(fit), fit)
 
 
 def unresolved_lags(fit: NoiseFit) -> tuple[int, ...]:
@@ -241,7 +237,7 @@ def unresolved_lags(fit: NoiseFit) -> tuple[int, ...]:
     Far below the time between rows a lag has the effect of a delay, and beside one of about the
     same size that of this one: the linear model takes them for unknown to any size.
     """
-    cov, kernel = _covariance(fit), [name for _, name in fit.model.order]
+    cov, kernel = _covariance(fit, fit.parts), [name for _, name in fit.model.order]
     longest = max(float(np.ptp(rows.time)) for rows in fit.runs)
     size = {
         place: fit.numbers.lags[int(name.removeprefix("lag "))]
@@ -272,16 +268,32 @@ def _held(cov: Array, held: Sequence[int], fit: NoiseFit) -> Array:
     return cov
 
 
+def _under(
+    fit: NoiseFit, noises: Sequence[Sequence[RowNoise]], weights: Mapping[str, Array]
+) -> tuple[Array, Array]:
+    """-2 ln L under each of these noises of the recordings, and the variance of each quantity."""
+    each = [
+        fit.likelihood.under(run, fit.numbers, [noise[run] for noise in noises])
+        for run in range(len(fit.runs))
+    ]
+    held, w = unresolved_lags(fit), np.array(list(weights.values()))
+    cov = np.array([_held(_covariance(fit, parts), held, fit) for parts in zip(*each, strict=True)])
+    objectives = np.array([[one.objective for one in parts] for parts in each]).sum(axis=0)
+    return objectives, np.einsum("qi,nij,qj->nq", w, cov, w)
+
+
 def _row(fit: NoiseFit) -> float:
     """Time between rows, s."""
-    return float(np.median(np.diff(fit.runs[0].time)))
+    return fit.runs[0].row_time
 
 
-def _covariance(fit: NoiseFit) -> Array:
-    blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in fit.parts]
+def _covariance(fit: NoiseFit, parts: Sequence[RowLikelihood]) -> Array:
+    blocks = [_common(part.inverse, len(part.linear), fit) * part.variance for part in parts]
+    if len(blocks) == 1:
+        return blocks[0]
     # A recording whose derivatives are singular tells nothing here, which is the safe side.
     told = [block for block in blocks if np.all(np.isfinite(block))]
-    if len(blocks) == 1 or not told:
+    if not told:
         return blocks[0]
     # A number that one recording does not move at all, as a second lag of zero, has no variance.
     information = sum(np.linalg.pinv(block, hermitian=True) for block in told)
@@ -291,11 +303,10 @@ def _covariance(fit: NoiseFit) -> Array:
 def _common(inverse: Array, linear: int, fit: NoiseFit) -> Array:
     """The block of the common numbers."""
     size = math.isqrt(inverse.size)
-    square = inverse.reshape(size, size)
     own = list(range(linear, size))
     if "gain" in fit.model.names and len(fit.runs) == 1:
         own = [0, *own]
-    return square[np.ix_(own, own)]
+    return np.asarray(inverse.reshape(size, size)[own][:, own])
 
 
 def unseen_air(
@@ -310,22 +321,22 @@ def unseen_air(
     none = dict.fromkeys(weights, 1.0)
     if not fit.model.integrates or any(one.air > 0.0 for one in fit.numbers.noise):
         return none
-    middle = fit.numbers.objective
     _, slow = airs_of(fit.model, fit.runs)
-    total, sums, held = 0.0, dict.fromkeys(weights, 0.0), unresolved_lags(fit)
-    for step in UNSEEN:
-        noise = [
+    noises = [
+        [
             changed(one, air=step * air.air, air_time=air.air_time)
             for one, air in zip(fit.numbers.noise, slow, strict=True)
         ]
-        moved = fit.moved(with_noise(fit.numbers, noise))
-        rise = sum(part.objective for part in moved.parts) - middle
-        weight = math.sqrt(step) * math.exp(-0.5 * max(rise, -1.0))
-        cov = common_covariance(moved, held)
-        total += weight
-        for name, w in weights.items():
-            sums[name] += weight * float(w @ cov @ w)
-    return {name: max(1.0, sums[name] / total / bounds[name] ** 2) for name in weights}
+        for step in UNSEEN
+    ]
+    objectives, variances = _under(fit, noises, weights)
+    rises = np.maximum(objectives - fit.numbers.objective, -1.0)
+    likely = np.sqrt(UNSEEN) * np.exp(-0.5 * rises)
+    means = likely @ variances / np.sum(likely)
+    return {
+        name: max(1.0, float(mean) / bounds[name] ** 2)
+        for name, mean in zip(weights, means, strict=True)
+    }
 
 
 def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -> dict[str, float]:
@@ -339,36 +350,28 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
     ]
     if not places:
         return dict.fromkeys(weights, float(rows))
-    held = unresolved_lags(fit)
 
-    def at(steps: Mapping[int, float]) -> tuple[float, dict[str, float]]:
+    def at(steps: Mapping[int, float]) -> list[RowNoise]:
         noise = [{name: getattr(one, name) for name in PARTS} for one in base]
         for place, step in steps.items():
             run, part = places[place]
             noise[run][part] *= math.exp(step)
-        numbers = with_noise(fit.numbers, [RowNoise(**one) for one in noise])
-        moved = fit.moved(numbers)
-        cov = common_covariance(moved, held)
-        value = sum(part.objective for part in moved.parts)
-        return value, {
-            name: math.log(max(float(w @ cov @ w), 1e-300)) for name, w in weights.items()
-        }
+        return [RowNoise(**one) for one in noise]
 
     h, count = LOG_STEP, len(places)
-    middle, _ = at({})
+    pairs = list(combinations(range(count), 2))
+    singles = [{i: step} for step in (h, -h) for i in range(count)]
+    noises = [at(steps) for steps in ({}, *singles, *({i: h, j: h} for i, j in pairs))]
+    objectives, variances = _under(fit, noises, weights)
+    middle, above, below = objectives[0], objectives[1 : count + 1], objectives[count + 1 :]
     hessian = np.zeros((count, count))
-    slopes = {name: np.zeros(count) for name in weights}
-    single = {}
     for i in range(count):
-        single[i] = higher, lower = at({i: h}), at({i: -h})
-        hessian[i, i] = (higher[0] - 2.0 * middle + lower[0]) / h**2
-        for name in weights:
-            slopes[name][i] = (higher[1][name] - lower[1][name]) / (2.0 * h)
-    for i in range(count):
-        for j in range(i):
-            both = at({i: h, j: h})[0]
-            mixed = both - single[i][0][0] - single[j][0][0] + middle
-            hessian[i, j] = hessian[j, i] = mixed / h**2
+        hessian[i, i] = (above[i] - 2.0 * middle + below[i]) / h**2
+    for (i, j), both in zip(pairs, objectives[2 * count + 1 :], strict=True):
+        hessian[i, j] = hessian[j, i] = (both - above[i] - above[j] + middle) / h**2
+    logs = np.log(np.maximum(variances, 1e-300))
+    quotients = (logs[1 : count + 1] - logs[count + 1 : 2 * count + 1]) / (2.0 * h)
+    slopes = dict(zip(weights, quotients.T, strict=True))
     if not np.all(np.isfinite(hessian)):
         # At some noise near by one unknown cannot be told from others.
         return dict.fromkeys(weights, LEAST_FREEDOM)

@@ -30,9 +30,10 @@ NO_SPEED = np.empty(0)
 
 
 class FlightRows(NamedTuple):
-    """What the kernel is given of one recording."""
+    """What the kernel is given of one recording; `row_time` is the median time between rows, s."""
 
     time: Array
+    row_time: float
     output: Array
     used: NDArray[np.bool_]
     command_time: Array
@@ -66,7 +67,8 @@ def _from_neighbours(residuals: Array) -> tuple[Array, float]:
     slope of the residuals shows there, so that the deviation is that of the other rows.
     """
     wide = min(2 * HALF_WINDOW + 1, residuals.size)
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(residuals, wide), axis=1)
+    windows = np.sort(np.lib.stride_tricks.sliding_window_view(residuals, wide), axis=1)
+    medians = 0.5 * (windows[:, (wide - 1) // 2] + windows[:, wide // 2])
     places = np.arange(residuals.size) - HALF_WINDOW
     away = residuals - medians[np.clip(places, 0, medians.size - 1)]
     inner = away[(places >= 0) & (places < medians.size)]

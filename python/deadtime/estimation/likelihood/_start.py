@@ -71,6 +71,7 @@ def excited_part(rows: FlightRows) -> FlightRows:
     )
     return rows._replace(
         time=rows.time[kept],
+        row_time=float(np.median(np.diff(rows.time[kept]))),
         output=rows.output[kept],
         used=rows.used[kept],
         speed=rows.speed[kept],
@@ -89,7 +90,7 @@ def least_squares(
     zero = model.zero
     if zero == 0.0 and "zero" in model.names:
         # There its effect is that of a shorter delay: to first order, they cannot be told apart.
-        zero = float(np.median(np.diff(runs[0].time)))
+        zero = runs[0].row_time
     first = PlantNumbers(delay, model.lags, [RowNoise()], gain, zero)
     quiet = [RowNoise()] * len(runs)
     likelihood = model.likelihood(runs, False)
@@ -123,7 +124,7 @@ def _tells_without_zero(model: PlantModel, rows: FlightRows, first: PlantNumbers
 
 def _minima(model: PlantModel, rows: FlightRows, first: PlantNumbers) -> list[PlantNumbers]:
     """The lowest local minima over the delay at each set of lags."""
-    between = float(np.median(np.diff(rows.time)))
+    between = rows.row_time
     delays = [first.delay]
     if "delay" in model.names:
         longest = LONGEST * float(rows.time[-1] - rows.time[0])

@@ -101,6 +101,7 @@ class CommandedModel(ModelOfOne):
                 )
         return FlightRows(
             time=self.recording.time,
+            row_time=float(np.median(np.diff(self.recording.time))),
             output=self.recording.output - (initial_output or 0.0),
             used=used,
             command_time=self.commands.time,

@@ -98,7 +98,7 @@ def _start(model: PlantModel, first: PlantNumbers, rows: Sequence[FlightRows]) -
 
     Free lags that are equal would stay equal, since they have the same effect: they are spread.
     """
-    least = 0.5 * float(np.median(np.diff(rows[0].time)))
+    least = 0.5 * rows[0].row_time
     delay, lags = first.delay, []
     for lag, free in zip(first.lags, model.free_lags, strict=True):
         if free and abs(lag) < least:
@@ -184,7 +184,7 @@ def values_of(
     Beside no lag there is no zero: its effect would be a pulse between rows.
     """
     numbers = fit.numbers
-    least = NO_LAG * 1e-3 * float(np.median(np.diff(fit.runs[0].time)))
+    least = NO_LAG * 1e-3 * fit.runs[0].row_time
     found = {"delay": numbers.delay, "gain": fit.gain, "zero": numbers.zero}
     for name, lag in zip(fit.model.lag_names, numbers.lags, strict=True):
         if name.startswith("lag") and lag <= least:

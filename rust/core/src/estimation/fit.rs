@@ -1,6 +1,6 @@
 //! The numbers of plant and noise at which the likelihood of one or more recordings is largest.
 
-use super::likelihood::{Evaluation, Noise, Wanted, evaluate, objectives};
+use super::likelihood::{Evaluation, Noise, Wanted, evaluate, evaluations};
 use super::mean::{Derivatives, Gain, Values};
 use super::over_delays::over_delays;
 use super::plant::{MOST_STATES, Plant};
@@ -139,6 +139,42 @@ impl Model {
         self.part(run, point, None, Wanted::All, task)
     }
 
+    /// One recording at a point under each of these noises in the place of its own, without what has a
+    /// value for each row.
+    ///
+    /// # Errors
+    ///
+    /// As for `at`, and for numbers that are not those of noise.
+    pub fn under(
+        &self,
+        run: usize,
+        point: &Point,
+        noises: &[Noise],
+        task: &Task,
+    ) -> Result<Vec<Evaluation>, Error> {
+        self.check(point)?;
+        noises.iter().try_for_each(Noise::check)?;
+        let (values, by) = self.mean(point, None);
+        let (rows, _) = self.recorded(run, point)?;
+        let wanted = Wanted::Covariance;
+        evaluations(rows, &self.plant, &values, noises, &by, wanted, task)
+    }
+
+    /// The rows of a recording and its noise.
+    fn recorded<'a>(
+        &'a self,
+        run: usize,
+        point: &'a Point,
+    ) -> Result<(&'a Rows, &'a Noise), Error> {
+        let (Some(rows), Some(noise)) = (self.runs.get(run), point.noise.get(run)) else {
+            refuse!(
+                "recording {run} of {}: give the number of one of them, from zero",
+                self.runs.len()
+            )
+        };
+        Ok((rows, noise))
+    }
+
     /// The numbers of the mean at a point, and by which there are derivatives.
     fn mean(&self, point: &Point, held: Option<Quantity>) -> (Values, Derivatives) {
         let values = Values {
@@ -164,12 +200,7 @@ impl Model {
         task: &Task,
     ) -> Result<Evaluation, Error> {
         let (values, by) = self.mean(point, held);
-        let (Some(rows), Some(noise)) = (self.runs.get(run), point.noise.get(run)) else {
-            refuse!(
-                "recording {run} of {}: give the number of one of them, from zero",
-                self.runs.len()
-            )
-        };
+        let (rows, noise) = self.recorded(run, point)?;
         evaluate(rows, &self.plant, &values, noise, &by, wanted, task)
     }
 
@@ -332,10 +363,51 @@ impl Sum<'_> {
             .collect()
     }
 
-    /// The part of a recording that is kept from these numbers.
-    fn known(&self, run: usize, own: &Point) -> Option<&Value> {
-        let kept = self.kept.get(run)?.as_ref();
-        kept.filter(|(point, _)| point == own).map(|(_, part)| part)
+    /// The function at places that differ in the noise alone.
+    fn under_noises(
+        &mut self,
+        places: &[Vec<f64>],
+        wanted: Wanted,
+        found: &mut Vec<Value>,
+    ) -> Result<(), Error> {
+        let Model { plant, runs, .. } = self.model;
+        let points: Vec<Vec<Point>> = places.iter().map(|place| self.moved(place)).collect();
+        let zero = Value::new(self.model.penalty(&self.trial), mean_slots(self.slots));
+        let mut sums = vec![zero; places.len()];
+        let (values, by) = self.model.mean(&self.trial, self.held);
+        let is_gain = matches!(values.gain, Gain::Searched(_));
+        for (run, (rows, kept)) in runs.iter().zip(&mut self.kept).enumerate() {
+            let known = |point: &Point| kept.as_ref().is_some_and(|(kept, _)| kept == point);
+            let mut open: Vec<&Point> = Vec::new();
+            for own in points.iter().map(|points| &points[run]) {
+                if !known(own) && !open.contains(&own) {
+                    open.push(own);
+                }
+            }
+            let noises: Vec<Noise> = open.iter().map(|point| point.noise[0]).collect();
+            let parts = evaluations(rows, plant, &values, &noises, &by, wanted, self.task)?;
+            let part = |part: Evaluation| match wanted {
+                Wanted::Value => Value::new(part.objective, 0),
+                _ => self.by.part(self.slots, &self.trial, is_gain, &part),
+            };
+            let parts: Vec<Value> = parts.into_iter().map(part).collect();
+            for (sum, points) in sums.iter_mut().zip(&points) {
+                let own = &points[run];
+                let made = open.iter().position(|point| *point == own);
+                let made = made.and_then(|place| parts.get(place));
+                let known = kept.as_ref().map(|(_, part)| part);
+                made.or(known).into_iter().for_each(|part| sum.add(part));
+            }
+            // That of the first place, around which the others are.
+            let first = points.first().map(|points| &points[run]);
+            if let (Wanted::Slopes, Some(point), Some(part)) = (wanted, first, parts.first())
+                && open.first() == Some(&point)
+            {
+                *kept = Some((point.clone(), part.clone()));
+            }
+        }
+        found.extend(sums);
+        Ok(())
     }
 }
 
@@ -361,71 +433,12 @@ impl Function for Sum<'_> {
         })
     }
 
-    fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error> {
-        let owns = self.moved(place);
-        let mut sum = Value::new(self.model.penalty(&self.trial), mean_slots(self.slots));
-        for (run, own) in owns.into_iter().enumerate() {
-            if let Some(part) = self.known(run, &own) {
-                sum.add(part);
-                continue;
-            }
-            let part = self
-                .model
-                .part(run, &self.trial, self.held, wanted, self.task)?;
-            if wanted == Wanted::Value {
-                sum.value += part.objective;
-                continue;
-            }
-            let is_gain = matches!(
-                self.model.gain_at(&self.trial, self.held),
-                Gain::Searched(_)
-            );
-            let part = self.by.part(self.slots, &self.trial, is_gain, &part);
-            sum.add(&part);
-            if let Some(kept) = self.kept.get_mut(run) {
-                *kept = Some((own, part));
-            }
-        }
-        Ok(sum)
-    }
-
-    /// Places that differ in the noise alone share the mean: those of the last.
-    fn values(&mut self, places: &[Vec<f64>]) -> Result<Vec<f64>, Error> {
+    fn at(&mut self, places: &[Vec<f64>], wanted: Wanted) -> Result<Vec<Value>, Error> {
         let mean = mean_slots(self.slots);
-        let Some(last) = places.last() else {
-            return Ok(Vec::new());
-        };
-        let own = places
-            .iter()
-            .take_while(|place| place[..mean] != last[..mean])
-            .count();
         let mut found = Vec::with_capacity(places.len());
-        for place in &places[..own] {
-            found.push(self.at(place, Wanted::Value)?.value);
+        for alike in places.chunk_by(|one, other| one[..mean] == other[..mean]) {
+            self.under_noises(alike, wanted, &mut found)?;
         }
-        let points: Vec<Vec<Point>> = places[own..]
-            .iter()
-            .map(|place| self.moved(place))
-            .collect();
-        let mut sums = vec![self.model.penalty(&self.trial); points.len()];
-        let (values, by) = self.model.mean(&self.trial, self.held);
-        for (run, rows) in self.model.runs.iter().enumerate() {
-            let (mut noises, mut open) = (Vec::new(), Vec::new());
-            for (sum, point) in sums.iter_mut().zip(&points) {
-                if let Some(part) = self.known(run, &point[run]) {
-                    *sum += part.value;
-                } else {
-                    noises.extend(&point[run].noise);
-                    open.push(sum);
-                }
-            }
-            let plant = &self.model.plant;
-            let parts = objectives(rows, plant, &values, &noises, &by, self.task)?;
-            for (sum, part) in open.into_iter().zip(parts) {
-                *sum += part;
-            }
-        }
-        found.extend(sums);
         Ok(found)
     }
 }

@@ -30,14 +30,25 @@ impl<T> Kept<T> {
     }
 
     /// The value for a step of this length that ends at `time`.
+    #[inline(always)]
     pub(super) fn at(&mut self, length: f64, time: f64, make: impl FnOnce() -> T) -> &T {
         let tolerance = SAME * time.abs() + SAME_STEP * length;
+        let next = self.follower[self.recent];
+        let kept = self.found.get(next);
+        if kept.is_some_and(|(kept, _)| (kept - length).abs() <= tolerance) {
+            self.recent = next;
+        } else {
+            self.search(length, tolerance, make);
+        }
+        &self.found[self.recent].1
+    }
+
+    /// Another value than the one that followed the last time.
+    #[inline(never)]
+    fn search(&mut self, length: f64, tolerance: f64, make: impl FnOnce() -> T) {
         let fits = |(kept, _): &(f64, T)| (kept - length).abs() <= tolerance;
         let before = self.recent;
-        let next = self.follower[before];
-        self.recent = if self.found.get(next).is_some_and(fits) {
-            next
-        } else if let Some(place) = self.found.iter().position(fits) {
+        self.recent = if let Some(place) = self.found.iter().position(fits) {
             place
         } else if self.found.len() < KEPT {
             self.found.push((length, make()));
@@ -48,7 +59,6 @@ impl<T> Kept<T> {
             self.oldest
         };
         self.follower[before] = self.recent;
-        &self.found[self.recent].1
     }
 }
 

@@ -46,9 +46,9 @@ fn kicks_of<const N: usize>(
     } = &rows.commands;
     let jumps = if arrivals > 0.0 { time.len() - 1 } else { 0 };
     let mut found = memory::reserved("the errors of commands", uncertain.len() + jumps)?;
-    let mut steps = Steps::<N>::new(space);
+    let mut steps = Steps::<N, 1>::new([space]);
     // Ends come in their order, and so do the rows that follow them.
-    let mut add = |steps: &mut Steps<N>, row: &mut usize, end: f64, moved: &[f64; N]| {
+    let mut add = |steps: &mut Steps<N, 1>, row: &mut usize, end: f64, moved: &[f64; N]| {
         let arrival = end + delay;
         while rows.time.get(*row).is_some_and(|time| *time < arrival) {
             *row += 1;
@@ -57,14 +57,12 @@ fn kicks_of<const N: usize>(
             return;
         };
         let mut state = [0.0; MOST_STATES];
-        state[..N].copy_from_slice(&steps.at(time - arrival, *time).apply(moved, 0.0));
+        state[..N].copy_from_slice(&steps.at(time - arrival, *time)[0].apply(moved, 0.0));
         found.push(Kick { row: *row, state });
     };
     let mut row = 0;
     for (start, end, deviation) in uncertain {
-        let moved = steps
-            .at(end - start, *end)
-            .apply(&[0.0; N], sensor * deviation);
+        let moved = steps.at(end - start, *end)[0].apply(&[0.0; N], sensor * deviation);
         add(&mut steps, &mut row, *end, &moved);
     }
     if arrivals > 0.0 {

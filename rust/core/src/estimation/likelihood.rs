@@ -143,6 +143,8 @@ pub(super) enum Wanted {
     Value,
     /// With its slope and curvature.
     Slopes,
+    /// With the covariance of the unknowns, too.
+    Covariance,
     /// All of it.
     All,
 }
@@ -198,31 +200,85 @@ impl Counts {
         let is_certain = objective.is_finite() && !triangle.is_dependent(self.count);
         (squares, if is_certain { objective } else { f64::INFINITY })
     }
+
+    /// What is wanted but for the rows.
+    fn evaluation(
+        &self,
+        triangle: &Triangle,
+        gain: Gain,
+        (log_det, log_gram): (f64, f64),
+        wanted: Wanted,
+    ) -> Result<Evaluation, Error> {
+        let Self {
+            used,
+            count,
+            first,
+            linear,
+            ..
+        } = *self;
+        let (squares, objective) = self.objective(triangle, log_det, log_gram);
+        let freedom = used - count;
+        let m = (used - first) as f64;
+        let solved = triangle.solve(&triangle.column(count)[..linear]);
+        let gain = match gain {
+            Gain::Eliminated => solved.first().copied().unwrap_or(0.0),
+            Gain::Searched(gain) | Gain::Known(gain) => gain,
+        };
+        // The derivatives by delay, lags and zero are those of a plant of unit gain.
+        let factors: Vec<f64> = (linear..count)
+            .map(|column| if column < first { 1.0 } else { gain })
+            .collect();
+        let mut inverse = Vec::new();
+        if matches!(wanted, Wanted::Covariance | Wanted::All) {
+            inverse = triangle.inverse(count)?;
+        }
+        for (row, entries) in inverse.chunks_exact_mut(count.max(1)).enumerate() {
+            for (column, entry) in entries.iter_mut().enumerate() {
+                for _ in [row, column].iter().filter(|place| **place >= first) {
+                    *entry /= gain;
+                }
+            }
+        }
+        Ok(Evaluation {
+            objective,
+            log_det,
+            variance: (squares / freedom as f64).max(f64::MIN_POSITIVE),
+            freedom,
+            gain,
+            linear: solved,
+            searched: searched(triangle, linear, &factors, 2.0 * m / squares),
+            inverse,
+            score: Vec::new(),
+            whitened: Vec::new(),
+            residuals: Vec::new(),
+            rate: Vec::new(),
+        })
+    }
 }
 
-/// −2 ln L under each of these noises, as `evaluate` for `Wanted::Value`.
-pub(super) fn objectives(
+/// As `evaluate` under each of these noises; the rows are not wanted.
+pub(super) fn evaluations(
     rows: &Rows,
     plant: &Plant,
     values: &Values,
     noises: &[Noise],
     by: &Derivatives,
+    wanted: Wanted,
     task: &Task,
-) -> Result<Vec<f64>, Error> {
+) -> Result<Vec<Evaluation>, Error> {
     let parts: Vec<Vec<Disturbance>> = noises.iter().map(Noise::disturbances).collect();
     let alike = parts.windows(2).all(|pair| pair[0].len() == pair[1].len());
     if noises.len() < 2 || !alike || !rows.commands.uncertain.is_empty() {
-        let one = |noise| evaluate(rows, plant, values, noise, by, Wanted::Value, task);
-        return noises
-            .iter()
-            .map(|noise| Ok(one(noise)?.objective))
-            .collect();
+        let one = |noise| evaluate(rows, plant, values, noise, by, wanted, task);
+        return noises.iter().map(one).collect();
     }
+    check_count(rows, values, by)?;
     let n = rows.time.len();
-    let by = Derivatives::none();
-    let (_, count) = sizes(rows, values, &by);
+    let none = Derivatives::none();
+    let by = if wanted == Wanted::Value { &none } else { by };
+    let (_, count) = sizes(rows, values, by);
     let space = plant.space(&values.lags, values.zero);
-    let mut mean = Mean::new(rows, plant, &space, values, &by, task)?;
+    let mut mean = Mean::new(rows, plant, &space, values, by, task)?;
     let counts = Counts::of(rows, &mut mean, values, count);
     let plain = Triangle::new(&mean.columns, n, counts.first, task)?.log_det(counts.first);
     let scatters = |noise: &Noise| noise.arrivals.hypot(noise.stamps);
@@ -247,13 +303,25 @@ pub(super) fn objectives(
         })
         .collect();
     let triangles = triangles(shared, &each?, task)?;
-    let objective = |(log_det, triangle): (f64, Triangle)| {
+    let evaluation = |(log_det, triangle): (f64, Triangle)| {
         let log_gram = triangle.log_det(counts.first) - plain;
-        counts.objective(&triangle, log_det, log_gram).1
+        counts.evaluation(&triangle, values.gain, (log_det, log_gram), wanted)
     };
-    Ok(triangles.into_iter().map(objective).collect())
+    triangles.into_iter().map(evaluation).collect()
 }
 
+/// An error unless there are more rows than unknowns.
+fn check_count(rows: &Rows, values: &Values, by: &Derivatives) -> Result<(), Error> {
+    let used = rows.used.iter().filter(|used| **used).count();
+    let (_, count) = sizes(rows, values, by);
+    refuse_if!(
+        used <= count,
+        "{used} rows for {count} unknowns: the likelihood needs more rows than unknowns"
+    );
+    Ok(())
+}
+
+/// The likelihood under one noise; all of it only if wanted.
 pub(super) fn evaluate(
     rows: &Rows,
     plant: &Plant,
@@ -264,12 +332,7 @@ pub(super) fn evaluate(
     task: &Task,
 ) -> Result<Evaluation, Error> {
     let n = rows.time.len();
-    let used = rows.used.iter().filter(|used| **used).count();
-    let (_, count) = sizes(rows, values, by);
-    refuse_if!(
-        used <= count,
-        "{used} rows for {count} unknowns: the likelihood needs more rows than unknowns"
-    );
+    check_count(rows, values, by)?;
     let none = Derivatives::none();
     let by = if wanted == Wanted::Value { &none } else { by };
     let (_, count) = sizes(rows, values, by);
@@ -315,44 +378,9 @@ pub(super) fn evaluate(
     if !is_white {
         log_gram += triangle.log_det(first);
     }
-    let (squares, objective) = counts.objective(&triangle, log_det, log_gram);
-    let freedom = used - count;
-    let variance = (squares / freedom as f64).max(f64::MIN_POSITIVE);
-    let m = (used - first) as f64;
-    let solved = triangle.solve(&triangle.column(count)[..linear]);
-    let gain = match values.gain {
-        Gain::Eliminated => solved.first().copied().unwrap_or(0.0),
-        Gain::Searched(gain) | Gain::Known(gain) => gain,
-    };
-    // The derivatives by delay, lags and zero are those of a plant of unit gain.
-    let factors: Vec<f64> = (linear..count)
-        .map(|column| if column < first { 1.0 } else { gain })
-        .collect();
-    let mut found = Evaluation {
-        objective,
-        log_det,
-        variance,
-        freedom,
-        gain,
-        linear: Vec::new(),
-        searched: searched(&triangle, linear, &factors, 2.0 * m / squares),
-        inverse: Vec::new(),
-        score: Vec::new(),
-        whitened: Vec::new(),
-        residuals: Vec::new(),
-        rate: Vec::new(),
-    };
+    let mut found = counts.evaluation(&triangle, values.gain, (log_det, log_gram), wanted)?;
     if wanted != Wanted::All {
         return Ok(found);
-    }
-    found.linear = solved;
-    found.inverse = triangle.inverse(count)?;
-    for (row, entries) in found.inverse.chunks_exact_mut(count.max(1)).enumerate() {
-        for (column, entry) in entries.iter_mut().enumerate() {
-            for _ in [row, column].iter().filter(|place| **place >= first) {
-                *entry /= found.gain;
-            }
-        }
     }
     if by.delay {
         let mut unit = vec![0.0; first + 1];
@@ -363,7 +391,7 @@ pub(super) fn evaluate(
     }
     found.whitened = memory::copied(WHAT, &mean.columns[count * n..])?;
     subtract(&mut found.whitened, &found.linear, &mean.columns);
-    let deviation = variance.sqrt();
+    let deviation = found.variance.sqrt();
     found
         .whitened
         .iter_mut()

@@ -99,8 +99,33 @@ impl Mean {
         let mut rate = memory::filled(WHAT, 0.0, n)?;
         let (delay, time) = (values.delay, &rows.time);
         let slope = Some(rate.as_mut_slice());
-        respond(space, held, delay, time, &mut response, slope, task)?;
         let mut columns = memory::filled(WHAT, 0.0, (count + 1).saturating_mul(n))?;
+        // The plants of the difference quotients, and their steps; their columns come last.
+        let mut others = Vec::new();
+        for (i, lag) in values.lags.iter().enumerate() {
+            if by.by_lag(values, i) {
+                let mut moved = values.lags.clone();
+                moved[i] = lag * (1.0 + STEP);
+                others.push((plant.space(&moved, values.zero), moved[i] - lag));
+            }
+        }
+        if by.zero {
+            // The response is linear in it: the quotient is exact, and a long step has the least rounding.
+            let step = values.lags.last().copied().unwrap_or(1.0);
+            others.push((plant.space(&values.lags, values.zero + step), step));
+        }
+        let from = (count - others.len()) * n;
+        let mut outs = columns[from..].chunks_exact_mut(n);
+        let out = response.as_mut_slice();
+        if let Some(((other, _), quotient)) = others.first().zip(outs.next()) {
+            let (plants, outs) = ([space, other], [out, quotient]);
+            respond(plants, held, delay, time, outs, slope, task)?;
+        } else {
+            respond([space], held, delay, time, [out], slope, task)?;
+        }
+        for ((other, _), out) in others.iter().skip(1).zip(outs) {
+            respond([other], held, delay, time, [out], None, task)?;
+        }
         let mut places = columns.chunks_exact_mut(n);
         let mut place = || places.next().unwrap_or_default();
         if values.gain == Gain::Eliminated {
@@ -124,9 +149,8 @@ impl Mean {
             }
         }
         let rounding = ROUNDING * response.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        let difference = |other: &PlantSpace, step: f64, out: &mut [f64]| {
-            respond(other, held, delay, time, out, None, task)?;
-            for (out, response) in out.iter_mut().zip(&response) {
+        for (_, step) in &others {
+            for (out, response) in place().iter_mut().zip(&response) {
                 let change = *out - response;
                 *out = if change.abs() > rounding {
                     change / step
@@ -134,20 +158,6 @@ impl Mean {
                     0.0
                 };
             }
-            Ok::<(), Error>(())
-        };
-        for (i, lag) in values.lags.iter().enumerate() {
-            if by.by_lag(values, i) {
-                let mut moved = values.lags.clone();
-                moved[i] = lag * (1.0 + STEP);
-                difference(&plant.space(&moved, values.zero), moved[i] - lag, place())?;
-            }
-        }
-        if by.zero {
-            // The response is linear in it: the quotient is exact, and a long step has the least rounding.
-            let step = values.lags.last().copied().unwrap_or(1.0);
-            let other = plant.space(&values.lags, values.zero + step);
-            difference(&other, step, place())?;
         }
         let target = place();
         target.copy_from_slice(&rows.output);
@@ -208,5 +218,5 @@ fn pulse(
         time: &[ends.0, ends.1],
         value: &[1.0, 0.0],
     };
-    respond(space, held, delay, times, out, None, task)
+    respond([space], held, delay, times, [out], None, task)
 }

@@ -20,8 +20,13 @@ use crate::{Error, Task, memory};
 /// Lanes of the widest registers.
 const WIDEST: usize = 8;
 
-/// Rows between two updates of R.
-const BLOCK: usize = 128;
+/// Rows between two updates of R: few enough for the first cache.
+const BLOCK: usize = 64;
+
+/// What begins at a line of the cache: a register as long as a line would else be read from two.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Line<T>(T);
 
 /// One of the noises.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,6 +130,7 @@ fn matrix<S: Simd, const N: usize>(
 }
 
 /// Φ and Q of one step length.
+#[repr(align(64))]
 struct Step<V, const N: usize> {
     phi: Matrix<V, N>,
     q: Matrix<V, N>,
@@ -210,7 +216,7 @@ fn pass<S: Simd, const N: usize>(
     }
     let stamps = lanes(simd, noises, |one| one.stamps * one.stamps);
     let kicked = lanes(simd, noises, |one| one.kick * one.kick);
-    let mut states = memory::filled(WHAT, [zero; N], count)?;
+    let mut states = memory::filled(WHAT, Line([zero; N]), count)?;
     let mut steps = Kept::new();
     let mut kicks = kicks.iter().peekable();
     let mut factor = Factor::new(simd, count)?;
@@ -219,19 +225,22 @@ fn pass<S: Simd, const N: usize>(
     let mut length = f64::NAN;
     for row in 0..rows {
         if row % SETTLED as usize == 0 {
-            for state in cast_slice_mut::<_, f64>(states.as_flattened_mut()) {
-                *state = settled(*state);
+            for Line(state) in &mut states {
+                for state in cast_slice_mut::<_, f64>(state) {
+                    *state = settled(*state);
+                }
             }
         }
+        let mut by: Option<&Step<S::f64s, N>> = None;
         if row > 0 {
             let between = time[row] - time[row - 1];
             let tolerance = SAME_ROWS.0 * time[row].abs() + SAME_ROWS.1 * between;
             if length.is_nan() || (between - length).abs() > tolerance {
                 length = between;
             }
-            let by: &Step<S::f64s, N> =
-                steps.at(length, time[row], || step::<S, N>(simd, noises, length));
-            predict(simd, &mut p, by);
+            let own = steps.at(length, time[row], || step::<S, N>(simd, noises, length));
+            predict(simd, &mut p, own);
+            by = Some(own);
             while let Some(kick) = kicks.next_if(|kick| kick.row <= row) {
                 for i in 0..N {
                     for j in 0..N {
@@ -240,17 +249,9 @@ fn pass<S: Simd, const N: usize>(
                     }
                 }
             }
-            for state in &mut states {
-                let mut moved = [zero; N];
-                for i in 0..N {
-                    for j in 0..N {
-                        moved[i] = simd.mul_add_e_f64s(by.phi[i][j], state[j], moved[i]);
-                    }
-                }
-                *state = moved;
-            }
         }
         let place = row % BLOCK;
+        let (mut gain, mut scale) = ([zero; N], zero);
         if used[row] {
             let moved = speed.get(row).copied().unwrap_or(0.0);
             let mut variance = simd.mul_add_e_f64s(stamps, simd.splat_f64s(moved * moved), one);
@@ -262,8 +263,8 @@ fn pass<S: Simd, const N: usize>(
                 variance = simd.mul_add_e_f64s(pc[i], c[i], variance);
             }
             let inverse = simd.div_f64s(one, variance);
-            let scale = simd.sqrt_f64s(inverse);
-            let gain = pc.map(|pc| simd.mul_f64s(pc, inverse));
+            scale = simd.sqrt_f64s(inverse);
+            gain = pc.map(|pc| simd.mul_f64s(pc, inverse));
             for i in 0..N {
                 for j in 0..N {
                     let less = simd.mul_f64s(pc[i], gain[j]);
@@ -279,20 +280,27 @@ fn pass<S: Simd, const N: usize>(
                 add_logarithms(&mut log_det, cast_slice(&[variance]));
                 large = one;
             }
-            for (column, state) in states.iter_mut().enumerate() {
-                let mut innovation = simd.splat_f64s(columns[column * rows + row]);
-                for (c, state) in c.iter().zip(state.iter()) {
-                    innovation = simd.negate_mul_add_e_f64s(*c, *state, innovation);
+        }
+        for (column, Line(state)) in states.iter_mut().enumerate() {
+            // At the first row all are zero.
+            let mut moved = [zero; N];
+            if let Some(by) = by {
+                for i in 0..N {
+                    for j in 0..N {
+                        moved[i] = simd.mul_add_e_f64s(by.phi[i][j], state[j], moved[i]);
+                    }
                 }
-                for (gain, state) in gain.iter().zip(state.iter_mut()) {
-                    *state = simd.mul_add_e_f64s(*gain, innovation, *state);
-                }
-                factor.put(column, place, simd.mul_f64s(innovation, scale));
             }
-        } else {
-            for column in 0..count {
-                factor.put(column, place, zero);
+            // In a row that is not used the gain and the scale are zero.
+            let mut innovation = simd.splat_f64s(columns[column * rows + row]);
+            for i in 0..N {
+                innovation = simd.negate_mul_add_e_f64s(c[i], moved[i], innovation);
             }
+            for i in 0..N {
+                moved[i] = simd.mul_add_e_f64s(gain[i], innovation, moved[i]);
+            }
+            *state = moved;
+            factor.put(column, place, simd.mul_f64s(innovation, scale));
         }
         if place == BLOCK - 1 || row == rows - 1 {
             task.check()?;
@@ -320,7 +328,7 @@ struct Factor<V> {
     /// Column by column; row i of column j at j (j + 1)/2 + i.
     factor: Vec<V>,
     /// Each column of R above the rows of a block.
-    stacked: Vec<V>,
+    stacked: Vec<Line<V>>,
 }
 
 impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
@@ -330,13 +338,13 @@ impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
         Ok(Self {
             count,
             factor: memory::filled(WHAT, zero, count * (count + 1) / 2)?,
-            stacked: memory::filled(WHAT, zero, count * (count + BLOCK))?,
+            stacked: memory::filled(WHAT, Line(zero), count * (count + BLOCK))?,
         })
     }
 
     #[inline(always)]
     fn put(&mut self, column: usize, row: usize, value: V) {
-        self.stacked[column * (self.count + BLOCK) + self.count + row] = value;
+        self.stacked[column * (self.count + BLOCK) + self.count + row] = Line(value);
     }
 
     /// Update R by the first rows of the block.
@@ -346,8 +354,11 @@ impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
         let zero = simd.splat_f64s(0.0);
         for j in 0..count {
             let above = &mut self.stacked[j * stride..][..count];
-            above.fill(zero);
-            above[..=j].copy_from_slice(&self.factor[j * (j + 1) / 2..][..=j]);
+            above.fill(Line(zero));
+            let from = &self.factor[j * (j + 1) / 2..][..=j];
+            for (above, from) in above.iter_mut().zip(from) {
+                *above = Line(*from);
+            }
         }
         for j in 0..count {
             let (before, rest) = self.stacked.split_at_mut(j * stride);
@@ -356,7 +367,7 @@ impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
             for (part, q) in parts.iter_mut().zip(before.chunks_exact(stride)) {
                 let q = &q[..own.len()];
                 *part = product(simd, q, own);
-                for (q, own) in q.iter().zip(own.iter_mut()) {
+                for (Line(q), Line(own)) in q.iter().zip(own.iter_mut()) {
                     *own = simd.negate_mul_add_e_f64s(*part, *q, *own);
                 }
             }
@@ -365,7 +376,7 @@ impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
             for inverse in cast_slice_mut::<V, f64>(std::slice::from_mut(&mut inverse)) {
                 *inverse = if *inverse > 0.0 { 1.0 / *inverse } else { 0.0 };
             }
-            for own in own.iter_mut() {
+            for Line(own) in own.iter_mut() {
                 *own = simd.mul_f64s(*own, inverse);
             }
             parts[j] = left;
@@ -382,17 +393,17 @@ impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
 
 /// The inner product of two columns, in four sums that are computed side by side.
 #[inline(always)]
-fn product<S: Simd>(simd: S, x: &[S::f64s], y: &[S::f64s]) -> S::f64s {
+fn product<S: Simd>(simd: S, x: &[Line<S::f64s>], y: &[Line<S::f64s>]) -> S::f64s {
     let mut sums = [simd.splat_f64s(0.0); 4];
     let (left, right) = (x.chunks_exact(4), y.chunks_exact(4));
-    for (sum, (x, y)) in sums
+    for (sum, (Line(x), Line(y))) in sums
         .iter_mut()
         .zip(left.remainder().iter().zip(right.remainder()))
     {
         *sum = simd.mul_f64s(*x, *y);
     }
     for (x, y) in left.zip(right) {
-        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+        for (sum, (Line(x), Line(y))) in sums.iter_mut().zip(x.iter().zip(y)) {
             *sum = simd.mul_add_e_f64s(*x, *y, *sum);
         }
     }

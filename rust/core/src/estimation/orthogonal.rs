@@ -14,7 +14,7 @@ use crate::{Error, Task, memory};
 /// Norm of what is left of a column, as a share of its norm, below which it depends on the others.
 const DEPENDENT: f64 = 1e-9;
 
-/// Rows of a block, and the least as a multiple of the columns.
+/// Most rows of a block, or this multiple of the columns if that is more.
 const BLOCK: usize = 256;
 const BLOCK_SHARE: usize = 2;
 
@@ -61,7 +61,9 @@ impl Triangle {
     #[inline(always)]
     fn made(columns: &[f64], length: usize, count: usize, task: &Task) -> Result<Self, Error> {
         const WHAT: &str = "the triangular factor";
-        let block = BLOCK.max(BLOCK_SHARE * count).min(length);
+        // Blocks of about equal length: a short last one would cost as much as the others.
+        let most = BLOCK.max(BLOCK_SHARE * count);
+        let block = length.div_ceil(length.div_ceil(most).max(1));
         let stride = count + block;
         let mut factor = memory::filled(WHAT, 0.0, count * (count + 1) / 2)?;
         let mut stacked = memory::filled(WHAT, 0.0, stride * count)?;

@@ -185,7 +185,15 @@ impl Responses {
         let mut each = Vec::with_capacity(rests.len());
         for rest in rests {
             let mut response = memory::filled(WHAT, 0.0, times.len())?;
-            respond(space, held, rest * step, &times, &mut response, None, task)?;
+            respond(
+                [space],
+                held,
+                rest * step,
+                &times,
+                [&mut response],
+                None,
+                task,
+            )?;
             each.push(response);
         }
         let places = late.into_iter().map(|(rest, whole)| (rest, most - whole));

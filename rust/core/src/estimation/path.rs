@@ -27,47 +27,52 @@ pub(super) struct Held<'a> {
     pub(super) value: &'a [f64],
 }
 
-/// The response to `inputs`, each `delay` later, at `times`; and its slope there, if asked for.
-pub(super) fn respond(
-    plant: &PlantSpace,
+/// The responses of plants of equally many states to `inputs`, each `delay` later, at `times`; and the
+/// slope of the first there, if asked for.
+///
+/// Plants that differ little, for a difference quotient, go side by side: events and lengths of steps
+/// are the same.
+pub(super) fn respond<const M: usize>(
+    plants: [&PlantSpace; M],
     inputs: Held<'_>,
     delay: f64,
     times: &[f64],
-    out: &mut [f64],
+    outs: [&mut [f64]; M],
     rate: Option<&mut [f64]>,
     task: &Task,
 ) -> Result<(), Error> {
-    let run = match plant.b.len() {
-        0 => run::<0>,
-        1 => run::<1>,
-        2 => run::<2>,
-        3 => run::<3>,
-        4 => run::<4>,
-        5 => run::<5>,
-        6 => run::<6>,
-        7 => run::<7>,
-        8 => run::<8>,
+    let run = match plants[0].b.len() {
+        0 => run::<0, M>,
+        1 => run::<1, M>,
+        2 => run::<2, M>,
+        3 => run::<3, M>,
+        4 => run::<4, M>,
+        5 => run::<5, M>,
+        6 => run::<6, M>,
+        7 => run::<7, M>,
+        8 => run::<8, M>,
         n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
     };
-    run(plant, inputs, delay, times, out, rate, task)
+    run(plants, inputs, delay, times, outs, rate, task)
 }
 
-fn run<const N: usize>(
-    plant: &PlantSpace,
+fn run<const N: usize, const M: usize>(
+    plants: [&PlantSpace; M],
     inputs: Held<'_>,
     delay: f64,
     times: &[f64],
-    out: &mut [f64],
+    mut outs: [&mut [f64]; M],
     mut rate: Option<&mut [f64]>,
     task: &Task,
 ) -> Result<(), Error> {
-    let c: [f64; N] = std::array::from_fn(|i| plant.c[i]);
+    let c: [[f64; N]; M] = plants.map(|plant| std::array::from_fn(|i| plant.c[i]));
     // The slope of the output is C (A x + B u) between events.
+    let first = plants[0];
     let by_state: [f64; N] =
-        std::array::from_fn(|j| (0..N).map(|i| plant.c[i] * plant.a[i * N + j]).sum());
-    let by_input: f64 = plant.c.iter().zip(&plant.b).map(|(c, b)| c * b).sum();
-    let mut steps = Steps::<N>::new(plant);
-    let mut state = [0.0; N];
+        std::array::from_fn(|j| (0..N).map(|i| first.c[i] * first.a[i * N + j]).sum());
+    let by_input: f64 = first.c.iter().zip(&first.b).map(|(c, b)| c * b).sum();
+    let mut steps = Steps::<N, M>::new(plants);
+    let mut states = [[0.0; N]; M];
     let mut arrivals = inputs.time.iter().zip(inputs.value);
     let mut coming = arrivals.next();
     let mut input = 0.0;
@@ -77,7 +82,7 @@ fn run<const N: usize>(
         loop {
             events = events.wrapping_add(1);
             if events.is_multiple_of(SETTLED) {
-                state = state.map(settled);
+                states = states.map(|state| state.map(settled));
             }
             if events.is_multiple_of(CHECKED) {
                 task.check()?;
@@ -86,7 +91,10 @@ fn run<const N: usize>(
             let until = time.min(arrival);
             let length = until - now;
             if N > 0 && length > 0.0 {
-                state = steps.at(length, until).apply(&state, input);
+                let steps = steps.at(length, until);
+                for (state, step) in states.iter_mut().zip(steps) {
+                    *state = step.apply(state, input);
+                }
                 now = until;
             }
             if let Some((_, value)) = coming.filter(|_| arrival <= time) {
@@ -97,9 +105,11 @@ fn run<const N: usize>(
                 break;
             }
         }
-        out[row] = product(&c, &state) + plant.d * input;
+        for (((out, plant), c), state) in outs.iter_mut().zip(plants).zip(&c).zip(&states) {
+            out[row] = product(c, state) + plant.d * input;
+        }
         if let Some(rate) = rate.as_deref_mut() {
-            rate[row] = product(&by_state, &state) + by_input * input;
+            rate[row] = product(&by_state, &states[0]) + by_input * input;
         }
     }
     Ok(())
@@ -154,7 +164,16 @@ mod tests {
         };
         let (mut out, mut rate) = (vec![f64::NAN; times.len()], vec![f64::NAN; times.len()]);
         let task = Task::new();
-        respond(&space, held, delay, times, &mut out, Some(&mut rate), &task).unwrap();
+        respond(
+            [&space],
+            held,
+            delay,
+            times,
+            [&mut out],
+            Some(&mut rate),
+            &task,
+        )
+        .unwrap();
         (out, rate)
     }
 
@@ -275,7 +294,7 @@ mod tests {
             value: &times,
         };
         let mut out = vec![0.0; times.len()];
-        let found = respond(&space, held, 0.5, &times, &mut out, None, &task);
+        let found = respond([&space], held, 0.5, &times, [&mut out], None, &task);
         assert_eq!(found, Err(Error::Interrupted));
     }
 }

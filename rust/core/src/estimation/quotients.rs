@@ -76,19 +76,14 @@ pub(super) trait Function {
         None
     }
 
-    /// Its value, with slope and curvature if wanted.
-    fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error>;
-
-    /// Its values alone at some places.
-    fn values(&mut self, places: &[Vec<f64>]) -> Result<Vec<f64>, Error> {
-        let value = |place: &Vec<f64>| Ok(self.at(place, Wanted::Value)?.value);
-        places.iter().map(value).collect()
-    }
+    /// Its values at some places, with slope and curvature if wanted. Neighbours that differ in the
+    /// last variables alone may be computed together.
+    fn at(&mut self, places: &[Vec<f64>], wanted: Wanted) -> Result<Vec<Value>, Error>;
 }
 
 impl<F: FnMut(&[f64], Wanted) -> Result<Value, Error>> Function for F {
-    fn at(&mut self, place: &[f64], wanted: Wanted) -> Result<Value, Error> {
-        self(place, wanted)
+    fn at(&mut self, places: &[Vec<f64>], wanted: Wanted) -> Result<Vec<Value>, Error> {
+        places.iter().map(|place| self(place, wanted)).collect()
     }
 }
 
@@ -142,10 +137,113 @@ impl Slack {
     }
 }
 
+/// The places around another one at which difference quotients by some of the variables need the
+/// function.
+pub(super) struct Around<'a> {
+    variables: &'a [Variable],
+    steps: &'a [f64],
+    which: Range<usize>,
+    /// The bound on several variables that is close, and the variable that moves away from it; the
+    /// others move along it.
+    bound: Option<(Slack, usize)>,
+    /// The two steps of each variable: to both sides, or one and two to one side.
+    moves: Vec<[f64; 2]>,
+    /// A place for each step.
+    pub(super) places: Vec<Vec<f64>>,
+}
+
 /// Difference quotients by some of the variables, from one side at a bound.
 pub(super) struct Quotients {
     pub(super) slope: Vec<f64>,
     pub(super) curvature: Vec<f64>,
+}
+
+impl<'a> Around<'a> {
+    pub(super) fn new(
+        variables: &'a [Variable],
+        steps: &'a [f64],
+        x: &[f64],
+        which: Range<usize>,
+        function: &impl Function,
+    ) -> Self {
+        let bound = function.slack(x).and_then(|slack| {
+            let pivot = slack.near(variables, steps)?;
+            which.contains(&pivot).then_some((slack, pivot))
+        });
+        let (mut moves, mut places) = (Vec::new(), Vec::new());
+        for i in which.clone() {
+            let (variable, step) = (variables[i], steps[i]);
+            let (mut up, mut down) = (
+                step.min(variable.high - x[i]),
+                step.min(x[i] - variable.low),
+            );
+            if let Some((slack, _)) = bound.as_ref().filter(|(_, pivot)| *pivot == i) {
+                *(if slack.slope[i] > 0.0 {
+                    &mut down
+                } else {
+                    &mut up
+                }) = 0.0;
+            }
+            let both = if up <= 0.0 {
+                [-down, -2.0 * down]
+            } else if down <= 0.0 {
+                [up, 2.0 * up]
+            } else {
+                [up, -down]
+            };
+            for distance in both {
+                let mut place = x.to_vec();
+                place[i] += distance;
+                if let Some((slack, pivot)) = bound.as_ref().filter(|(slack, pivot)| {
+                    *pivot != i && slack.slope.get(i).is_some_and(|by| *by != 0.0)
+                }) {
+                    keep_slack(variables, &mut place, *pivot, slack.value, function);
+                }
+                places.push(place);
+            }
+            moves.push(both);
+        }
+        Self {
+            variables,
+            steps,
+            which,
+            bound,
+            moves,
+            places,
+        }
+    }
+
+    /// From the function at its own place and at `places`.
+    pub(super) fn quotients(self, value: f64, values: &[Value]) -> Quotients {
+        let (mut slope, mut curvature) = (Vec::new(), Vec::new());
+        for ((i, values), [a, b]) in self
+            .which
+            .clone()
+            .zip(values.chunks_exact(2))
+            .zip(self.moves)
+        {
+            let step = self.variables[i].step;
+            let flattest = FLATTEST / (step * step);
+            let [by_a, by_b] =
+                [(a, &values[0]), (b, &values[1])].map(|(d, far)| (far.value - value) / d);
+            if by_a.is_finite() && by_b.is_finite() {
+                slope.push((a * by_b - b * by_a) / (a - b));
+                curvature.push((2.0 * (by_a - by_b) / (a - b)).max(flattest));
+            } else {
+                let only = if by_a.is_finite() { by_a } else { by_b };
+                slope.push(if only.is_finite() { only } else { 0.0 });
+                curvature.push((only.abs() / self.steps[i]).max(flattest));
+            }
+        }
+        if let Some((slack, pivot)) = self.bound {
+            let start = self.which.start;
+            let by_pivot = slope[pivot - start] / slack.slope[pivot];
+            for i in self.which.filter(|i| *i != pivot) {
+                slope[i - start] += slack.slope.get(i).unwrap_or(&0.0) * by_pivot;
+            }
+        }
+        Quotients { slope, curvature }
+    }
 }
 
 impl Quotients {
@@ -157,70 +255,9 @@ impl Quotients {
         which: Range<usize>,
         function: &mut impl Function,
     ) -> Result<Self, Error> {
-        let value = found.value;
-        let (mut slope, mut curvature) = (Vec::new(), Vec::new());
-        // Close to a bound on several variables the others move along it, and one away from it.
-        let slack = function.slack(x);
-        let bound = slack.as_ref().and_then(|slack| {
-            let pivot = slack.near(variables, steps)?;
-            which.contains(&pivot).then_some((slack, pivot))
-        });
-        // The two steps of a variable: to both sides, or one and two to one side.
-        let moves = |i: usize| {
-            let (variable, step) = (variables[i], steps[i]);
-            let (mut up, mut down) = (
-                step.min(variable.high - x[i]),
-                step.min(x[i] - variable.low),
-            );
-            if let Some((slack, _)) = bound.filter(|(_, pivot)| *pivot == i) {
-                *(if slack.slope[i] > 0.0 {
-                    &mut down
-                } else {
-                    &mut up
-                }) = 0.0;
-            }
-            if up <= 0.0 {
-                [-down, -2.0 * down]
-            } else if down <= 0.0 {
-                [up, 2.0 * up]
-            } else {
-                [up, -down]
-            }
-        };
-        let mut places = Vec::new();
-        for i in which.clone() {
-            for distance in moves(i) {
-                let mut place = x.to_vec();
-                place[i] += distance;
-                if let Some((slack, pivot)) = bound.filter(|(slack, pivot)| {
-                    *pivot != i && slack.slope.get(i).is_some_and(|by| *by != 0.0)
-                }) {
-                    keep_slack(variables, &mut place, pivot, slack.value, function);
-                }
-                places.push(place);
-            }
-        }
-        let values = function.values(&places)?;
-        for (i, values) in which.clone().zip(values.chunks_exact(2)) {
-            let flattest = FLATTEST / (variables[i].step * variables[i].step);
-            let [a, b] = moves(i);
-            let [by_a, by_b] = [(a, values[0]), (b, values[1])].map(|(d, far)| (far - value) / d);
-            if by_a.is_finite() && by_b.is_finite() {
-                slope.push((a * by_b - b * by_a) / (a - b));
-                curvature.push((2.0 * (by_a - by_b) / (a - b)).max(flattest));
-            } else {
-                let only = if by_a.is_finite() { by_a } else { by_b };
-                slope.push(if only.is_finite() { only } else { 0.0 });
-                curvature.push((only.abs() / steps[i]).max(flattest));
-            }
-        }
-        if let Some((slack, pivot)) = bound {
-            let by_pivot = slope[pivot - which.start] / slack.slope[pivot];
-            for i in which.clone().filter(|i| *i != pivot) {
-                slope[i - which.start] += slack.slope.get(i).unwrap_or(&0.0) * by_pivot;
-            }
-        }
-        Ok(Self { slope, curvature })
+        let around = Around::new(variables, steps, x, which, function);
+        let values = function.at(&around.places, Wanted::Value)?;
+        Ok(around.quotients(found.value, &values))
     }
 }
 

@@ -8,8 +8,10 @@
 //! value of the quadratic model there (Nocedal & Wright, Numerical Optimization, 18.1). What the known
 //! slopes lack is a difference quotient at the start and at the end of the search.
 
+use std::ops::Range;
+
 use super::likelihood::Wanted;
-use super::quotients::{Function, Quotients, Slack, Value, Variable, keep_within, shorten};
+use super::quotients::{Around, Function, Quotients, Slack, Value, Variable, keep_within, shorten};
 use crate::Error;
 
 /// Most iterations, and those over the first variables alone.
@@ -56,8 +58,10 @@ pub(super) fn minimise(
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
     keep_within(variables, &mut x, &function);
-    let mut found = function.at(&x, Wanted::Slopes)?;
+    let mut values = function.at(std::slice::from_ref(&x), Wanted::Slopes)?;
+    let mut found = values.swap_remove(0);
     let (n, known) = (x.len(), found.slope.len());
+    let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverted(&found.curvature, known) else {
             break;
@@ -67,10 +71,13 @@ pub(super) fn minimise(
         if promised(&step, &found.slope) <= tolerance.max(WORTHWHILE) {
             break;
         }
-        let slope = found.slope.clone();
-        let Some((next, _)) =
-            line_search(variables, &mut x, found.value, &slope, &step, &mut function)?
-        else {
+        let line = Line {
+            value: found.value,
+            gradient: &found.slope,
+            step: &step,
+        };
+        let by = (steps.as_slice(), n..n);
+        let Some((next, ..)) = line_search(variables, &mut x, line, by, &mut function)? else {
             break;
         };
         let decrease = found.value - next.value;
@@ -84,7 +91,6 @@ pub(super) fn minimise(
         let value = found.value;
         return Ok(Minimum { place: x, value });
     }
-    let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
     let (mut gradient, mut inverse) =
         by_quotients(variables, &mut steps, &x, &found, &mut function)?;
     let mut lacking = difference(&gradient, &found.slope);
@@ -108,15 +114,14 @@ pub(super) fn minimise(
             exact = true;
             continue;
         }
-        let next = line_search(
-            variables,
-            &mut x,
-            found.value,
-            &gradient,
-            &step,
-            &mut function,
-        )?;
-        if let Some((next, moved)) = next {
+        let line = Line {
+            value: found.value,
+            gradient: &gradient,
+            step: &step,
+        };
+        let by = (steps.as_slice(), known..n);
+        let next = line_search(variables, &mut x, line, by, &mut function)?;
+        if let Some((next, moved, others)) = next {
             let decrease = found.value - next.value;
             let is_poor = decrease < WORTHWHILE && decrease < POOR * promised(&step, &gradient);
             stalled = if is_poor { stalled + 1 } else { 0 };
@@ -126,7 +131,6 @@ pub(super) fn minimise(
             }
             let parts = found.slope.iter().zip(&lacking);
             let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
-            let others = Quotients::new(variables, &steps, &x, &found, known..n, &mut function)?;
             shorten(&variables[known..], &others.curvature, &mut steps[known..]);
             slopes.extend(others.slope);
             update(&mut inverse, &moved, &difference(&slopes, &gradient));
@@ -147,28 +151,40 @@ pub(super) fn minimise(
     })
 }
 
-/// The first point along a step, ever shorter, at which the function is lower; x moves there.
+/// A step from a place at which the function has this value and gradient.
+struct Line<'a> {
+    value: f64,
+    gradient: &'a [f64],
+    step: &'a [f64],
+}
+
+/// The first point along a step, ever shorter, at which the function is lower; x moves there. With how
+/// far it moves, and the quotients there with these steps `by` some of the variables.
 fn line_search(
     variables: &[Variable],
     x: &mut [f64],
-    value: f64,
-    gradient: &[f64],
-    step: &[f64],
+    line: Line<'_>,
+    by: (&[f64], Range<usize>),
     function: &mut impl Function,
-) -> Result<Option<(Value, Vec<f64>)>, Error> {
+) -> Result<Option<(Value, Vec<f64>, Quotients)>, Error> {
     let mut share = 1.0;
     let mut trial = x.to_vec();
     for _ in 0..SHORTENINGS {
-        let places = trial.iter_mut().zip(x.iter()).zip(variables).zip(step);
+        let places = trial.iter_mut().zip(x.iter()).zip(variables).zip(line.step);
         for (((trial, x), variable), step) in places {
             *trial = (x + share * step).clamp(variable.low, variable.high);
         }
         keep_within(variables, &mut trial, function);
         let moved = difference(&trial, x);
-        let found = function.at(&trial, Wanted::Slopes)?;
-        if found.value < value + SUFFICIENT * product(gradient, &moved) && found.value < value {
+        let mut around = Around::new(variables, by.0, &trial, by.1.clone(), function);
+        around.places.insert(0, trial.clone());
+        let mut values = function.at(&around.places, Wanted::Slopes)?;
+        let found = values.remove(0);
+        let enough = line.value + SUFFICIENT * product(line.gradient, &moved);
+        if found.value < enough && found.value < line.value {
             x.copy_from_slice(&trial);
-            return Ok(Some((found, moved)));
+            let quotients = around.quotients(found.value, &values);
+            return Ok(Some((found, moved, quotients)));
         }
         share *= SHORTER;
     }

@@ -45,29 +45,42 @@ impl<const N: usize> Step<N> {
     }
 }
 
-/// Steps of one plant.
-pub(super) struct Steps<const N: usize> {
+/// A, b and the norm of A of a plant.
+struct Equations<const N: usize> {
     a: Square<N>,
     b: [f64; N],
     norm: f64,
-    kept: Kept<Step<N>>,
 }
 
-impl<const N: usize> Steps<N> {
-    /// For a plant of N states.
-    pub(super) fn new(plant: &PlantSpace) -> Self {
-        Self {
+/// Steps of M plants, in which they take the same ones.
+pub(super) struct Steps<const N: usize, const M: usize> {
+    plants: [Equations<N>; M],
+    kept: Kept<[Step<N>; M]>,
+}
+
+impl<const N: usize, const M: usize> Steps<N, M> {
+    /// For plants of N states.
+    pub(super) fn new(plants: [&PlantSpace; M]) -> Self {
+        let equations = |plant: &PlantSpace| Equations {
             a: std::array::from_fn(|i| std::array::from_fn(|j| plant.a[i * N + j])),
             b: std::array::from_fn(|i| plant.b[i]),
             norm: balanced_norm(&plant.a, N),
+        };
+        Self {
+            plants: plants.map(equations),
             kept: Kept::new(),
         }
     }
 
-    /// The step of this length that ends at `time`.
-    pub(super) fn at(&mut self, length: f64, time: f64) -> &Step<N> {
-        let (a, b, norm) = (&self.a, &self.b, self.norm);
-        self.kept.at(length, time, || made(a, b, norm, length))
+    /// The step of each plant of this length that ends at `time`.
+    #[inline(always)]
+    pub(super) fn at(&mut self, length: f64, time: f64) -> &[Step<N>; M] {
+        let plants = &self.plants;
+        self.kept.at(length, time, || {
+            plants
+                .each_ref()
+                .map(|Equations { a, b, norm }| made(a, b, *norm, length))
+        })
     }
 }
 
@@ -116,14 +129,14 @@ mod tests {
     fn a_step_is_that_of_the_general_propagator() {
         let plant = Plant::new(&[0.4, 2.0], &[1.0, 0.6, 0.0]).unwrap();
         let space = plant.space(&[0.3], 0.0);
-        let mut steps = Steps::<3>::new(&space);
+        let mut steps = Steps::<3, 1>::new([&space]);
         for k in 0..60 {
             let length = 1e-4 * 1.3_f64.powi(k);
             let expected = Propagator::new(&space.a, &[&space.b], length);
             let (state, input) = ([0.7, -1.3, 0.2], 0.9);
             let mut there = vec![0.0; 3];
             expected.apply(&state, &[input], &mut there);
-            let found = steps.at(length, length).apply(&state, input);
+            let found = steps.at(length, length)[0].apply(&state, input);
             for (found, there) in found.iter().zip(&there) {
                 assert!(
                     (found - there).abs() <= 1e-13 * (1.0 + there.abs()),
@@ -136,6 +149,9 @@ mod tests {
     #[test]
     fn a_plant_without_states_has_steps_that_do_nothing() {
         let space = Plant::new(&[1.0], &[1.0]).unwrap().space(&[], 0.0);
-        assert_eq!(Steps::<0>::new(&space).at(0.1, 1.0).apply(&[], 3.0), []);
+        assert_eq!(
+            Steps::<0, 1>::new([&space]).at(0.1, 1.0)[0].apply(&[], 3.0),
+            []
+        );
     }
 }

@@ -157,11 +157,11 @@ pub(super) fn recorded(
         value: &moved,
     };
     respond(
-        &space,
+        [&space],
         held,
         delay,
         &rows.time,
-        &mut rows.output,
+        [&mut rows.output],
         None,
         &Task::new(),
     )

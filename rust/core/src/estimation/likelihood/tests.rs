@@ -215,7 +215,7 @@ fn delay_and_zero_of_a_response_that_jumps_are_dependent_at_any_lag() {
 }
 
 #[test]
-fn several_noises_at_once_have_the_objective_of_each() {
+fn several_noises_at_once_have_the_objective_slopes_and_covariance_of_each() {
     // More rows than a block, more noises than lanes; some scatter, and two have no air.
     let mut rows = rows(300);
     rows.speed = rows.time.iter().map(|t| (3.0 * t).sin()).collect();
@@ -234,12 +234,25 @@ fn several_noises_at_once_have_the_objective_of_each() {
             for noises in [(0..2), (2..13), (0..13)] {
                 let noises: Vec<Noise> = noises.map(noise).collect();
                 let (values, by) = (values(gain, &[0.1, 0.03]), by_delay(2));
-                let found = objectives(&rows, &plant, &values, &noises, &by, &task).unwrap();
-                assert_eq!(found.len(), noises.len());
-                for (found, noise) in found.iter().zip(&noises) {
-                    let one = evaluate(&rows, &plant, &values, noise, &by, Wanted::Value, &task);
-                    let expected = one.unwrap().objective;
-                    assert!((found - expected).abs() < 1e-9 * expected.abs());
+                for wanted in [Wanted::Value, Wanted::Slopes, Wanted::Covariance] {
+                    let found = evaluations(&rows, &plant, &values, &noises, &by, wanted, &task);
+                    let found = found.unwrap();
+                    assert_eq!(found.len(), noises.len());
+                    for (found, noise) in found.iter().zip(&noises) {
+                        let one = evaluate(&rows, &plant, &values, noise, &by, wanted, &task);
+                        let expected = one.unwrap();
+                        let near = |x: f64, y: f64| (x - y).abs() < 1e-9 * y.abs();
+                        assert!(near(found.objective, expected.objective));
+                        for (found, expected) in [
+                            (&found.searched.slope, &expected.searched.slope),
+                            (&found.inverse, &expected.inverse),
+                        ] {
+                            assert_eq!(found.len(), expected.len());
+                            let size = expected.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                            let apart = found.iter().zip(expected).map(|(x, y)| (x - y).abs());
+                            assert!(apart.fold(0.0, f64::max) <= 1e-8 * size);
+                        }
+                    }
                 }
             }
         }

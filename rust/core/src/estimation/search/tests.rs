@@ -79,10 +79,13 @@ impl<F: Fn(f64, f64) -> f64> Function for Parts<F> {
         })
     }
 
-    fn at(&mut self, place: &[f64], _: Wanted) -> Result<Value, Error> {
-        let rest = self.slack(place).map_or(0.0, |slack| slack.value);
-        assert!(rest > -1e-12, "{place:?}");
-        unknown(self.0(rest, place[1].exp()))
+    fn at(&mut self, places: &[Vec<f64>], _: Wanted) -> Result<Vec<Value>, Error> {
+        let value = |place: &Vec<f64>| {
+            let rest = self.slack(place).map_or(0.0, |slack| slack.value);
+            assert!(rest > -1e-12, "{place:?}");
+            unknown(self.0(rest, place[1].exp()))
+        };
+        places.iter().map(value).collect()
     }
 }
 
