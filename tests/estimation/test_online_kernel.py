@@ -118,8 +118,9 @@ def test_weights_are_the_posterior_over_delays_and_lags():
     logs = np.array([[density(*given, delay, lag) for delay in DELAYS] for lag in lags])
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
+    # The sum of hundreds of terms, of which the dense covariance gives some ten digits.
     assert found.evidence == pytest.approx(
-        np.log(np.mean(np.exp(logs - logs.max()))) + logs.max(), abs=1e-8
+        np.log(np.mean(np.exp(logs - logs.max()))) + logs.max(), abs=1e-7
     )
     assert found.lag == pytest.approx(float(weights.sum(axis=1) @ lags), abs=1e-9)
     assert found.lowest == pytest.approx(float(weights[:, 0].sum()), abs=1e-9)
