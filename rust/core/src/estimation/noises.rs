@@ -347,8 +347,9 @@ impl<V: Copy + pulp::bytemuck::Pod> Factor<V> {
         self.stacked[column * (self.count + BLOCK) + self.count + row] = Line(value);
     }
 
-    /// Update R by the first rows of the block.
-    #[inline(always)]
+    /// Update R by the first rows of the block. A page, whose code has one instruction set, needs one
+    /// copy for all numbers of states.
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn take_in<S: Simd<f64s = V>>(&mut self, simd: S, rows: usize) {
         let (count, stride) = (self.count, self.count + BLOCK);
         let zero = simd.splat_f64s(0.0);

@@ -147,8 +147,11 @@ impl<const N: usize> WithSimd for Passes<'_, N> {
             task,
         } = self;
         let mut log_det = 0.0;
-        // Where registers are short two of them share the work on the covariance.
-        let is_wide = S::F64_LANES >= WIDE || columns.len() <= S::F64_LANES * time.len();
+        // Where registers are short two of them share the work on the covariance; in a page always,
+        // which has no room for both.
+        let is_page = cfg!(target_family = "wasm");
+        let is_enough = !is_page && columns.len() <= S::F64_LANES * time.len();
+        let is_wide = S::F64_LANES >= WIDE || is_enough;
         let lanes = if is_wide { 1 } else { 2 } * S::F64_LANES;
         for group in columns.chunks_mut(lanes * time.len()) {
             log_det = if is_wide {
@@ -218,7 +221,7 @@ fn pass<S: Simd, const N: usize, const K: usize>(
             }
         }
         if row % BLOCK == 0 {
-            transposed::<S, K>(&mut block, columns, rows, row, |lane, entry| *lane = *entry);
+            transposed::<S, K>(&mut block, columns, rows, row, Way::ToLanes);
         }
         let place = row % BLOCK;
         if row > 0 {
@@ -300,22 +303,27 @@ fn pass<S: Simd, const N: usize, const K: usize>(
         }
         if place == BLOCK - 1 || row == rows - 1 {
             let first = row - place;
-            transposed::<S, K>(&mut block, columns, rows, first, |lane, entry| {
-                *entry = *lane
-            });
+            transposed::<S, K>(&mut block, columns, rows, first, Way::ToColumns);
         }
     }
     Ok(log_det + large.ln())
 }
 
+/// Which way a block is copied.
+#[derive(Clone, Copy)]
+enum Way {
+    ToLanes,
+    ToColumns,
+}
+
 /// Copy between the columns, from a row on, and the lanes of a block.
-#[inline(always)]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 fn transposed<S: Simd, const K: usize>(
     block: &mut [[S::f64s; K]; BLOCK],
     columns: &mut [f64],
     rows: usize,
     first: usize,
-    copy: impl Fn(&mut f64, &mut f64),
+    way: Way,
 ) {
     let last = rows.min(first + BLOCK);
     let lanes = K * S::F64_LANES;
@@ -323,7 +331,10 @@ fn transposed<S: Simd, const K: usize>(
     for (column, entries) in columns.chunks_exact_mut(rows).enumerate() {
         let places = block.chunks_exact_mut(lanes);
         for (entry, lane) in entries[first..last].iter_mut().zip(places) {
-            copy(&mut lane[column], entry);
+            match way {
+                Way::ToLanes => lane[column] = *entry,
+                Way::ToColumns => *entry = lane[column],
+            }
         }
     }
 }
