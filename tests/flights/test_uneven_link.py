@@ -52,8 +52,9 @@ def test_the_estimate_is_the_mean_of_the_delays(tmp_path):
 
 
 @pytest.mark.survey
-def test_intervals_hold_the_mean_in_200_flights(tmp_path):
-    errors, held = zip(*[by_known_plant(tmp_path, seed) for seed in range(1000, 1200)], strict=True)
+def test_intervals_hold_the_mean_in_80_flights(tmp_path):
+    # The first of 200 flights, of which the pages give the figures.
+    errors, held = zip(*[by_known_plant(tmp_path, seed) for seed in range(1000, 1080)], strict=True)
     assert np.mean(held) >= 0.93
     assert np.std(errors) < 0.005
     assert abs(np.mean(errors)) < 0.003
