@@ -97,6 +97,11 @@ impl Plant {
         self.den.len() > 1 && self.den[0] == 0.0
     }
 
+    /// Whether air passes the lags.
+    pub(super) fn lags_move_air(&self) -> bool {
+        !self.air_behind_lags
+    }
+
     /// The plant behind these lags, s, the last of them with the zero (`zero` s + 1).
     pub(super) fn space(&self, lags: &[f64], zero: f64) -> PlantSpace {
         let lags: Vec<f64> = lags.iter().copied().filter(|lag| *lag != 0.0).collect();
