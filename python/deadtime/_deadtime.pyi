@@ -675,6 +675,13 @@ def whitened_columns(
     time: _Reals,
     columns: _Reals,
 ) -> _Reals: ...
+def held_response(
+    num: Sequence[float],
+    den: Sequence[float],
+    input_time: _Reals,
+    input: _Reals,
+    times: _Reals,
+) -> _Reals: ...
 def loop_sensitivities(
     slopes: _LoopSlopes,
     run: _LoopRun,

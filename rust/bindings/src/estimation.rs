@@ -2,7 +2,7 @@
 
 use deadtime::estimation::{
     Commands, Disturbance, Entry, Evaluation, Fit, Free, Limits, Model, Noise, Plant, Point,
-    Quantity, Rows, Search, Timing, whiten,
+    Quantity, Rows, Search, Timing, held_response as response, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -422,6 +422,24 @@ pub(crate) fn whitened_columns<'py>(
     let (time, columns) = (owned(&time)?, owned(&columns)?);
     let found = run_here(py, |task| {
         whiten(&time, columns, &plant, &disturbances, task)
+    })?;
+    Ok(found.into_pyarray(py))
+}
+
+/// The output of the plant num/den under inputs that hold from their times on, at `times`.
+#[pyfunction]
+pub(crate) fn held_response<'py>(
+    py: Python<'py>,
+    num: Vec<f64>,
+    den: Vec<f64>,
+    input_time: Floats<'py>,
+    input: Floats<'py>,
+    times: Floats<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let plant = converted(Plant::new(&num, &den))?;
+    let (input_time, input, times) = (owned(&input_time)?, owned(&input)?, owned(&times)?);
+    let found = run_here(py, |task| {
+        response(&plant, &input_time, &input, &times, task)
     })?;
     Ok(found.into_pyarray(py))
 }

@@ -43,7 +43,7 @@ mod _deadtime {
     use super::dde::{PyLinearLoop, PyLoopResponse, on_samples, rate_limited};
     #[pymodule_export]
     use super::estimation::{
-        FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, whitened_columns,
+        FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
     };
     #[pymodule_export]
     use super::fixed_step::{FixedStepResponse, fixed_step_run};

@@ -30,6 +30,7 @@ from deadtime.estimation.likelihood._missing import HeldCommands, with_lost, wit
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of
 from deadtime.estimation.likelihood._search import (
     LONGEST,
+    SHORTEST,
     NoiseFit,
     PlantModel,
 )
@@ -157,7 +158,11 @@ class CommandedModel(ModelOfOne):
         return self.recording.sample_time
 
     def ends(self, label: str) -> Ends:
-        size = abs(self.known.get(label, 1.0))
+        value = self.known.get(label, 1.0)
+        size = abs(value)
+        if label.startswith("lag_") and value >= 0.0:
+            # A shorter one acts as a delay, and takes ever longer to simulate.
+            return Ends(SHORTEST * self._sample, self.span, self._sample)
         return {
             "delay": Ends(0.0, LONGEST * self.span, self._sample),
             "lag": Ends(0.0, self.span, self._sample),

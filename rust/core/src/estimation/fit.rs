@@ -1,6 +1,6 @@
 //! The numbers of plant and noise at which the likelihood of one or more recordings is largest.
 
-use super::likelihood::{Evaluation, Noise, Wanted, evaluate, evaluations};
+use super::likelihood::{Evaluation, Noise, Through, Wanted, evaluate, evaluations};
 use super::mean::{Derivatives, Gain, Values};
 use super::over_delays::over_delays;
 use super::plant::{MOST_STATES, Plant};
@@ -156,8 +156,9 @@ impl Model {
         noises.iter().try_for_each(Noise::check)?;
         let (values, by) = self.mean(point, None);
         let (rows, _) = self.recorded(run, point)?;
+        let noises: Vec<Through> = noises.iter().map(|one| one.through(&values)).collect();
         let wanted = Wanted::Covariance;
-        evaluations(rows, &self.plant, &values, noises, &by, wanted, task)
+        evaluations(rows, &self.plant, &values, &noises, &by, wanted, task)
     }
 
     /// The rows of a recording and its noise.
@@ -201,7 +202,8 @@ impl Model {
     ) -> Result<Evaluation, Error> {
         let (values, by) = self.mean(point, held);
         let (rows, noise) = self.recorded(run, point)?;
-        evaluate(rows, &self.plant, &values, noise, &by, wanted, task)
+        let noise = noise.through(&values);
+        evaluate(rows, &self.plant, &values, &noise, &by, wanted, task)
     }
 
     /// −2 ln L of all recordings.
@@ -384,13 +386,32 @@ impl Sum<'_> {
                     open.push(own);
                 }
             }
-            let noises: Vec<Noise> = open.iter().map(|point| point.noise[0]).collect();
-            let parts = evaluations(rows, plant, &values, &noises, &by, wanted, self.task)?;
+            let first = points.first().map(|points| &points[run]);
+            let is_first = open.first().is_some_and(|point| Some(*point) == first);
+            let mut noises: Vec<Through> = open
+                .iter()
+                .map(|point| point.noise[0].through(&values))
+                .collect();
+            let moved = match (wanted, noises.first()) {
+                (Wanted::Slopes, Some(own)) if is_first && plant.lags_move_air() => {
+                    self.by.moved_lags(self.slots, own)
+                }
+                _ => Vec::new(),
+            };
+            noises.extend(moved.iter().flat_map(|(_, _, both)| both.clone()));
+            let mut parts = evaluations(rows, plant, &values, &noises, &by, wanted, self.task)?;
+            let of_air: Vec<f64> = parts
+                .drain(open.len()..)
+                .map(|part| part.objective)
+                .collect();
             let part = |part: Evaluation| match wanted {
                 Wanted::Value => Value::new(part.objective, 0),
                 _ => self.by.part(self.slots, &self.trial, is_gain, &part),
             };
-            let parts: Vec<Value> = parts.into_iter().map(part).collect();
+            let mut parts: Vec<Value> = parts.into_iter().map(part).collect();
+            for ((slot, step, _), far) in moved.iter().zip(of_air.chunks_exact(2)) {
+                parts[0].bend(*slot, *step, far);
+            }
             for (sum, points) in sums.iter_mut().zip(&points) {
                 let own = &points[run];
                 let made = open.iter().position(|point| *point == own);
@@ -399,9 +420,8 @@ impl Sum<'_> {
                 made.or(known).into_iter().for_each(|part| sum.add(part));
             }
             // That of the first place, around which the others are.
-            let first = points.first().map(|points| &points[run]);
-            if let (Wanted::Slopes, Some(point), Some(part)) = (wanted, first, parts.first())
-                && open.first() == Some(&point)
+            if let (Wanted::Slopes, true, Some(point), Some(part)) =
+                (wanted, is_first, first, parts.first())
             {
                 *kept = Some((point.clone(), part.clone()));
             }

@@ -86,6 +86,15 @@ impl Noise {
         parts.filter(|part| part.deviation > 0.0).collect()
     }
 
+    /// With the lags and the zero of the mean.
+    pub(super) fn through(self, values: &Values) -> Through {
+        Through {
+            noise: self,
+            lags: values.lags.clone(),
+            zero: values.zero,
+        }
+    }
+
     /// Variance of the white noise of each row; empty where it is one.
     fn variances(&self, rows: &Rows) -> Result<Vec<f64>, Error> {
         if self.stamps == 0.0 {
@@ -93,6 +102,21 @@ impl Noise {
         }
         let variance = |speed: &f64| (self.stamps * speed).mul_add(self.stamps * speed, 1.0);
         memory::collected(WHAT, rows.speed.iter().map(variance))
+    }
+}
+
+/// Noise, and the lags and the zero that its air passes: those of the mean but for difference quotients.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Through {
+    pub(super) noise: Noise,
+    pub(super) lags: Vec<f64>,
+    pub(super) zero: f64,
+}
+
+impl Through {
+    fn joint(&self, plant: &Plant) -> Result<Joint, Error> {
+        let space = plant.space(&self.lags, self.zero);
+        Joint::new(&space, &self.noise.disturbances())
     }
 }
 
@@ -261,13 +285,15 @@ pub(super) fn evaluations(
     rows: &Rows,
     plant: &Plant,
     values: &Values,
-    noises: &[Noise],
+    noises: &[Through],
     by: &Derivatives,
     wanted: Wanted,
     task: &Task,
 ) -> Result<Vec<Evaluation>, Error> {
-    let parts: Vec<Vec<Disturbance>> = noises.iter().map(Noise::disturbances).collect();
-    let alike = parts.windows(2).all(|pair| pair[0].len() == pair[1].len());
+    let parts = |one: &Through| one.noise.disturbances().len();
+    let alike = noises
+        .windows(2)
+        .all(|pair| parts(&pair[0]) == parts(&pair[1]));
     if noises.len() < 2 || !alike || !rows.commands.uncertain.is_empty() {
         let one = |noise| evaluate(rows, plant, values, noise, by, wanted, task);
         return noises.iter().map(one).collect();
@@ -282,7 +308,7 @@ pub(super) fn evaluations(
     let counts = Counts::of(rows, &mut mean, values, count);
     let plain = Triangle::new(&mean.columns, n, counts.first, task)?.log_det(counts.first);
     let scatters = |noise: &Noise| noise.arrivals.hypot(noise.stamps);
-    let kicked = noises.iter().any(|noise| scatters(noise) > 0.0);
+    let kicked = noises.iter().any(|one| scatters(&one.noise) > 0.0);
     let kicks = kicks(rows, &space, values.delay, f64::from(u8::from(kicked)), 1.0)?;
     let shared = Shared {
         time: &rows.time,
@@ -293,12 +319,11 @@ pub(super) fn evaluations(
     };
     let each: Result<Vec<One>, Error> = noises
         .iter()
-        .zip(&parts)
-        .map(|(noise, parts)| {
+        .map(|one| {
             Ok(One {
-                joint: Joint::new(&space, parts)?,
-                stamps: noise.stamps,
-                kick: scatters(noise),
+                joint: one.joint(plant)?,
+                stamps: one.noise.stamps,
+                kick: scatters(&one.noise),
             })
         })
         .collect();
@@ -326,11 +351,12 @@ pub(super) fn evaluate(
     rows: &Rows,
     plant: &Plant,
     values: &Values,
-    noise: &Noise,
+    through: &Through,
     by: &Derivatives,
     wanted: Wanted,
     task: &Task,
 ) -> Result<Evaluation, Error> {
+    let noise = through.noise;
     let n = rows.time.len();
     check_count(rows, values, by)?;
     let none = Derivatives::none();
@@ -347,7 +373,6 @@ pub(super) fn evaluate(
     }
     let counts = Counts::of(rows, &mut mean, values, count);
     let first = counts.first;
-    let disturbances = noise.disturbances();
     let kicks = kicks(
         rows,
         &space,
@@ -358,10 +383,10 @@ pub(super) fn evaluate(
     let variances = noise.variances(rows)?;
     let mut log_det = 0.0;
     let mut log_gram = 0.0;
-    let is_white = disturbances.is_empty() && kicks.is_empty() && variances.is_empty();
+    let is_white = noise.disturbances().is_empty() && kicks.is_empty() && variances.is_empty();
     if !is_white {
         log_gram = -Triangle::new(&mean.columns, n, first, task)?.log_det(first);
-        let joint = Joint::new(&space, &disturbances)?;
+        let joint = through.joint(plant)?;
         log_det = whiten_in_place(
             &rows.time,
             Known {

@@ -38,6 +38,7 @@ pub use disturbance::{Disturbance, Entry};
 pub use fit::{Fit, Model, Search};
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};
+pub use path::held_response;
 pub use plant::Plant;
 pub use point::{Point, Quantity, Timing};
 pub use profile::Limits;

@@ -246,6 +246,7 @@ mod tests {
                     for (delay, found) in delays.iter().zip(found) {
                         values.delay = *delay;
                         let wanted = Wanted::Value;
+                        let noise = noise.through(&values);
                         let one = evaluate(&rows, &plant, &values, &noise, &by, wanted, &task);
                         let expected = one.unwrap().objective;
                         assert!(

@@ -3,9 +3,10 @@
 //! Exact: the state is propagated from event to event, an event being a row or the arrival of an
 //! input. Step lengths repeat on even rows, so that few propagators are made.
 
-use super::plant::PlantSpace;
+use super::plant::{Plant, PlantSpace};
+use super::rows::check_times;
 use super::steps::Steps;
-use crate::{Error, Task};
+use crate::{Error, Task, memory};
 
 /// Events between two checks for a stop.
 const CHECKED: u32 = 4096;
@@ -26,6 +27,46 @@ pub(super) struct Held<'a> {
     pub(super) time: &'a [f64],
     pub(super) value: &'a [f64],
 }
+
+/// The output of a plant under inputs that hold, at `times`, exact to rounding.
+///
+/// A plant that comes to rest under a constant input rests under the first one until the second; one
+/// that integrates is at zero until the first.
+///
+/// # Errors
+///
+/// If sizes do not fit, or times do not increase.
+pub fn held_response(
+    plant: &Plant,
+    input_time: &[f64],
+    input: &[f64],
+    times: &[f64],
+    task: &Task,
+) -> Result<Vec<f64>, Error> {
+    refuse_if!(
+        input_time.is_empty() || input.len() != input_time.len(),
+        "{} inputs at {} times: give as many, at least one",
+        input.len(),
+        input_time.len()
+    );
+    check_times("input_time", input_time)?;
+    check_times("times", times)?;
+    let first = plant.rest_gain().map_or(0.0, |_| input[0]);
+    let moved = memory::collected(WHAT, input.iter().map(|value| value - first))?;
+    let held = Held {
+        time: input_time,
+        value: &moved,
+    };
+    let mut out = memory::filled(WHAT, 0.0, times.len())?;
+    let space = plant.space(&[], 0.0);
+    respond([&space], held, 0.0, times, [&mut out], None, task)?;
+    let rest = plant.rest_gain().unwrap_or(0.0) * first;
+    out.iter_mut().for_each(|value| *value += rest);
+    Ok(out)
+}
+
+/// What memory is asked for.
+const WHAT: &str = "a response";
 
 /// The responses of plants of equally many states to `inputs`, each `delay` later, at `times`; and the
 /// slope of the first there, if asked for.

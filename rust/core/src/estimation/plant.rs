@@ -92,9 +92,19 @@ impl Plant {
         self.num.len() > 2 && self.num.iter().rev().take(2).all(|c| *c == 0.0)
     }
 
+    /// The output by a constant input at rest; none where it grows without end.
+    pub(super) fn rest_gain(&self) -> Option<f64> {
+        (self.den[0] != 0.0).then(|| self.num[0] / self.den[0])
+    }
+
     /// Does a constant input let the output grow without end?
     pub(super) fn integrates(&self) -> bool {
         self.den.len() > 1 && self.den[0] == 0.0
+    }
+
+    /// Whether air passes the lags.
+    pub(super) fn lags_move_air(&self) -> bool {
+        !self.air_behind_lags
     }
 
     /// The plant behind these lags, s, the last of them with the zero (`zero` s + 1).

@@ -50,6 +50,20 @@ impl Value {
         }
     }
 
+    /// Add the slope and curvature by a variable of a part of the value that has these values a step up
+    /// and down.
+    pub(super) fn bend(&mut self, variable: usize, step: f64, far: &[f64]) {
+        let n = self.slope.len();
+        if let [up, down] = far
+            && up.is_finite()
+            && down.is_finite()
+        {
+            self.slope[variable] += (up - down) / (2.0 * step);
+            let bend = (up - 2.0 * self.value + down) / (step * step);
+            self.curvature[variable * n + variable] += bend.max(0.0);
+        }
+    }
+
     /// Add another function of the same variables.
     pub(super) fn add(&mut self, other: &Self) {
         self.value += other.value;

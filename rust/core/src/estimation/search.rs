@@ -91,60 +91,57 @@ pub(super) fn minimise(
         let value = found.value;
         return Ok(Minimum { place: x, value });
     }
-    let (mut gradient, mut inverse) =
-        by_quotients(variables, &mut steps, &x, &found, &mut function)?;
-    let mut lacking = difference(&gradient, &found.slope);
+    let mut near = Near::new(variables, &mut steps, &x, &found, &mut function)?;
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
-    if let Some(near) = known_inverse.take_if(|near| near.len() == n * n) {
-        (inverse, fresh) = (near, false);
+    if let Some(known) = known_inverse.take_if(|known| known.len() == n * n) {
+        (near.inverse, fresh) = (known, false);
     }
     let mut stalled = 0;
     for _ in 0..ITERATIONS {
         let slack = function.slack(&x);
-        let step = direction(variables, &x, &inverse, &gradient, slack.as_ref());
-        if promised(&step, &gradient) <= tolerance {
+        let step = direction(variables, &x, &near.inverse, &near.gradient, slack.as_ref());
+        let promise = promised(&step, &near.gradient);
+        if promise <= tolerance {
             if exact {
                 break;
             }
             // The slopes by the others are quotients already.
             let quotients = Quotients::new(variables, &steps, &x, &found, 0..known, &mut function)?;
-            lacking = difference(&quotients.slope, &found.slope);
-            gradient[..known].copy_from_slice(&quotients.slope);
+            near.lacking = difference(&quotients.slope, &found.slope);
+            near.gradient[..known].copy_from_slice(&quotients.slope);
             exact = true;
             continue;
         }
         let line = Line {
             value: found.value,
-            gradient: &gradient,
+            gradient: &near.gradient,
             step: &step,
         };
         let by = (steps.as_slice(), known..n);
         let next = line_search(variables, &mut x, line, by, &mut function)?;
         if let Some((next, moved, others)) = next {
             let decrease = found.value - next.value;
-            let is_poor = decrease < WORTHWHILE && decrease < POOR * promised(&step, &gradient);
+            let is_poor = decrease < WORTHWHILE && decrease < POOR * promise;
             stalled = if is_poor { stalled + 1 } else { 0 };
             found = next;
             if stalled >= STALLED {
                 break;
             }
-            let parts = found.slope.iter().zip(&lacking);
-            let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
-            shorten(&variables[known..], &others.curvature, &mut steps[known..]);
-            slopes.extend(others.slope);
-            update(&mut inverse, &moved, &difference(&slopes, &gradient));
-            gradient = slopes;
-            (exact, fresh) = (known == 0, false);
+            if !is_poor || fresh {
+                shorten(&variables[known..], &others.curvature, &mut steps[known..]);
+                near.follow(&moved, &found.slope, others.slope);
+                (exact, fresh) = (known == 0, false);
+                continue;
+            }
         } else if fresh {
             break;
-        } else {
-            (gradient, inverse) = by_quotients(variables, &mut steps, &x, &found, &mut function)?;
-            lacking = difference(&gradient, &found.slope);
-            (exact, fresh) = (true, true);
         }
+        // What was gathered on the way misleads here.
+        near = Near::new(variables, &mut steps, &x, &found, &mut function)?;
+        (exact, fresh) = (true, true);
     }
-    *known_inverse = Some(inverse);
+    *known_inverse = Some(near.inverse);
     Ok(Minimum {
         place: x,
         value: found.value,
@@ -191,36 +188,64 @@ fn line_search(
     Ok(None)
 }
 
-/// The gradient, and the inverse of the Hessian: the known curvature of the first variables, and that
-/// of the quotients by each of the others alone; by each of all where the known one is not positive.
-///
-/// Mixed derivatives by the others are left to the update: where two of them have almost the same
-/// effect, steps of Newton's run along the valley, past minima.
-fn by_quotients(
-    variables: &[Variable],
-    steps: &mut [f64],
-    x: &[f64],
-    found: &Value,
-    function: &mut impl Function,
-) -> Result<(Vec<f64>, Vec<f64>), Error> {
-    let (n, known) = (x.len(), found.slope.len());
-    let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
-    if shorten(variables, &quotients.curvature, steps) {
-        quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
-    }
-    let mut inverse = vec![0.0; n * n];
-    for (i, bend) in quotients.curvature.iter().enumerate() {
-        inverse[i * n + i] = 1.0 / bend;
-    }
-    if let Some(first) = inverted(&found.curvature, known) {
-        for (to, from) in inverse
-            .chunks_exact_mut(n)
-            .zip(first.chunks_exact(known.max(1)))
-        {
-            to[..known].copy_from_slice(from);
+/// The function near a place.
+struct Near {
+    gradient: Vec<f64>,
+    /// Of the Hessian.
+    inverse: Vec<f64>,
+    /// What the known slopes lack.
+    lacking: Vec<f64>,
+}
+
+impl Near {
+    /// By difference quotients: the Hessian is the known curvature of the first variables, and the quotient
+    /// by each of the others alone; by each of all where the known one is not positive.
+    ///
+    /// Mixed derivatives by the others are left to the update: where two of them have almost the same
+    /// effect, steps of Newton's run along the valley, past minima.
+    fn new(
+        variables: &[Variable],
+        steps: &mut [f64],
+        x: &[f64],
+        found: &Value,
+        function: &mut impl Function,
+    ) -> Result<Self, Error> {
+        let (n, known) = (x.len(), found.slope.len());
+        let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
+        if shorten(variables, &quotients.curvature, steps) {
+            quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
         }
+        let mut inverse = vec![0.0; n * n];
+        for (i, bend) in quotients.curvature.iter().enumerate() {
+            inverse[i * n + i] = 1.0 / bend;
+        }
+        if let Some(first) = inverted(&found.curvature, known) {
+            for (to, from) in inverse
+                .chunks_exact_mut(n)
+                .zip(first.chunks_exact(known.max(1)))
+            {
+                to[..known].copy_from_slice(from);
+            }
+        }
+        Ok(Self {
+            lacking: difference(&quotients.slope, &found.slope),
+            gradient: quotients.slope,
+            inverse,
+        })
     }
-    Ok((quotients.slope, inverse))
+
+    /// Move along, to where the known slopes and those of the others are these.
+    fn follow(&mut self, moved: &[f64], known: &[f64], others: Vec<f64>) {
+        let parts = known.iter().zip(&self.lacking);
+        let mut slopes: Vec<f64> = parts.map(|(a, b)| a + b).collect();
+        slopes.extend(others);
+        update(
+            &mut self.inverse,
+            moved,
+            &difference(&slopes, &self.gradient),
+        );
+        self.gradient = slopes;
+    }
 }
 
 /// The inverse of a matrix of this size, by Cholesky's method on its unit diagonal; none for one that
@@ -261,8 +286,8 @@ fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
     Some(inverse)
 }
 
-/// −H g over the variables that may move, no longer than allowed; zero for those at a bound that
-/// would leave it. Where it crosses the bound on several variables, the least on that.
+/// −H g, no longer than allowed: the least of the quadratic model with the variables that would leave
+/// the bound they are at held there, and on the bound on several variables where it would cross that.
 fn direction(
     variables: &[Variable],
     x: &[f64],
@@ -271,21 +296,36 @@ fn direction(
     slack: Option<&Slack>,
 ) -> Vec<f64> {
     let n = gradient.len();
-    let moving: Vec<bool> = (0..n)
-        .map(|i| {
-            !((x[i] <= variables[i].low && gradient[i] > 0.0)
-                || (x[i] >= variables[i].high && gradient[i] < 0.0))
-        })
-        .collect();
-    // H times a vector, over those that may move.
+    let mut within = inverse.to_vec();
+    let leaves = |i: usize, entry: f64| {
+        (x[i] <= variables[i].low && entry < 0.0) || (x[i] >= variables[i].high && entry > 0.0)
+    };
+    let mut out = least(&within, gradient, slack);
+    while let Some(i) = (0..n).find(|i| leaves(*i, out[*i])) {
+        hold(&mut within, n, i);
+        out = least(&within, gradient, slack);
+    }
+    // A step ends at a bound, however far it would go beyond.
+    let mut scale: f64 = 1.0;
+    for ((entry, variable), x) in out.iter().zip(variables).zip(x) {
+        let left = (if *entry < 0.0 {
+            variable.low
+        } else {
+            variable.high
+        } - x)
+            .abs();
+        scale = scale.min(variable.longest / entry.abs().min(left));
+    }
+    out.iter_mut().for_each(|entry| *entry *= scale);
+    out
+}
+
+/// −H g, on the bound on several variables where it would cross that.
+fn least(inverse: &[f64], gradient: &[f64], slack: Option<&Slack>) -> Vec<f64> {
+    let n = gradient.len().max(1);
     let times = |vector: &[f64]| -> Vec<f64> {
-        let moved = |i: usize| {
-            let others = (0..vector.len()).filter(|j| moving[*j]);
-            others.map(|j| inverse[i * n + j] * vector[j]).sum::<f64>()
-        };
-        (0..n)
-            .map(|i| if moving[i] { moved(i) } else { 0.0 })
-            .collect()
+        let rows = inverse.chunks_exact(n);
+        rows.map(|row| product(row, vector)).collect()
     };
     let mut out = times(gradient);
     out.iter_mut().for_each(|entry| *entry = -*entry);
@@ -298,12 +338,19 @@ fn direction(
             moved.for_each(|(entry, along)| *entry -= beyond / bend * along);
         }
     }
-    let mut scale: f64 = 1.0;
-    for (entry, variable) in out.iter().zip(variables) {
-        scale = scale.min(variable.longest / entry.abs());
-    }
-    out.iter_mut().for_each(|entry| *entry *= scale);
     out
+}
+
+/// Make of an inverse Hessian that of the function with one variable held.
+fn hold(inverse: &mut [f64], n: usize, held: usize) {
+    let row = inverse[held * n..][..n].to_vec();
+    for (i, entries) in inverse.chunks_exact_mut(n).enumerate() {
+        let share = if i == held { 1.0 } else { row[i] / row[held] };
+        for (entry, by) in entries.iter_mut().zip(&row) {
+            *entry -= share * by;
+        }
+        entries[held] = 0.0;
+    }
 }
 
 /// The decrease that a step of a quasi-Newton method promises; none where it is not a number.

@@ -1,6 +1,6 @@
 //! The variables of a search: what they are in plant and noise, their bounds, and their steps.
 
-use super::likelihood::{Evaluation, Noise, Searched};
+use super::likelihood::{Evaluation, Noise, Searched, Through};
 use super::point::{Point, Quantity, Timing};
 use super::quotients::{Value, Variable};
 use super::rows::Rows;
@@ -21,6 +21,10 @@ pub(super) const MOST_DEVIATION: f64 = 1e5;
 const TIME_STEP: f64 = 2e-3;
 const LOG_STEP: f64 = 0.02;
 const GAIN_STEP: f64 = 1e-4;
+
+/// Step of the logarithms of the lags that air passes: the covariance of the air bends more by them than
+/// by its own numbers.
+const AIR_STEP: f64 = 5e-3;
 
 /// Longest steps of the search: of times, in rows; of logarithms; of the gain, as a share of it.
 const LONGEST_TIME_STEP: f64 = 1.0;
@@ -172,6 +176,38 @@ impl Variables<'_> {
                 self.runs.get(run).map_or(1.0, Rows::largest_jump),
             ),
         }
+    }
+
+    /// The same noise with each lag and the zero that its air passes a step up and down, with the place
+    /// of the variable and the step.
+    pub(super) fn moved_lags(
+        &self,
+        slots: &[Slot],
+        own: &Through,
+    ) -> Vec<(usize, f64, [Through; 2])> {
+        if own.noise.air == 0.0 {
+            return Vec::new();
+        }
+        let moved = |(place, slot): (usize, &Slot)| {
+            let mut both = [own.clone(), own.clone()];
+            let step = match *slot {
+                Slot::Lag(i) => {
+                    both[0].lags[i] *= AIR_STEP.exp();
+                    both[1].lags[i] *= (-AIR_STEP).exp();
+                    AIR_STEP
+                }
+                Slot::Zero => {
+                    let step = TIME_STEP * self.row_time;
+                    both[0].zero += step;
+                    both[1].zero -= step;
+                    step
+                }
+                _ => return None,
+            };
+            Some((place, step, both))
+        };
+        let of_mean = slots[..mean_slots(slots)].iter().enumerate();
+        of_mean.filter_map(moved).collect()
     }
 
     /// The part of one recording, with its derivatives by the variables of the mean, which come first;

@@ -1,4 +1,5 @@
-use super::super::tests::recorded;
+use super::super::path::{Held, respond};
+use super::super::tests::{gaussian, recorded};
 use super::super::variables::MOST_DEVIATION;
 use super::*;
 
@@ -102,6 +103,49 @@ fn air_that_is_not_there_is_fitted_to_nothing() {
         "{white:?} {found:?}"
     );
     assert!((found.point.total() - 0.48).abs() < 0.02);
+}
+
+/// A recording in air of this deviation that passes the lag and is held from row to row.
+fn windy(plant: (&[f64], &[f64]), numbers: (f64, f64, f64), deviation: f64) -> Rows {
+    let mut rows = recorded(plant, numbers, 1e-4, 6);
+    let space = Plant::new(plant.0, plant.1).unwrap();
+    let space = space.space(&[numbers.2], 0.0);
+    let mut air = 0.0;
+    let mut later = |gust: f64| {
+        air = 0.9 * air + 0.44 * deviation * gust;
+        air
+    };
+    let value: Vec<f64> = gaussian(7, 200).into_iter().map(&mut later).collect();
+    let held = Held {
+        time: &rows.time,
+        value: &value,
+    };
+    let mut moved = vec![0.0; 200];
+    let (times, task) = (&rows.time, Task::new());
+    respond([&space], held, 0.0, times, [&mut moved], None, &task).unwrap();
+    let outputs = rows.output.iter_mut().zip(moved);
+    outputs.for_each(|(output, moved)| *output += moved);
+    rows
+}
+
+#[test]
+fn a_search_in_air_ends_where_another_one_stays() {
+    let air = Noise {
+        air_time: 0.2,
+        air: 30.0,
+        ..Noise::QUIET
+    };
+    for plant in [INTEGRATOR, NOTHING] {
+        for (lag, deviation) in [(0.05, 0.3), (0.2, 0.1), (0.2, 1.0), (0.6, 0.3)] {
+            let model = model(plant, vec![windy(plant, (0.31, 0.85, lag), deviation)]);
+            for start in [0.3 * lag, 3.0 * lag] {
+                let found = fitted(&model, point(0.25, start, vec![air]));
+                let again = fitted(&model, found.point.clone());
+                let left = found.objective - again.objective;
+                assert!(left < 2e-3, "{lag} {deviation} {start}: {left}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn at(rows: &Rows, values: &Values, noise: &Noise) -> Evaluation {
         rows,
         &integrator(),
         values,
-        noise,
+        &noise.through(values),
         &by,
         Wanted::All,
         &Task::new(),
@@ -207,6 +207,7 @@ fn delay_and_zero_of_a_response_that_jumps_are_dependent_at_any_lag() {
                     ..values(Gain::Eliminated, &[lag])
                 };
                 let (wanted, task) = (Wanted::Slopes, Task::new());
+                let noise = noise.through(&at);
                 let found = evaluate(&rows, &plant, &at, &noise, &by, wanted, &task).unwrap();
                 assert_eq!(found.objective, f64::INFINITY, "{lag} {zero}");
             }
@@ -232,8 +233,12 @@ fn several_noises_at_once_have_the_objective_slopes_and_covariance_of_each() {
         let rows = rows.checked().unwrap();
         for gain in [Gain::Eliminated, Gain::Searched(0.8), Gain::Known(0.8)] {
             for noises in [(0..2), (2..13), (0..13)] {
-                let noises: Vec<Noise> = noises.map(noise).collect();
                 let (values, by) = (values(gain, &[0.1, 0.03]), by_delay(2));
+                let noises = noises.map(|k| Through {
+                    lags: vec![0.1, 0.03 + 0.01 * f64::from(k % 5)],
+                    ..noise(k).through(&values)
+                });
+                let noises: Vec<Through> = noises.collect();
                 for wanted in [Wanted::Value, Wanted::Slopes, Wanted::Covariance] {
                     let found = evaluations(&rows, &plant, &values, &noises, &by, wanted, &task);
                     let found = found.unwrap();
@@ -346,7 +351,7 @@ fn fewer_rows_than_unknowns_are_refused() {
         &rows,
         &integrator(),
         &values,
-        &Noise::QUIET,
+        &Noise::QUIET.through(&values),
         &by,
         Wanted::Slopes,
         &Task::new(),

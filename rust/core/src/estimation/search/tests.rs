@@ -67,6 +67,20 @@ fn a_minimum_beyond_a_bound_is_found_on_it() {
     assert!(found.is_ok_and(|found| found.place[0] == 0.0 && (found.place[1] - 2.0).abs() < 1e-4));
 }
 
+#[test]
+fn a_variable_that_stays_at_its_bound_shortens_no_step_of_others() {
+    // The least of the quadratic model is beyond the bound of the second variable.
+    let around = [variable(0.0, -9.0, 9.0), variable(1.0, 1.0, 9.0)];
+    let (inverse, gradient) = ([1.0, -50.0, -50.0, 3000.0], [-0.05, -1e-4]);
+    let step = direction(&around, &[0.0, 1.0], &inverse, &gradient, None);
+    // Of the Hessian, which is the inverse of that, the first entry is 3000/500.
+    assert!((step[0] - 0.05 / 6.0).abs() < 1e-15, "{step:?}");
+    assert_eq!(step[1], 0.0);
+    // One that reaches its bound within the longest step does not either.
+    let step = direction(&around, &[0.0, 1.05], &inverse, &gradient, None);
+    assert!((step[0] - 0.045).abs() < 1e-15, "{step:?}");
+}
+
 /// A function of a sum and the logarithm of a part of it, the rest of which is not below zero.
 struct Parts<F: Fn(f64, f64) -> f64>(F);
 
