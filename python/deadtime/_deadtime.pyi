@@ -679,7 +679,7 @@ def held_response(
     num: Sequence[float],
     den: Sequence[float],
     input_time: _Reals,
-    input: _Reals,
+    inputs: _Reals,
     times: _Reals,
 ) -> _Reals: ...
 def loop_sensitivities(

@@ -29,12 +29,14 @@ def test_two_lags_are_found_and_a_third_is_not():
     assert choice.to_dict()["chosen"] == "2 lags"
 
 
-def test_a_zero_is_found():
-    choice = choose_plant(record_attitude(2, **VEHICLE, zero=0.3), FLAT, most_lags=2)
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_a_zero_is_found(seed):
+    choice = choose_plant(record_attitude(seed, **VEHICLE, zero=0.3), FLAT, most_lags=2)
     assert choice.chosen == "2 lags, zero"
     low, high = choice.ci()
     # The output leads a ramp: the zero is longer than delay and lags.
     assert low < -0.053 < high
+    assert 0.004 < high - low < 0.008
 
 
 @pytest.mark.parametrize("louder", [0.0, 1e-12, 3e-12])

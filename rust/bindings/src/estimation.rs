@@ -433,13 +433,13 @@ pub(crate) fn held_response<'py>(
     num: Vec<f64>,
     den: Vec<f64>,
     input_time: Floats<'py>,
-    input: Floats<'py>,
+    inputs: Floats<'py>,
     times: Floats<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let plant = converted(Plant::new(&num, &den))?;
-    let (input_time, input, times) = (owned(&input_time)?, owned(&input)?, owned(&times)?);
+    let (input_time, inputs, times) = (owned(&input_time)?, owned(&inputs)?, owned(&times)?);
     let found = run_here(py, |task| {
-        response(&plant, &input_time, &input, &times, task)
+        response(&plant, &input_time, &inputs, &times, task)
     })?;
     Ok(found.into_pyarray(py))
 }

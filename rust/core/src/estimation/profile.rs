@@ -59,8 +59,9 @@ impl Quantity {
                 held.timing = Timing::Delay(value);
             }
             Self::Total => {
+                // Of less than lags and zero the delay would be below zero.
                 let late = point.total() - point.delay();
-                if value <= 0.0 && model.free.zero {
+                if value < late && value <= 0.0 && model.free.zero {
                     // No lag is below zero: the zero is longer than the lags.
                     held.zero += late - value;
                 } else if value < late && value > 0.0 {
@@ -391,6 +392,14 @@ mod tests {
             assert!(held.lags[0] > 0.0);
             assert!((held.total() - value).abs() < 1e-15);
             assert!(held.delay() > -1e-15, "{held:?}");
+        }
+        // A zero longer than delay and lags stays where the delay stays above zero.
+        let mut leading = best.point.clone();
+        (leading.zero, leading.timing) = (0.6, Timing::Total(0.31 + 0.17 - 0.6));
+        for value in [-0.2, -0.12, -0.01] {
+            let held = Quantity::Total.held(&leading, value, &model);
+            assert_eq!((held.zero, &held.lags), (0.6, &leading.lags));
+            assert!((held.total() - value).abs() < 1e-15);
         }
     }
 
