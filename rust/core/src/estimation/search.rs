@@ -305,7 +305,6 @@ fn direction(
         hold(&mut within, n, i);
         out = least(&within, gradient, slack);
     }
-    // A step ends at a bound, however far it would go beyond.
     let mut scale: f64 = 1.0;
     for ((entry, variable), x) in out.iter().zip(variables).zip(x) {
         let left = (if *entry < 0.0 {
@@ -314,7 +313,10 @@ fn direction(
             variable.high
         } - x)
             .abs();
-        scale = scale.min(variable.longest / entry.abs().min(left));
+        // A step ends at a bound that is near, however far it would go beyond.
+        if left > variable.longest {
+            scale = scale.min(variable.longest / entry.abs());
+        }
     }
     out.iter_mut().for_each(|entry| *entry *= scale);
     out
