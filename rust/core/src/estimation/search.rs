@@ -53,11 +53,27 @@ pub(super) fn minimise(
     known_inverse: &mut Option<Vec<f64>>,
     mut function: impl Function,
 ) -> Result<Minimum, Error> {
-    let mut x: Vec<f64> = variables
+    let mut place: Vec<f64> = variables
         .iter()
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
-    keep_within(variables, &mut x, &function);
+    keep_within(variables, &mut place, &function);
+    let mut start = |x: Vec<f64>| descend(variables, x, tolerance, known_inverse, &mut function);
+    let (found, is_stuck) = start(place)?;
+    if is_stuck {
+        return Ok(start(found.place)?.0);
+    }
+    Ok(found)
+}
+
+/// A search from x, and whether it ended where a step promised much and led nowhere.
+fn descend(
+    variables: &[Variable],
+    mut x: Vec<f64>,
+    tolerance: f64,
+    known_inverse: &mut Option<Vec<f64>>,
+    function: &mut impl Function,
+) -> Result<(Minimum, bool), Error> {
     let mut values = function.at(std::slice::from_ref(&x), Wanted::Slopes)?;
     let mut found = values.swap_remove(0);
     let (n, known) = (x.len(), found.slope.len());
@@ -77,7 +93,7 @@ pub(super) fn minimise(
             step: &step,
         };
         let by = (steps.as_slice(), n..n);
-        let Some((next, ..)) = line_search(variables, &mut x, line, by, &mut function)? else {
+        let Some((next, ..)) = line_search(variables, &mut x, line, by, function)? else {
             break;
         };
         let decrease = found.value - next.value;
@@ -89,15 +105,15 @@ pub(super) fn minimise(
     // What the known slopes lack is less than a coarse tolerance.
     if n == 0 || (n == known && tolerance >= WORTHWHILE) {
         let value = found.value;
-        return Ok(Minimum { place: x, value });
+        return Ok((Minimum { place: x, value }, false));
     }
-    let mut near = Near::new(variables, &mut steps, &x, &found, &mut function)?;
+    let mut near = Near::new(variables, &mut steps, &x, &found, function)?;
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
     if let Some(known) = known_inverse.take_if(|known| known.len() == n * n) {
         (near.inverse, fresh) = (known, false);
     }
-    let mut stalled = 0;
+    let (mut stalled, mut is_stuck) = (0, false);
     for _ in 0..ITERATIONS {
         let slack = function.slack(&x);
         let step = direction(variables, &x, &near.inverse, &near.gradient, slack.as_ref());
@@ -107,7 +123,7 @@ pub(super) fn minimise(
                 break;
             }
             // The slopes by the others are quotients already.
-            let quotients = Quotients::new(variables, &steps, &x, &found, 0..known, &mut function)?;
+            let quotients = Quotients::new(variables, &steps, &x, &found, 0..known, function)?;
             near.lacking = difference(&quotients.slope, &found.slope);
             near.gradient[..known].copy_from_slice(&quotients.slope);
             exact = true;
@@ -119,7 +135,7 @@ pub(super) fn minimise(
             step: &step,
         };
         let by = (steps.as_slice(), known..n);
-        let next = line_search(variables, &mut x, line, by, &mut function)?;
+        let next = line_search(variables, &mut x, line, by, function)?;
         if let Some((next, moved, others)) = next {
             let decrease = found.value - next.value;
             let is_poor = decrease < WORTHWHILE && decrease < POOR * promise;
@@ -135,17 +151,16 @@ pub(super) fn minimise(
                 continue;
             }
         } else if fresh {
+            is_stuck = promise > WORTHWHILE;
             break;
         }
         // What was gathered on the way misleads here.
-        near = Near::new(variables, &mut steps, &x, &found, &mut function)?;
+        near = Near::new(variables, &mut steps, &x, &found, function)?;
         (exact, fresh) = (true, true);
     }
     *known_inverse = Some(near.inverse);
-    Ok(Minimum {
-        place: x,
-        value: found.value,
-    })
+    let value = found.value;
+    Ok((Minimum { place: x, value }, is_stuck))
 }
 
 /// A step from a place at which the function has this value and gradient.

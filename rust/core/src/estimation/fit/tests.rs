@@ -136,7 +136,7 @@ fn a_search_in_air_ends_where_another_one_stays() {
         ..Noise::QUIET
     };
     for plant in [INTEGRATOR, NOTHING] {
-        for (lag, deviation) in [(0.05, 0.3), (0.2, 0.1), (0.2, 1.0)] {
+        for (lag, deviation) in [(0.05, 0.3), (0.2, 0.1), (0.2, 1.0), (0.6, 0.3)] {
             let model = model(plant, vec![windy(plant, (0.31, 0.85, lag), deviation)]);
             for start in [0.3 * lag, 3.0 * lag] {
                 let found = fitted(&model, point(0.25, start, vec![air]));
