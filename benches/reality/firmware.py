@@ -122,12 +122,24 @@ def fly(folder: Path, flights: Iterable[Flight]) -> None:
         sessions.setdefault(flight.wind, []).append(flight.name)
     running = [
         subprocess.Popen(
-            [*first, *alone(), sys.executable, str(script), str(firmware), str(folder), *names]
+            [*first, *alone(), sys.executable, str(script), str(firmware), str(folder), *names],
+            stderr=subprocess.PIPE,
+            text=True,
         )
         for names in sessions.values()
     ]
-    if sum(process.wait() != 0 for process in running):
-        raise SystemExit("a session of the firmware failed; its words are in firmware.log")
+    said = [process.communicate()[1] for process in running]
+    sys.stderr.writelines(said)
+    reasons = [
+        words.strip().rpartition("\n")[2]
+        for process, words in zip(running, said, strict=True)
+        if process.returncode != 0
+    ]
+    if reasons:
+        raise SystemExit(
+            f"a session of the firmware failed, and its words are in firmware.log: "
+            f"{'; '.join(reasons)}"
+        )
 
 
 def estimated(folder: Path, flight: Flight, plant: str, own_log: bool = False) -> Estimated:
