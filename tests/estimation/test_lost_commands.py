@@ -8,7 +8,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
-from deadtime.estimation.likelihood._missing import _closed
+from deadtime.estimation.likelihood._missing import _closed, _response, smoothed
 from deadtime.estimation.models._held import path_of
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
@@ -80,10 +80,24 @@ def test_the_loop_answers_an_error_of_a_predicted_output():
             sent[k] = -slopes[k] * (output + errors[k])
         return sent
 
-    each, shared = _closed(loop, slopes)
+    each, shared = _closed(slopes, _response(loop, slopes.size))
     sums = [commands(error).sum() for error in np.eye(slopes.size)]
     np.testing.assert_allclose(each, np.abs(sums), atol=1e-9)
     assert shared * 12 == pytest.approx(abs(commands(np.ones(slopes.size)).sum()))
+
+
+@pytest.mark.parametrize("rows", [3, 30, 96, 97, 300])
+def test_values_are_smoothed_around_their_own_place(rows):
+    # Also where there are fewer of them than neighbours that may count.
+    rng = np.random.default_rng(rows)
+    place = np.arange(rows) / rows
+    values = np.sin(6.0 * place) + 0.05 * rng.normal(size=rows)
+    means, error = smoothed(values)
+    backward, same = smoothed(values[::-1])
+    np.testing.assert_allclose(backward[::-1], means, atol=1e-13)
+    assert error == same
+    if rows > 3:
+        assert np.std(means - np.sin(6.0 * place)) < 0.05
 
 
 def test_the_reference_may_change_in_any_of_many_missing_rows():

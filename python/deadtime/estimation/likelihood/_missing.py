@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.estimation.models._held import Path, path_of
+from deadtime.estimation.models._held import path_of
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
 
@@ -64,7 +67,7 @@ class HeldCommands(NamedTuple):
         Times between which the mean command is unknown.
     computed : tuple of (float, float, float)
         Times between which a command was computed from an output, and its change by a unit of the
-        error of that output; zero at its limit.
+        error of that output, zero at its limit; in the order of the later times.
     steps : int
         In how many ways the reference may have changed between rows.
     longest : int
@@ -77,10 +80,6 @@ class HeldCommands(NamedTuple):
     computed: tuple[tuple[float, float, float], ...] = ()
     steps: int = 1
     longest: int = 0
-
-
-#: The output of the plant at some times, for a better guess than a straight line between rows.
-Predicted: TypeAlias = Callable[[Array], Array]
 
 
 def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
@@ -110,13 +109,7 @@ def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
 
 
 def with_missing(
-    recording: Recording,
-    loop: ControlLoop,
-    command: Array,
-    predicted: Predicted | None = None,
-    step: int | None = None,
-    shared: float | None = None,
-    closed: bool = False,
+    recording: Recording, loop: ControlLoop, command: Array, step: int | None = None
 ) -> HeldCommands:
     """The commands of all samples of the controller, from those of the first rows.
 
@@ -125,87 +118,158 @@ def with_missing(
     recording, loop
     command : ndarray, shape (m,)
         Commands of the first rows.
-    predicted : callable, optional
-        The output between rows; a straight line by default.
     step : int, optional
         After how many missing samples the reference changes, where it changes between rows that
         are further apart than samples. If not given, the mean command there is unknown.
-    shared : float, optional
-        Error of the predicted output that many missing rows share, in deviations of the white
-        noise. If not given, their mean command is unknown besides.
-    closed : bool
-        Whether the loop answers the errors of the outputs across many missing rows.
     """
-    time = recording.time[: command.size]
-    plain = HeldCommands(time, command)
-    if loop.sample_time is None or time.size < 2:
-        return plain
-    apart = np.diff(time) / loop.sample_time
-    whole = np.rint(apart)
-    # A row that is late, not lost, is as much closer to the next one.
-    late = apart + np.append(apart[1:], np.inf) < whole + 0.5
-    gaps = np.flatnonzero((whole > 1.0) & ~late & (np.abs(apart - whole) < NEAR_WHOLE * whole))
-    if not gaps.size:
-        return plain
-    law = _law(recording, loop, command)
-    commands, ambiguous, steps = [], [], 1
-    computed: list[tuple[float, float, float]] = []
-    counts = whole[gaps].astype(int) - 1
-    shares = [np.arange(1, count + 1) / (count + 1) for count in counts]
-    places = [
-        time[gap] + share * (time[gap + 1] - time[gap])
-        for gap, share in zip(gaps, shares, strict=True)
-    ]
-    outputs = np.interp(np.concatenate(places), time, recording.output[: time.size])
-    if predicted is not None:
-        outputs = predicted(np.concatenate(places))
-    between = np.split(outputs, np.cumsum(counts)[:-1])
-    error = SHARED if shared is None else shared
-    for gap, at, output in zip(gaps, places, between, strict=True):
-        count = at.size
-        before, after = recording.reference[gap], recording.reference[gap + 1]
-        ends = (float(at[0]), float(time[gap + 1]))
-        known = law is not None and (before == after or step is not None)
-        if law is None:
-            sent = np.full(count, 0.5 * (command[gap] + command[gap + 1]))
+    gaps = _Gaps.of(recording, loop, command)
+    if gaps is None:
+        return HeldCommands(recording.time[: command.size], command)
+    outputs = np.interp(gaps.places, gaps.time, recording.output[: command.size])
+    return _Missing(recording, loop, command, gaps, step).filled(outputs)
+
+
+class _Gaps(NamedTuple):
+    """Rows that are further apart than the samples of a controller, and the samples between."""
+
+    time: Array
+    #: The row before each gap, how many samples are missing in it, and the row after, s.
+    rows: NDArray[np.intp]
+    counts: NDArray[np.intp]
+    ends: Array
+    #: Where the samples of each gap begin among all missing ones, and where the last of them end.
+    firsts: NDArray[np.intp]
+    #: Of each missing sample: its time, that of the next one, s, and its number in its gap.
+    places: Array
+    until: Array
+    number: NDArray[np.intp]
+    #: Times of the rows and then of the missing samples, put in order.
+    order: NDArray[np.intp]
+
+    @staticmethod
+    def of(recording: Recording, loop: ControlLoop, command: Array) -> _Gaps | None:
+        """Those between the first rows, as many as commands; None where there is none."""
+        time = recording.time[: command.size]
+        if loop.sample_time is None or time.size < 2:
+            return None
+        apart = np.diff(time) / loop.sample_time
+        whole = np.rint(apart)
+        # A row that is late, not lost, is as much closer to the next one.
+        late = apart + np.append(apart[1:], np.inf) < whole + 0.5
+        rows = np.flatnonzero((whole > 1.0) & ~late & (np.abs(apart - whole) < NEAR_WHOLE * whole))
+        if not rows.size:
+            return None
+        counts = whole[rows].astype(np.intp) - 1
+        firsts = np.append(0, np.cumsum(counts))
+        number = np.arange(firsts[-1]) - np.repeat(firsts[:-1], counts)
+        ends = time[rows + 1]
+        share = (number + 1) / np.repeat(counts + 1, counts)
+        places = np.repeat(time[rows], counts) + share * np.repeat(ends - time[rows], counts)
+        until = np.append(places[1:], np.nan)
+        until[firsts[1:] - 1] = ends
+        order = np.argsort(np.append(time, places), kind="stable")
+        return _Gaps(time, rows, counts, ends, firsts, places, until, number, order)
+
+    def each(self, values: Array) -> Array:
+        """Values of gaps as those of their samples."""
+        return np.repeat(values, self.counts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Missing:
+    """What is known of the commands between rows, whatever the output there; see `with_missing`."""
+
+    recording: Recording
+    loop: ControlLoop
+    command: Array
+    gaps: _Gaps
+    step: int | None
+
+    @cached_property
+    def law(self) -> Callable[[Array, Array], Array] | None:
+        """The command of a P controller, if the rows show that it is in charge."""
+        controller, limit = self.loop.controller, self.loop.limit or math.inf
+        if not isinstance(controller, P):
+            return None
+
+        def law(reference: Array, output: Array) -> Array:
+            return np.asarray(np.clip(controller.Kp * (reference - output), -limit, limit))
+
+        rows = slice(0, self.command.size)
+        differs = law(self.recording.reference[rows], self.recording.output[rows]) - self.command
+        return None if np.std(differs) > ALIKE * np.std(self.command) else law
+
+    @cached_property
+    def response(self) -> Array:
+        """See `_response`; for as many samples as are missing in a row."""
+        return _response(self.loop, int(self.gaps.counts.max()))
+
+    def filled(
+        self, outputs: Array, shared: float | None = None, closed: bool = False
+    ) -> HeldCommands:
+        """The commands for outputs at the missing samples.
+
+        `shared` is the error of the output that many missing rows share, in deviations of the white
+        noise; if None, their mean command is unknown besides. `closed`: the loop answers errors of
+        the outputs across many missing rows.
+        """
+        gaps, command, reference = self.gaps, self.command, self.recording.reference
+        before, after = reference[gaps.rows], reference[gaps.rows + 1]
+        changes = before != after
+        steps = 1
+        if self.law is None:
+            sent = gaps.each(0.5 * (command[gaps.rows] + command[gaps.rows + 1]))
+            unknown = np.full(changes.shape, True)
         else:
-            reference = np.where(np.arange(count) < (step or 0), before, after)
-            sent = law(reference, output)
-            if before != after:
-                steps = max(steps, count + 1)
-        commands.append(sent)
-        until = np.append(at[1:], time[gap + 1])
-        slopes = _slopes(loop, sent)
-        shared_by_all = float(slopes.max())
-        if count >= HOLE and closed:
-            slopes, shared_by_all = _closed(loop, slopes)
-        computed += zip(at.tolist(), until.tolist(), slopes.tolist(), strict=True)
-        if count >= HOLE:
+            is_before = gaps.number < (self.step or 0)
+            sent = self.law(np.where(is_before, gaps.each(before), gaps.each(after)), outputs)
+            steps += int(gaps.counts.max(initial=0, where=changes))
+            unknown = changes & (self.step is None)
+        many = np.flatnonzero(gaps.counts >= HOLE)
+        slopes = self._slopes(sent)
+        together = []
+        for gap in many:
             # The output that is predicted has errors too, which all these commands share.
-            free = at[slopes > 0.0]
+            inside = slice(*gaps.firsts[gap : gap + 2])
+            shared_by_all = float(slopes[inside].max())
+            if closed:
+                slopes[inside], shared_by_all = _closed(slopes[inside], self.response)
+            free = gaps.places[inside][slopes[inside] > 0.0]
             if free.size:
-                computed.append((float(free[0]), ends[1], error * shared_by_all))
-        if not known or (count >= HOLE and shared is None):
-            ambiguous.append((count, ends))
-    ambiguous.sort(key=lambda pair: -pair[0])
-    most = max(1, int(MOST_UNKNOWN * time.size))
-    unknown = tuple(sorted(ends for _, ends in ambiguous[:most]))
-    every = np.concatenate([time, *places])
-    order = np.argsort(every, kind="stable")
-    values = np.concatenate([command, *commands])
-    return HeldCommands(
-        every[order], values[order], unknown, tuple(computed), steps, int(counts.max())
-    )
+                error = SHARED if shared is None else shared
+                together.append((float(free[0]), float(gaps.ends[gap]), error * shared_by_all))
+        if shared is None:
+            unknown[many] = True
+        computed = zip(gaps.places.tolist(), gaps.until.tolist(), slopes.tolist(), strict=True)
+        ambiguous = np.flatnonzero(unknown)
+        ambiguous = ambiguous[np.argsort(-gaps.counts[ambiguous], kind="stable")]
+        ambiguous = np.sort(ambiguous[: max(1, int(MOST_UNKNOWN * gaps.time.size))])
+        begins = gaps.places[gaps.firsts[ambiguous]]
+        return HeldCommands(
+            np.append(gaps.time, gaps.places)[gaps.order],
+            np.append(command, sent)[gaps.order],
+            tuple(zip(begins.tolist(), gaps.ends[ambiguous].tolist(), strict=True)),
+            tuple(sorted((*computed, *together), key=itemgetter(1))),
+            steps,
+            int(gaps.counts.max()),
+        )
+
+    def _slopes(self, sent: Array) -> Array:
+        """Change of computed commands by a unit of the output: none at the limit."""
+        gain = abs(self.loop.controller.gains.get("Kp", 0.0))
+        return np.where(np.abs(sent) < (self.loop.limit or math.inf), gain, 0.0)
 
 
-def _slopes(loop: ControlLoop, sent: Array) -> Array:
-    """Change of computed commands by a unit of the output: none at the limit."""
-    gain = abs(loop.controller.gains.get("Kp", 0.0))
-    limit = math.inf if loop.limit is None else loop.limit
-    return np.where(np.abs(sent) < limit, gain, 0.0)
+def _response(loop: ControlLoop, samples: int) -> Array:
+    """Of the output to a command that lasts a sample, after whole samples since its start."""
+    known = {"gain": 1.0, **loop.parameters}
+    sample_time = loop.sample_time or 1.0
+    pulse = path_of(loop.plant, np.array([0.0, sample_time]), np.array([1.0, 0.0]))
+    ages = np.asarray(sample_time * np.arange(samples) - known["delay"], dtype=np.float64)
+    return np.asarray(known["gain"] * pulse.value(ages, known))
 
 
-def _closed(loop: ControlLoop, slopes: Array) -> tuple[Array, float]:
+def _closed(slopes: Array, response: Array) -> tuple[Array, float]:
     """Change of the sum of the commands by an error of each output they are computed from.
 
     The loop answers an error: with the response M of the outputs to the commands and their slopes
@@ -214,15 +278,21 @@ def _closed(loop: ControlLoop, slopes: Array) -> tuple[Array, float]:
     """
     from scipy import linalg
 
-    known = {"gain": 1.0, **loop.parameters}
-    sample_time = loop.sample_time or 1.0
-    pulse = path_of(loop.plant, np.array([0.0, sample_time]), np.array([1.0, 0.0]))
-    ages = np.asarray(sample_time * np.arange(slopes.size) - known["delay"], dtype=np.float64)
-    response = known["gain"] * pulse.value(ages, known)
-    M = linalg.toeplitz(response, np.zeros(slopes.size))
+    M = linalg.toeplitz(response[: slopes.size], np.zeros(slopes.size))
     change = np.linalg.solve(np.eye(slopes.size) + slopes[:, None] * M, np.diag(slopes))
     sums = change.sum(axis=0)
     return np.abs(sums), abs(float(sums.sum())) / max(1, int(np.count_nonzero(slopes)))
+
+
+@lru_cache(maxsize=8)
+def _neighbours(size: int) -> tuple[Array, Array]:
+    """Weights of neighbours for each of `LENGTHS`, and their sums for each of so many values."""
+    from scipy import ndimage
+
+    weights = np.exp(-np.abs(np.arange(-REACH, REACH + 1)) / np.array(LENGTHS)[:, None])
+    weights[:, REACH] = 0.0
+    shares = [ndimage.correlate1d(np.ones(size), one, mode="constant") for one in weights]
+    return weights, np.array(shares)
 
 
 def smoothed(values: Array) -> tuple[Array, float]:
@@ -230,37 +300,15 @@ def smoothed(values: Array) -> tuple[Array, float]:
 
     They are over the length that predicts each value best from the rest.
     """
-    best, least, error_of_best = values, math.inf, 1.0
-    offsets = np.arange(-REACH, REACH + 1)
-    inside = np.ones(values.size)
-    for length in LENGTHS:
-        weights = np.exp(-np.abs(offsets) / length)
-        weights[REACH] = 0.0
-        sums = np.convolve(values, weights, mode="same")[: values.size]
-        shares = np.convolve(inside, weights, mode="same")[: values.size]
-        error = float(np.median(np.abs(values - sums / shares)))
-        if error < least:
-            least, best = error, (sums + values) / (shares + 1.0)
-            # At an end, as beside a hole, there are neighbours on one side.
-            half = weights[REACH + 1 :]
-            error_of_best = math.sqrt(1.0 + half @ half) / (1.0 + float(half.sum()))
-    return np.asarray(best), error_of_best
+    from scipy import ndimage
 
-
-def _law(
-    recording: Recording, loop: ControlLoop, command: Array
-) -> Callable[[Array, Array], Array] | None:
-    """The command of a P controller, if the rows show that it is in charge."""
-    if not isinstance(loop.controller, P):
-        return None
-    Kp, limit = loop.controller.Kp, math.inf if loop.limit is None else loop.limit
-
-    def law(reference: Array, output: Array) -> Array:
-        return np.asarray(np.clip(Kp * (reference - output), -limit, limit))
-
-    computed = law(recording.reference[: command.size], recording.output[: command.size])
-    differs = float(np.std(computed - command)) > ALIKE * float(np.std(command))
-    return None if differs else law
+    weights, shares = _neighbours(values.size)
+    sums = np.array([ndimage.correlate1d(values, one, mode="constant") for one in weights])
+    best = int(np.argmin(np.median(np.abs(values - sums / shares), axis=1)))
+    # At an end, as beside a hole, there are neighbours on one side.
+    half = weights[best, REACH + 1 :]
+    error = math.sqrt(1.0 + half @ half) / (1.0 + float(half.sum()))
+    return (sums[best] + values) / (shares[best] + 1.0), error
 
 
 def predicted_commands(
@@ -277,36 +325,32 @@ def predicted_commands(
     What moves the output beside the commands is interpolated between rows. Where it is `calm`, none
     does, and across many missing rows the loop is predicted from those before.
     """
-    commands = first
+    gaps = _Gaps.of(recording, loop, command)
+    if gaps is None:
+        return first
+    missing = _Missing(recording, loop, command, gaps, step)
     known = {"gain": 1.0, **loop.parameters}
-    rows = slice(0, command.size)
-    time, output = recording.time[rows], recording.output[rows]
+    time, output = gaps.time, recording.output[: command.size]
     apart = np.diff(time) / (loop.sample_time or math.inf)
     holes = np.flatnonzero(calm & (apart > HOLE + 0.5))
+    row = np.searchsorted(time, gaps.places, side="right") - 1
+    across = np.isin(row, holes)
+    commands = first
     for _ in range(ROUNDS + calm * first.longest):
         path = path_of(loop.plant, commands.time, commands.command)
-
-        def modelled(times: Array, path: Path = path) -> Array:
-            return np.asarray(known["gain"] * path.value(times - known["delay"], known))
-
-        beside = output - modelled(time)
+        modelled, there = (
+            known["gain"] * path.value(times - known["delay"], known)
+            for times in (time, gaps.places)
+        )
+        beside = output - modelled
         left, error = smoothed(beside)
         held = left.copy()
         if holes.size:
             pieces = np.split(beside, holes + 1)[:-1]
             held[holes] = [one.mean() for one in pieces]
             error = max(1.0 / math.sqrt(one.size) for one in pieces)
-
-        def predicted(
-            times: Array, left: Array = left, held: Array = held, modelled: Predicted = modelled
-        ) -> Array:
-            before = np.searchsorted(time, times, side="right") - 1
-            across = np.isin(before, holes)
-            return modelled(times) + np.where(across, held[before], np.interp(times, time, left))
-
-        again = with_missing(
-            recording, loop, command, predicted, step, None if unsure else error, calm
-        )
+        there += np.where(across, held[row], np.interp(gaps.places, time, left))
+        again = missing.filled(there, None if unsure else error, calm)
         moved = float(np.max(np.abs(again.command - commands.command)))
         commands = again
         if moved <= SETTLED * float(np.ptp(command)):
