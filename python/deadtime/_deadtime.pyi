@@ -720,6 +720,9 @@ def sweep_metrics(
     progress: _Progress = None,
 ) -> None: ...
 def sweep_abscissae(sets: _LoopSets, *, threads: int | None = None) -> _Reals: ...
+def sweep_decay(
+    sets: _LoopSets, rates: _Reals, *, threads: int | None = None
+) -> NDArray[np.bool_]: ...
 def sweep_responses(
     sets: _LoopSets,
     time: _Reals,

@@ -28,7 +28,7 @@ from deadtime._base.validation import (
     real_array,
     thread_number,
 )
-from deadtime._deadtime import sweep_abscissae, sweep_metrics, sweep_responses
+from deadtime._deadtime import sweep_abscissae, sweep_decay, sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._entries import Each
 from deadtime.loops._model import refuse_discretised, rest_of
@@ -384,8 +384,7 @@ class _Sets:
         doubtful = np.flatnonzero(status == _DOUBTFUL)
         if doubtful.size:
             inside = float(times[-1] - times[0]) - settled[doubtful]
-            stays = inside * self.only(doubtful).rates() >= TIME_CONSTANTS
-            status[doubtful[stays]] = SweepStatus.OK
+            status[doubtful[self.only(doubtful).stay(inside)]] = SweepStatus.OK
         return self._final(found, times, found.metrics, status)
 
     def until_settled(self, progress: Report | None) -> Sweep:
@@ -442,6 +441,18 @@ class _Sets:
         if unsettled.any():
             shaped["settling_time"] = np.where(unsettled, np.nan, shaped["settling_time"])
         return replace(found, time=times, metrics=shaped, status=status)
+
+    def stay(self, inside: Vector) -> NDArray[np.bool_]:
+        """Whether sets that were in their bands for the last seconds `inside` count as settled."""
+        if self.loop.is_sampled:
+            return np.asarray(inside * self.rates() >= TIME_CONSTANTS)
+        # None of them decays fast enough for no time at all.
+        with np.errstate(divide="ignore"):
+            least = TIME_CONSTANTS / inside
+        found = np.empty(self.shape, dtype=bool)
+        for place, _, sets, _ in self.blocks(None):
+            found[place] = sweep_decay(sets, least[place], threads=self.threads)
+        return found
 
     def rates(self) -> Vector:
         """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""

@@ -72,8 +72,8 @@ mod _deadtime {
     use super::stability::{MapBoundary, MapCells, PyFamily};
     #[pymodule_export]
     use super::sweeps::{
-        LoopSensitivities, SweepResponses, loop_sensitivities, sweep_abscissae, sweep_metrics,
-        sweep_responses,
+        LoopSensitivities, SweepResponses, loop_sensitivities, sweep_abscissae, sweep_decay,
+        sweep_metrics, sweep_responses,
     };
     #[pymodule_export]
     use super::systems::{

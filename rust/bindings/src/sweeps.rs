@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use deadtime::dde::Criteria;
 use deadtime::dde::ensemble::{self, Measures, Sets};
 use deadtime::dde::sensitivity::{self, Sloped};
-use deadtime::stability::abscissae;
+use deadtime::stability::{abscissae, decay};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray1,
 };
@@ -152,6 +152,22 @@ pub(crate) fn sweep_abscissae<'py>(
     let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
     let sets = sets.read(&entries)?;
     let found = run(py, threads, None, |task| abscissae(&sets, task))?;
+    Ok(found.into_pyarray(py))
+}
+
+/// Whether continuous loops without their limits decay at `rates` in 1/s at least; one for each loop.
+#[pyfunction]
+#[pyo3(signature = (sets, rates, *, threads=None))]
+pub(crate) fn sweep_decay<'py>(
+    py: Python<'py>,
+    sets: LoopSets<'py>,
+    rates: Floats<'py>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let (numbers, rates) = (sets.numbers()?, in_order(&rates)?);
+    let entries: Vec<&[f64]> = numbers.iter().map(|entry| &**entry).collect();
+    let sets = sets.read(&entries)?;
+    let found = run(py, threads, None, |task| decay(&sets, &rates, task))?;
     Ok(found.into_pyarray(py))
 }
 

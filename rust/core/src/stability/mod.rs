@@ -5,7 +5,8 @@
 //! * `crossings` finds where roots cross the edge of the specification as one gain varies,
 //!   `branches` follows roots along a row.
 //! * `boxes` proves statements about all points of a box of parameters.
-//! * `delayed` finds the spectral abscissae of many continuous loops.
+//! * `delayed` finds how fast many continuous loops decay, `one_delay` whether all roots of one are left
+//!   of a line.
 //! * `map` covers two parameters: counts, boundaries, spectral abscissa, robust maps.
 
 mod boxes;
@@ -17,13 +18,14 @@ mod family;
 mod held;
 mod hold;
 mod map;
+mod one_delay;
 mod specification;
 
 pub use boxes::{Boxes, Limits, Node, Radius, largest_stable_box, proved_boxes, stability_radius};
 pub use cell::{Cell, ENDLESS, UNKNOWN, judge};
 pub(crate) use crossings::radius_of_members;
 pub use crossings::{Crossing, crossings_along};
-pub use delayed::abscissae;
+pub use delayed::{abscissae, decay};
 pub use family::{Affine, Family, Term};
 pub use held::{HeldLoop, HeldNumbers, LoopRows, held_boundaries, held_crossings, held_map};
 pub use map::{
