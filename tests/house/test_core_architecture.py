@@ -39,6 +39,7 @@ ORDER = {
         "boxes",
         "map",
         "held",
+        "one_delay",
         "delayed",
     ],
     "frequency": [

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from deadtime.loops._model import rest_of
+from deadtime.loops._settled import TIME_CONSTANTS
 from deadtime.loops._sweep import _Sets
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -325,6 +326,29 @@ def test_the_poles_of_many_loops_are_those_of_each(loop):
     rates = _Sets(loop, values, (5,), 1.0, 0.02, (0.1, 0.9), 1).rates()
     alone = [-single(loop, values, i).spectral_abscissa() for i in range(5)]
     np.testing.assert_allclose(rates, alone, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.3),
+        dtm.ControlLoop(dtm.Integrator(1.0, 0.2), dtm.P(1.0), delay=0.3),
+        dtm.ControlLoop(dtm.Integrator(), dtm.PI(1.0, 0.1), delay=0.3),
+        dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.3), delay=0.3),
+        dtm.ControlLoop(dtm.FirstOrder(2.0, 0.5), dtm.PI(1.0, 0.3), delay=0.3),
+        dtm.ControlLoop(dtm.FactoredPlant([0.2, 0.1]), dtm.PI(1.0, 0.8), delay=0.3),
+    ],
+)
+def test_sets_stay_settled_where_their_slowest_root_says_so(loop):
+    rng = np.random.default_rng(7)
+    values = {"Kp": rng.uniform(0.1, 4.0, 300), "delay": rng.uniform(0.0, 0.6, 300)}
+    sets = _Sets(loop, values, (300,), 1.0, 0.02, (0.1, 0.9), 1)
+    rates = sets.rates()
+    inside = np.abs(TIME_CONSTANTS / rates) * (1.0 + np.geomspace(1e-6, 3.0, 300))
+    inside[::2] = np.abs(TIME_CONSTANTS / rates[::2]) / (1.0 + np.geomspace(1e-6, 3.0, 150))
+    np.testing.assert_array_equal(sets.stay(inside), inside * rates >= TIME_CONSTANTS)
+    # No time at all is not enough, and gives no warning.
+    assert not sets.stay(np.zeros(300)).any()
 
 
 @settings(max_examples=60, deadline=None)

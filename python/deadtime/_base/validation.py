@@ -132,6 +132,8 @@ def whole_number(
 
 def one_dimensional(name: str, given: ArrayLike) -> NDArray[np.float64]:
     """Return `given` as a vector of numbers, or raise; one number is a vector of one."""
+    if type(given) is np.ndarray and given.dtype is _FLOAT and given.ndim == 1:
+        return given
     array = real_array(name, given)
     if array.ndim == 1:
         return array

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -22,7 +21,7 @@ from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_w
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response
-from deadtime.systems._response import until_settled
+from deadtime.systems._response import response_of, until_settled
 
 Vector = NDArray[np.float64]
 
@@ -116,7 +115,8 @@ class LoopInTime:
         [ 0.         -1.31       -0.348984]
         """
         loop = self.specification
-        if not loop.plant.is_rational:
+        respond = loop.respond
+        if respond is None:
             return simulate_with_delays(
                 loop,
                 time,
@@ -129,8 +129,6 @@ class LoopInTime:
                 sensitivities=sensitivities,
             )
         times = one_dimensional("time", time)
-        if times.size == 0:
-            raise ValueError("time is empty: give at least one output time")
         run: LoopRun | float
         if (
             isinstance(reference, float)
@@ -138,7 +136,6 @@ class LoopInTime:
             and initial_output == sample_phase == 0.0
             and reference_before is reference_time is None
             and command_history is _NONE
-            and isfinite(reference)
         ):
             run, past = reference, 0.0
         else:
@@ -146,8 +143,7 @@ class LoopInTime:
                 loop, times, reference, initial_output, reference_before, reference_time,
                 command_history, sample_phase,
             )  # fmt: skip
-        found = loop.native.respond(times, run, loop.delay_path == "measurement")
-        response = Response._of_run(_Again(loop, run, found))
+        response = response_of(_Again(loop, run, respond(times, run)))
         if not sensitivities:
             return response
         names, start = slope_names(loop, sensitivities), float(times[0])
@@ -256,7 +252,7 @@ def _run_of(
         jumps = reference_jumps(times, reference, reference_time, before)
         # The arrays belong to the caller; the response must not change with them.
         held, held_from = jumps.values.copy(), jumps.times.copy()
-        if held_from[0] < times[0]:
+        if times.size and held_from[0] < times[0]:
             past = jumps.just_before(float(times[0]))
     history = None
     if not isinstance(command_history, tuple) or command_history:

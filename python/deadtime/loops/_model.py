@@ -143,10 +143,14 @@ class LoopModel:
         return [entry.numbers if isinstance(entry, Each) else entry for entry in row]
 
     def native(
-        self, delay: float, sample_time: float | None = None, limit: float | None = None
+        self,
+        delay: float,
+        sample_time: float | None = None,
+        limit: float | None = None,
+        is_ahead: bool = False,
     ) -> LinearLoop:
-        """Return the loop as the stepper holds it."""
-        return LinearLoop(self, delay, sample_time, limit)
+        """Return the loop as the stepper holds it; `is_ahead`: the delay is in the measurement."""
+        return LinearLoop(self, delay, sample_time, limit, is_ahead)
 
     @cached_property
     def rest_gains(self) -> tuple[float, float] | None:

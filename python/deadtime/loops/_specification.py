@@ -6,7 +6,7 @@ them take the specification.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from deadtime._base.validation import non_negative, positive
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
-from deadtime.loops._model import LoopModel, rest_of, state_at_rest
+from deadtime.loops._model import LoopModel, LoopRun, rest_of, state_at_rest
 from deadtime.loops._plants import Plant
 
 if TYPE_CHECKING:
-    from deadtime._deadtime import LinearLoop
+    from deadtime._deadtime import LinearLoop, LoopResponse
 
 
 #: Where the delay of a loop can sit.
@@ -150,7 +150,16 @@ class LoopSpecification:
     @cached_property
     def native(self) -> LinearLoop:
         """The loop as the stepper holds it."""
-        return self.model.native(self.known_delay, self.sample_time, self.limit)
+        is_ahead = self.delay_path == "measurement"
+        return self.model.native(self.known_delay, self.sample_time, self.limit, is_ahead)
+
+    @cached_property
+    def respond(self) -> Callable[[NDArray[np.float64], LoopRun | float], LoopResponse] | None:
+        """The response at times to a run; None where the plant has delays inside.
+
+        A run is a number as well: the height of a step from rest at zero.
+        """
+        return self.native.respond if self.plant.is_rational else None
 
     def rest_at(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
         """State in which the plant rests at `output`, and the command that keeps it there."""

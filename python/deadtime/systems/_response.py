@@ -36,6 +36,8 @@ _LOST = 20.0
 #: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
 
+_new = object.__new__
+
 #: What a `KeptRun` holds.
 PARTS = frozenset(("time", "outputs", "inputs", "breaks", "reference"))
 
@@ -116,16 +118,6 @@ class Response(ReadOnlyArrays, Pictured):
             if given is not None:
                 object.__setattr__(self, name, np.array(real_array(name, given)))
         self._freeze()
-
-    @classmethod
-    def _of_run(cls, run: KeptRun) -> Response:
-        """Make a response whose parts are those of a run, most of them taken as they are read."""
-        response = object.__new__(cls)
-        parts = response.__dict__
-        parts["_dense"] = run
-        # Nearly everyone reads these, and a descriptor takes longer than the array.
-        parts["outputs"] = run.found.outputs
-        return response
 
     def __getstate__(self) -> dict[str, Any]:
         for name in PARTS:
@@ -275,6 +267,16 @@ for _name in PARTS:
 for _name in ("sensitivities", "input_sensitivities"):
     setattr(Response, _name, _Later(_name, lambda run: NONE))
 setattr(Response, "steady_state", _Later("steady_state", methodcaller("steady_state")))  # noqa: B010
+
+
+def response_of(run: KeptRun) -> Response:
+    """The response whose parts are those of a run, most of them taken as they are read."""
+    response = _new(Response)
+    parts = response.__dict__
+    parts["_dense"] = run
+    # Nearly everyone reads these, and a descriptor takes longer than the array.
+    parts["outputs"] = run.found.outputs
+    return response
 
 
 def first_duration(A: NDArray[np.float64], delay: float) -> float:

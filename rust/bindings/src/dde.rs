@@ -1,5 +1,7 @@
 //! Bindings of `deadtime::dde`: linear loops.
 
+use std::slice;
+
 use deadtime::dde::sampled;
 use deadtime::dde::{
     Equations, LinearLoop, RateLimits, Reference, Request, Response, Start, Update, on_sample,
@@ -49,6 +51,14 @@ struct SampleUpdate<'py> {
     states: Floats<'py>,
     command: Floats<'py>,
     reference: Floats<'py>,
+}
+
+/// The jumps of a reference.
+enum Jumps {
+    /// To a number, where the run starts.
+    AtStart(f64),
+    /// Times and values.
+    Later(Vec<f64>, Vec<f64>),
 }
 
 /// The state in which a run starts, and its reference: a tuple, which takes a third of the time of
@@ -102,22 +112,23 @@ impl LoopRun<'_> {
             .map_or(Ok(Vec::new()), |history| owned(history))
     }
 
-    /// Times and values of the jumps of the reference in a run from `start` on.
-    pub(crate) fn jumps(&self, start: Option<f64>) -> PyResult<(Vec<f64>, Vec<f64>)> {
-        let Some(times) = &self.reference_time else {
-            let value = self.reference.extract::<f64>()?;
-            return Ok(start
-                .map(|start| (vec![start], vec![value]))
-                .unwrap_or_default());
-        };
-        let values = self.reference.extract::<Floats<'_>>()?;
-        Ok((owned(times)?, owned(&values)?))
+    fn jumps(&self) -> PyResult<Jumps> {
+        Ok(match &self.reference_time {
+            None => Jumps::AtStart(self.reference.extract()?),
+            Some(times) => {
+                let values = self.reference.extract::<Floats<'_>>()?;
+                Jumps::Later(owned(times)?, owned(&values)?)
+            }
+        })
     }
 
     /// The reference of a run from time 0 on.
     pub(crate) fn reference(&self) -> PyResult<Reference> {
-        let (times, values) = self.jumps(Some(0.0))?;
-        converted(Reference::new(self.reference_before, times, values))
+        let before = self.reference_before;
+        converted(match self.jumps()? {
+            Jumps::AtStart(value) => Reference::step(before, value),
+            Jumps::Later(times, values) => Reference::new(before, times, values),
+        })
     }
 }
 
@@ -125,17 +136,20 @@ impl LoopRun<'_> {
 #[pyclass(frozen, module = "deadtime._deadtime", name = "LinearLoop")]
 pub(crate) struct PyLinearLoop {
     inner: LinearLoop,
+    /// How much earlier than its measurement the output is, s.
+    output_lead: f64,
 }
 
 #[pymethods]
 impl PyLinearLoop {
     #[new]
-    #[pyo3(signature = (equations, delay, sample_time=None, limit=None))]
+    #[pyo3(signature = (equations, delay, sample_time=None, limit=None, delay_in_measurement=false))]
     fn new(
         equations: LoopEquations<'_>,
         delay: f64,
         sample_time: Option<f64>,
         limit: Option<f64>,
+        delay_in_measurement: bool,
     ) -> PyResult<Self> {
         let matrices = Equations {
             a: owned(&equations.a)?,
@@ -161,7 +175,8 @@ impl PyLinearLoop {
             Some(update) => plain.with_update(update),
             None => Ok(plain),
         });
-        converted(made).map(|inner| Self { inner })
+        let output_lead = if delay_in_measurement { delay } else { 0.0 };
+        converted(made).map(|inner| Self { inner, output_lead })
     }
 
     /// Outputs at some times; these and those of the run count from its start.
@@ -188,33 +203,23 @@ impl PyLinearLoop {
         py: Python<'_>,
         time: Floats<'_>,
         run: Bound<'_, PyAny>,
-        delay_in_measurement: bool,
     ) -> PyResult<PyLoopResponse> {
         let time = owned(&time)?;
-        let (start, reference_before, (reference_time, reference)) =
-            if let Ok(height) = run.cast::<PyFloat>() {
-                let start = Start {
-                    state: vec![0.0; self.inner.equations().states()],
-                    ..Start::default()
-                };
-                let at: Vec<f64> = time.iter().take(1).copied().collect();
-                let reference = vec![height.value(); at.len()];
-                (start, 0.0, (at, reference))
-            } else {
-                let run = run.extract::<LoopRun<'_>>()?;
-                let jumps = run.jumps(time.first().copied())?;
-                (run.start()?, run.reference_before, jumps)
+        let (start, reference_before, jumps) = if let Ok(height) = run.cast::<PyFloat>() {
+            let start = Start {
+                state: vec![0.0; self.inner.equations().states()],
+                ..Start::default()
             };
+            (start, 0.0, Jumps::AtStart(height.value()))
+        } else {
+            let run = run.extract::<LoopRun<'_>>()?;
+            (run.start()?, run.reference_before, run.jumps()?)
+        };
         let mut made = PyLoopResponse {
             time,
-            output_lead: if delay_in_measurement {
-                self.inner.delay()
-            } else {
-                0.0
-            },
+            output_lead: self.output_lead,
             reference_before,
-            reference_time,
-            reference,
+            jumps,
             found: Response::default(),
         };
         made.found = run_here(py, |task| self.inner.respond(&start, &made.request(), task))?;
@@ -275,19 +280,25 @@ pub(crate) struct PyLoopResponse {
     time: Vec<f64>,
     output_lead: f64,
     reference_before: f64,
-    reference_time: Vec<f64>,
-    reference: Vec<f64>,
+    jumps: Jumps,
     found: Response,
 }
 
 impl PyLoopResponse {
     fn request(&self) -> Request<'_> {
+        let (reference_time, reference) = match &self.jumps {
+            Jumps::AtStart(value) => {
+                let start = self.time.get(..1).unwrap_or_default();
+                (start, &slice::from_ref(value)[..start.len()])
+            }
+            Jumps::Later(times, values) => (&times[..], &values[..]),
+        };
         Request {
             time: &self.time,
             output_lead: self.output_lead,
             reference_before: self.reference_before,
-            reference_time: &self.reference_time,
-            reference: &self.reference,
+            reference_time,
+            reference,
         }
     }
 }

@@ -9,7 +9,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::sync::{Arc, LazyLock, Mutex};
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
@@ -205,41 +205,30 @@ where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
-    let (task, interrupted) = interruptible_task();
+    let task = Task::asking(POLL, goes_on);
     let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
-    into_py_result(Some(result), take_error(&interrupted))
+    into_py_result(Some(result), PyErr::take(py))
 }
 
 /// [`run_here`] for work that calls Python often: the interpreter is not released.
-pub(crate) fn run_attached<T, F>(_py: Python<'_>, work: F) -> PyResult<T>
+pub(crate) fn run_attached<T, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     F: FnOnce(&Task) -> Result<T, Error>,
 {
-    let (task, interrupted) = interruptible_task();
+    let task = Task::asking(POLL, goes_on);
     let result = catch_unwind(AssertUnwindSafe(|| work(&task)));
-    into_py_result(Some(result), take_error(&interrupted))
+    into_py_result(Some(result), PyErr::take(py))
 }
 
-type SharedError = Arc<Mutex<Option<PyErr>>>;
-
-/// A task that checks for signals by itself, and the place for the exception that they raise.
-fn interruptible_task() -> (Task, SharedError) {
-    let interrupted = SharedError::default();
-    let shared = Arc::clone(&interrupted);
-    let task = Task::asking(POLL, move || match attached(|py| py.check_signals()) {
+/// Has no signal raised an exception? One that was raised stays with this thread until the work ends.
+fn goes_on() -> bool {
+    attached(|py| match py.check_signals() {
         Ok(()) => true,
         Err(error) => {
-            if let Ok(mut slot) = shared.lock() {
-                *slot = Some(error);
-            }
+            error.restore(py);
             false
         }
-    });
-    (task, interrupted)
-}
-
-fn take_error(shared: &SharedError) -> Option<PyErr> {
-    shared.lock().ok().and_then(|mut slot| slot.take())
+    })
 }
 
 /// Check for signals and report progress.

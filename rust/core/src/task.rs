@@ -32,7 +32,7 @@ struct Lookout {
     every: Duration,
     checks: AtomicU64,
     asked: AtomicU64,
-    go_on: Box<dyn Fn() -> bool + Send + Sync>,
+    go_on: fn() -> bool,
 }
 
 impl fmt::Debug for Lookout {
@@ -88,14 +88,14 @@ impl Task {
 
     /// A task that calls `go_on` itself at about this interval when it is checked; `false` stops
     /// it.
-    pub fn asking(every: Duration, go_on: impl Fn() -> bool + Send + Sync + 'static) -> Self {
+    pub fn asking(every: Duration, go_on: fn() -> bool) -> Self {
         Self {
             lookout: Some(Lookout {
                 start: OnceLock::new(),
                 every,
                 checks: AtomicU64::new(0),
                 asked: AtomicU64::new(0),
-                go_on: Box::new(go_on),
+                go_on,
             }),
             ..Self::new()
         }

@@ -12,7 +12,8 @@ use crate::{Error, Task};
 
 use super::linear_loop::{LinearLoop, Start};
 use super::reference::Reference;
-use crate::dde::limits::RESPONSE;
+use super::requested_output::RequestedOutput;
+use crate::dde::limits::{RESPONSE, finite};
 
 /// Rounding error of a time of the clock, relative to the time.
 const CLOCK: f64 = 4.0 * f64::EPSILON;
@@ -58,22 +59,22 @@ impl LinearLoop {
     ) -> Result<Response, Error> {
         increasing("time", request.time)?;
         let Some(&first) = request.time.first() else {
-            return Ok(Response::default());
+            refuse!("time is empty: give at least one output time");
         };
-        let since = |times: &[f64]| {
+        let since = |times: &[f64], least: f64| {
             let sample = self.sample_time().map(|ts| (ts, start.sample_phase));
             let moved = times
                 .iter()
-                .map(|time| on_sample(time - first, first, sample));
+                .map(|time| on_sample(time - first, first, sample).max(least));
             collected(RESPONSE, moved)
         };
-        let jumps = since(request.reference_time)?;
+        let jumps = since(request.reference_time, f64::NEG_INFINITY)?;
         let values = copied(RESPONSE, request.reference)?;
         let reference = Reference::new(request.reference_before, jumps, values)?;
         let input_times = if first == 0.0 && self.sample_time().is_none() {
             Cow::Borrowed(request.time)
         } else {
-            Cow::Owned(since(request.time)?)
+            Cow::Owned(since(request.time, 0.0)?)
         };
         let later: Vec<f64>;
         let output_times = if request.output_lead == 0.0 {
@@ -85,7 +86,10 @@ impl LinearLoop {
             )?;
             &later[..]
         };
-        let found = self.simulate(start, &reference, output_times, &input_times, task)?;
+        let requested = RequestedOutput::new(output_times, &input_times, 0.0)?;
+        // In order and from the start on, as the times are that were given.
+        finite("time since the start", &[requested.last()])?;
+        let found = self.serve_increasing(start, &reference, requested, task)?;
         Ok(Response {
             outputs: found.outputs,
             inputs: found.inputs,

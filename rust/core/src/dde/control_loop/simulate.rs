@@ -23,6 +23,9 @@ impl<S: Scalar> LinearLoop<S> {
     }
 
     /// Run until all requested values are stored.
+    ///
+    /// # Errors
+    /// As `serve_increasing`; [`Error::Argument`] also where times are not finite, negative or out of order.
     pub(crate) fn serve(
         &self,
         start: &Start<S>,
@@ -30,7 +33,6 @@ impl<S: Scalar> LinearLoop<S> {
         requested: RequestedOutput<'_, S>,
         task: &Task,
     ) -> Result<Trajectory<S>, Error> {
-        self.check_start(start)?;
         let [output_times, input_times] = requested.times();
         let both = [output_times, input_times];
         let is_one = std::ptr::eq(output_times, input_times);
@@ -48,6 +50,18 @@ impl<S: Scalar> LinearLoop<S> {
                 refuse!("time {} follows {}: sort the times", pair[1], pair[0]);
             }
         }
+        self.serve_increasing(start, reference, requested, task)
+    }
+
+    /// [`Self::serve`] for times that are known to be finite, in order and not before the start.
+    pub(super) fn serve_increasing(
+        &self,
+        start: &Start<S>,
+        reference: &Reference,
+        requested: RequestedOutput<'_, S>,
+        task: &Task,
+    ) -> Result<Trajectory<S>, Error> {
+        self.check_start(start)?;
         match self.sample_time() {
             Some(ts) => sampled::run(self, ts, start, reference, requested, task),
             None => continuous::run(self, start, reference, requested, task),

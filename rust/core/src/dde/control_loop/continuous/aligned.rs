@@ -188,7 +188,9 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
         let mut slopes = (from_state && parts == 1 && self.a[0][0] == 0.0)
             .then(|| Slopes::new(self.k[0] * self.b[0], self.delay, slope(self.command)));
         let is_one = std::ptr::eq(outputs.times(), inputs.times());
-        let mut commands = vec![Polynomial::constant(self.command); parts];
+        // No polynomial of the command is needed where slopes are.
+        let kept_commands = if slopes.is_some() { 0 } else { parts };
+        let mut commands = vec![Polynomial::constant(self.command); kept_commands];
         let mut x = [Polynomial::constant(0.0); N];
         let mut state = self.state;
         let mut slot = 0;
@@ -198,13 +200,14 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
         let mut element = 0;
         while !(outputs.is_done() && inputs.is_done()) {
             watch(element, self.task)?;
-            let t = element as f64 * self.delay / parts as f64;
-            let next = (element + 1) as f64 * self.delay / parts as f64;
+            // The number of parts is a power of two, which no division rounds by.
+            let t = element as f64 * lengths.h;
+            let next = (element + 1) as f64 * lengths.h;
             let end = next - slack(next, self.delay);
-            let w = &commands[slot];
             if let Some(slopes) = &slopes {
                 slopes.integrate(&mut x[0], state[0]);
             } else {
+                let w = &commands[slot];
                 expand(
                     &mut x,
                     &self.a,
@@ -241,6 +244,7 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
                 for (k, x) in self.k.iter().zip(&x) {
                     u.add(*k, x);
                 }
+                let w = &commands[slot];
                 if self.l != 0.0 {
                     u.add(self.l, w);
                 }
@@ -314,6 +318,7 @@ impl<const N: usize> WithSimd for Run<'_, '_, N> {
 
 /// What follows from the length of elements.
 struct Lengths {
+    h: f64,
     /// 1/h.
     inverse: f64,
     /// h/(j + 1).
@@ -326,6 +331,7 @@ impl Lengths {
         let h = delay / parts as f64;
         let factors = std::array::from_fn(|j| h / (j + 1) as f64);
         Self {
+            h,
             inverse: 1.0 / h,
             factors,
         }

@@ -4,8 +4,11 @@
 
 use crate::dde::control_loop::series::{DEGREE, NEGLIGIBLE, TRIMMED};
 
-/// Numbers that are processed together.
-pub(super) const LANES: usize = 8;
+/// Values that are computed together: an element has three or four output times as a rule.
+pub(super) const LANES: usize = 4;
+
+/// Coefficients that are processed together.
+const WIDTH: usize = 8;
 
 /// A state this small throughout its element counts as zero.
 const NOTHING: f64 = 1e-280;
@@ -17,8 +20,8 @@ const PAIRS: usize = DEGREE / 2;
 const LARGEST_OF: usize = 5;
 
 /// Place of the constant in front of the other coefficients, which begin a block.
-const FIRST: usize = LANES - 1;
-const REST: usize = LANES;
+const FIRST: usize = WIDTH - 1;
+const REST: usize = WIDTH;
 
 /// c_0 + c_1 σ + …; c_j stands at `FIRST` + j, so that powers from 1 on fill whole blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +54,7 @@ impl Polynomial {
 
     #[inline(always)]
     pub(super) fn is_constant(&self) -> bool {
-        self.terms[REST..] == [0.0; DEGREE]
+        self.pairs == 0 && self.terms[REST..] == [0.0; DEGREE]
     }
 
     /// Become `first` + Σ_j g_j v_j σ^{j+1}.
@@ -122,14 +125,16 @@ impl Polynomial {
     /// The value at σ = 1.
     #[inline(always)]
     pub(super) fn end(&self) -> f64 {
-        let mut sums = [0.0; LANES];
-        for terms in self.terms[REST..].as_chunks::<LANES>().0.iter().rev() {
+        let blocks = self.terms[REST..].as_chunks::<WIDTH>().0;
+        let mut sums = [0.0; WIDTH];
+        for terms in blocks.iter().rev() {
             for (sum, term) in sums.iter_mut().zip(terms) {
                 *sum += term;
             }
         }
         let [a, b, c, d, e, f, g, h] = sums;
-        self.terms[FIRST] + (((a + e) + (c + g)) + ((b + f) + (d + h)))
+        let [a, b, c, d] = [a + e, b + f, c + g, d + h];
+        self.terms[FIRST] + ((a + c) + (b + d))
     }
 
     /// Values at several σ.

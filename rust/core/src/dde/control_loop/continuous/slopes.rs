@@ -31,7 +31,7 @@ impl Slopes {
         let mut gain = delay;
         for (j, place) in gains.iter_mut().enumerate() {
             *place = gain;
-            gain *= feedback * delay / (j + 2) as f64;
+            gain *= feedback * delay * (1.0 / (j + 2) as f64);
         }
         let mut values = [0.0; ROOM];
         let last = ROOM - DEGREE;
