@@ -157,8 +157,7 @@ fn positive_zeros(c: &Terms, degree: usize) -> Option<(Terms, usize)> {
         }
         let (mut zeros, mut found) = ([0.0; SIZE], 0);
         let mut low = 0.0;
-        for place in 0..=many {
-            let high = if place < many { splits[place] } else { bound };
+        for high in splits.into_iter().take(many).chain([bound]) {
             if let Some(zero) = zero_between(&derivative, degree - order, (low, high)) {
                 *zeros.get_mut(found)? = zero;
                 found += 1;
