@@ -2,10 +2,12 @@
 
 A response may pass through the band, or leave it slowly after the end of the run. It counts as
 settled if it has been inside for three of the slowest time constants of the closed loop,
-1/abs(abscissa). The poles of a loop take much longer to compute than its simulation, so they are
-computed in two cases only: if the response had not decayed to well within the band, or if a pole or
-zero of plant or controller is slow compared with the simulated time. Closed-loop poles are slow
-close to these, or close to the stability limit, where the response oscillates.
+1/abs(abscissa). To ask the poles of a loop takes longer than its simulation, so they are asked in
+two cases only: if the response had not decayed to well within the band, or if a pole or zero of
+plant or controller is slow compared with the simulated time. Closed-loop poles are slow close to
+these, or close to the stability limit, where the response oscillates. Where the simulated time is
+given, a count of the slow poles of a continuous loop is enough; where it is to be found, they are
+computed.
 """
 
 from __future__ import annotations
