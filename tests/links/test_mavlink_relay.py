@@ -21,7 +21,7 @@ LOSS, SAMPLE = 0.05, 0.065
 @pytest.fixture(scope="module")
 def links(tmp_path_factory):
     folder = tmp_path_factory.mktemp("relay")
-    found = json.loads(told_by("arducopter_relay.py", str(folder), timeout=560.0).splitlines()[-1])
+    found = json.loads(told_by("arducopter_relay.py", str(folder), timeout=900.0).splitlines()[-1])
     if any(reasons := [one["irregular"] for one in found]):
         pytest.skip(f"this machine is too busy for a loop in real time: {reasons}")
     return found
