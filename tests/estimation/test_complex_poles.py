@@ -122,14 +122,18 @@ def test_a_command_before_the_first_row_costs_no_accuracy(start):
     square = 0.2 * np.sign(np.sin(2.9 * (time - start) + 1e-9)) * (time >= start)
     output = truth.simulate(time, square, reference_time=time).outputs.ravel()
     command = square - output
-    output = output + 0.005 * np.random.default_rng(5).standard_normal(time.size)
-    data = dtm.Recording(time, square, output, command=command)
-    fit = dtm.estimate_delay(data, truth, free=("delay", "gain", "time_constant"))
-    assert fit.adequate, fit.message
-    assert fit.noise.air < 1e-3
-    assert fit.stderr["time_constant"] < 0.001
-    for name, value in {"delay": 0.05, "time_constant": 0.1, "gain": 1.0}.items():
-        assert holds(fit, name, value), name
+    names = {"delay": 0.05, "time_constant": 0.1, "gain": 1.0}
+    fits = []
+    for seed in range(10):
+        noise = 0.005 * np.random.default_rng(seed).standard_normal(time.size)
+        data = dtm.Recording(time, square, output + noise, command=command)
+        fits.append(dtm.estimate_delay(data, truth, free=("delay", "gain", "time_constant")))
+    assert np.median([fit.noise.air for fit in fits]) < 1e-3
+    assert np.median([fit.stderr["time_constant"] for fit in fits]) < 0.001
+    # One in twenty is doubted, and one interval in twenty misses: three of ten do so in 1 %.
+    assert sum(fit.adequate for fit in fits) >= 8
+    for name, value in names.items():
+        assert sum(holds(fit, name, value) for fit in fits) >= 8, name
 
 
 def test_a_plan_knows_the_numbers_of_any_plant():

@@ -76,6 +76,7 @@ ORDER = {
         "kicks",
         "mean",
         "likelihood",
+        "waves",
         "over_delays",
         "quotients",
         "search",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from browser import check_page
 from deadtime._base.digits import between, rounded, shown, stated
-from deadtime.reports.latencies._axes import doubted_by_axes
+from deadtime.reports.latencies._contradictions import doubted_by_others
 from deadtime.reports.latencies._filters import notch, one_pole, poles_in_row, two_poles
 from deadtime.reports.latencies._live import around_the_vehicle
 from deadtime.reports.latencies._relation import relation_of
@@ -146,18 +146,38 @@ def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_adequate(found):
     assert around_the_vehicle([doubted, found.loop("roll rate")]) is None
 
 
-def test_north_and_east_that_contradict_each_other_are_not_adequate(found):
-    """In gusts, 10 s fit best with 0.13 s to the north, and 20 s with 3.3 s to the east."""
+def test_north_and_east_that_contradict_each_other_are_not_adequate(found, tmp_path):
+    one = found.loop("roll rate", "actuator")
+    slow = dtm.latency(log_of(tmp_path, delay=8 * DELAY)).loop("roll rate", "actuator")
+    alike = [replace(one, axis=axis) for axis in ("north", "east")]
+    assert all(one.estimate.adequate for one in doubted_by_others(alike))
+    apart = [replace(one, axis="north"), replace(slow, axis="east")]
+    assert slow.estimate.adequate
+    for doubtful in doubted_by_others(apart):
+        assert not doubtful.estimate.adequate
+        assert "contradict each other" in doubtful.estimate.message
+    assert all(one.estimate.adequate for one in doubted_by_others([one, slow]))
+
+
+def test_a_setpoint_that_waits_longer_than_the_actuator_takes_is_not_adequate(found, tmp_path):
+    one = found.loop("roll rate", "actuator")
+    slow = dtm.latency(log_of(tmp_path, delay=8 * DELAY)).loop("roll rate", "actuator")
+    waits = replace(slow, command="setpoint")
+    doubtful, actuator = doubted_by_others([waits, one])
+    assert "it would wait" in doubtful.estimate.message
+    assert not doubtful.estimate.adequate
+    assert actuator.estimate.adequate
+    for others in ([replace(one, command="setpoint"), one], [waits, replace(one, loop="yaw rate")]):
+        assert all(one.estimate.adequate for one in doubted_by_others(others))
+
+
+def test_the_wait_of_a_real_position_loop_is_doubted():
+    """In gusts, 20 s fit best with a wait of 2.4 s, where the actuator takes 1.7 s at most."""
     flight = dtm.latency(
         flight_path("arducopter_2014-10-18_21-19-07.bin"), loops=["north position", "east position"]
     )
-    for axis in ("north", "east"):
-        estimate = flight.loop(f"{axis} position").estimate
-        assert not estimate.adequate
-        assert "contradict each other" in estimate.message
-    one = found.loop("roll rate", "actuator")
-    alike = [replace(one, axis=axis) for axis in ("north", "east")]
-    assert all(one.estimate.adequate for one in doubted_by_axes(alike))
+    assert "it would wait" in flight.loop("east position").estimate.message
+    assert not any(one.estimate.adequate for one in flight.estimated if one.command == "setpoint")
 
 
 def test_without_excitation_every_loop_is_refused_by_name(tmp_path):

@@ -13,6 +13,8 @@ use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
+type Array = Py<PyArray1<f64>>;
+
 /// The rows of one recording.
 #[derive(FromPyObject)]
 struct RecordedRows<'py> {
@@ -197,11 +199,11 @@ pub(crate) struct RowLikelihood {
     freedom: usize,
     gain: f64,
     linear: Vec<f64>,
-    inverse: Py<PyArray1<f64>>,
-    score: Py<PyArray1<f64>>,
-    whitened: Py<PyArray1<f64>>,
-    residuals: Py<PyArray1<f64>>,
-    rate: Py<PyArray1<f64>>,
+    inverse: Array,
+    score: Array,
+    whitened: Array,
+    residuals: Array,
+    rate: Array,
 }
 
 impl RowLikelihood {
@@ -283,6 +285,22 @@ impl FlightLikelihood {
             .into_iter()
             .map(|one| RowLikelihood::new(py, one))
             .collect())
+    }
+
+    /// What waves of the delay over the commands do to the rows of one recording: R of Q R, row-major, the
+    /// residuals along Q, and their sum of squares.
+    fn waves(
+        &self,
+        py: Python<'_>,
+        run: usize,
+        numbers: &PlantNumbers,
+        each: Floats<'_>,
+    ) -> PyResult<(Array, Array, usize)> {
+        let point = numbers.fit().point;
+        let each = owned(&each)?;
+        let found = run_here(py, |task| self.model.waves(run, &point, &each, task))?;
+        let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
+        Ok((array(found.factor), array(found.along), found.freedom))
     }
 
     /// −2 ln L of all recordings.

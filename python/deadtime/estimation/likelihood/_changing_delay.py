@@ -1,51 +1,53 @@
 """Whether the delay is the same over the window.
 
-A command that comes later than the fitted delay says moves the output later. The score test (Rao
-1948) takes delays that change over the window, u from 0 to 1, as
+A command that comes later than the fitted delay says moves the output later. Beside the fitted
+model, the delays of the commands are taken to wander around it: with a standard deviation and a
+correlation time of their own, from a small part of the window, as in a busy network, to the whole
+of it, as in a drift. To first order, the rows then have the noise of the fit and a further Gaussian
+part: the change of the rows by these delays, less what the fitted numbers follow. The ratio of its
+likelihood (Patterson & Thompson 1971) with the likeliest such delays and with none is the test.
 
-    delay + c1 cos(π u) + c2 cos(2 π u):
-
-of the whitened change of the rows by c1 and c2 it takes what the fitted numbers do not follow, and
-holds the whitened residuals against that. Without a change the squared length of that projection is
-chi-squared with two degrees of freedom. Where air or scattered times were fitted, they may stand
-for the change: there the likelihood ratio of a fit of both counts, or of a change without air where
-it is clearly likelier than a constant delay with them: each has about two numbers. A drift and a
-slow wandering show here more often than in the cumulated score of the delay (Nyblom 1989), which is
-for a change at any one time.
+Air, scattered times or a coloured sensor may stand for the change where they were fitted. There the
+delays also wander beside a fit without these, which has to be about as likely.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit, changed, with_noise
 from deadtime.estimation.likelihood._start import is_long
 
 Array = NDArray[np.float64]
 
-#: Periods of the changes, in half windows.
-WAVES = (1, 2)
+#: Delays that wander are sums of so many waves, with 1, 2, ... half periods in the window.
+WAVES = 12
 
-#: Step of difference quotients, in rows.
-STEP = 1e-3
+#: Correlation times of the delays, as shares of the window.
+CORRELATION_TIMES = np.array([1 / 16, 1 / 8, 1 / 4, 1.0])
 
-#: Share of the time between two commands by which they may come closer.
-CLOSER = 0.9
+#: Variance that the delays add to the rows along what shows best, in white variances.
+ADDED = np.geomspace(0.3, 3e5, 25)
 
-#: Rise of -2 ln L by which a changing delay without air has to be likelier than a constant one in
-#: air or with scattered times. 1 % of flights in weak air have more, and 2 % of those with jitter.
-CLEARLY = 6.0
+#: Share of what shows best below which a sum of waves does not show.
+SHOWS = 1e-9
 
-#: Share of a change that the fitted numbers have to leave.
-LEFT = 1e-3
+#: How much less likely, in −2 ln L, than a fit with air, scattered times or a coloured sensor one
+#: without these and with delays that wander may be. In air of 0.002 m/s/√s, 1 in 200 flights with a
+#: constant delay is doubted more than at 0, and of flights with a wandering one 1 in 100.
+AS_LIKELY = 1.0
+
+#: Share of recordings with a constant delay whose statistic is above a chi-square of one degree of
+#: freedom, in which a variance at its bound has a part of one half (Self & Liang 1987), and less
+#: where few rows tell. A statistic above DRAWN is held against so many drawn ones.
+SOME, DRAWN, DRAWS = 0.3, 2.0, 4000
 
 
 class DelayChange(NamedTuple):
@@ -75,110 +77,113 @@ def delay_change(fit: NoiseFit, run: int) -> DelayChange:
     jumps = np.diff(rows.command, prepend=rows.command[0])
     if "delay" not in fit.model.names or not np.any(jumps):
         return NONE_SEEN
-    square, delays = _scored(fit, run)
+    found = _wandering(fit, run)
     own = fit.numbers.noise[run]
-    if max(own.air, own.stamps, own.arrivals) > 0.0 and not is_long(fit.runs):
-        quiet = list(fit.numbers.noise)
-        quiet[run] = changed(own, air=0.0, stamps=0.0, arrivals=0.0)
-        calm = fit.moved(fit.likelihood.fit(with_noise(fit.with_gain, quiet), ROUGH, noise=False))
-        beside = fit
-        for start in (calm, None):
-            one = start or beside
-            if not math.isfinite(one.gain):  # the rows do not tell it there
-                continue
-            later = _later(beside, run, _scored(one, run)[1], (fit.numbers.noise, quiet))
-            if not math.isfinite(later.gain):
-                continue
-            beside = later
-            rise = fit.numbers.objective - beside.numbers.objective
-            if rise > CLEARLY and beside.numbers.noise[run].air == 0.0:
-                rise = math.inf
-            if rise > square:
-                square, delays = rise, _times(beside, run) - _times(fit, run)
+    quiet = changed(own, air=0.0, sensor=0.0, stamps=0.0, arrivals=0.0)
+    if max(own.air, own.sensor, own.stamps, own.arrivals) > 0.0 and not is_long(fit.runs):
+        noises = [*fit.numbers.noise[:run], quiet, *fit.numbers.noise[run + 1 :]]
+        calm = fit.moved(fit.likelihood.fit(with_noise(fit.with_gain, noises), ROUGH, noise=False))
+        if math.isfinite(calm.gain):  # else the rows do not tell it there
+            beside = _wandering(calm, run)
+            less_likely = calm.numbers.objective - beside.fall - fit.numbers.objective
+            if less_likely < AS_LIKELY and beside.fall > found.fall:
+                found = beside
+    if found.fall <= 0.0:
+        return NONE_SEEN
+    delays = found.delays() @ _waves(rows)
     weights = jumps**2 / np.sum(jumps**2)
-    spread = math.sqrt(float(weights @ (delays - weights @ delays) ** 2))
-    return DelayChange(float(special.chdtrc(len(WAVES), max(square, 0.0))), spread)
+    return DelayChange(
+        _above(found.drawn(), found.fall)
+        if found.fall > DRAWN
+        else SOME * float(special.chdtrc(1, found.fall)),
+        math.sqrt(float(weights @ (delays - weights @ delays) ** 2)),
+    )
 
 
-def _times(fit: NoiseFit, run: int) -> Array:
-    return fit.runs[run].command_time
+def _above(drawn: Array, value: float) -> float:
+    """Probability of such a value among drawn ones (Dufour 2006)."""
+    return (1.0 + float(np.sum(drawn >= value))) / (drawn.size + 1.0)
 
 
-def _later(
-    fit: NoiseFit, run: int, delays: Array, noises: Sequence[Sequence[RowNoise]]
-) -> NoiseFit:
-    """The likeliest numbers and noise with commands that are later by these times."""
-    rows = fit.runs[run]
-    runs = list(fit.runs)
-    runs[run] = _with_later(rows, delays)
-    moved = replace(fit, runs=tuple(runs))
-    found = [moved.likelihood.fit(with_noise(fit.with_gain, noise), ROUGH) for noise in noises]
-    return moved.moved(min(found, key=lambda numbers: numbers.objective))
+@dataclass(frozen=True)
+class _Wandering:
+    """Delays that wander beside a fit.
+
+    Attributes
+    ----------
+    left, shown, right : ndarray
+        Of every correlation time, the waves in their sizes by singular values, in white deviations.
+    sizes : ndarray
+        Of every correlation time, the standard deviations of the waves.
+    along : ndarray
+        The residuals along the waves.
+    freedom : int
+        Sum of squares of all residuals.
+    """
+
+    left: Array
+    shown: Array
+    right: Array
+    sizes: Array
+    along: Array
+    freedom: int
+
+    @cached_property
+    def added(self) -> Array:
+        """Variances by correlation time, size, and direction."""
+        largest = np.maximum(self.shown[:, :1], np.finfo(float).tiny)
+        return ADDED[:, None] * (self.shown / largest)[:, None, :] ** 2
+
+    def falls(self, along: Array) -> Array:
+        """By how much −2 ln L falls, by correlation time, recording, and size."""
+        share = np.swapaxes(self.added / (1.0 + self.added), 1, 2)
+        explained = (along @ self.left) ** 2 @ share / self.freedom
+        large = np.sum(np.log1p(self.added), axis=2)
+        return np.asarray(-self.freedom * np.log1p(-explained) - large[:, None, :])
+
+    @cached_property
+    def place(self) -> tuple[int, int]:
+        """Correlation time and size of the likeliest."""
+        falls = self.falls(self.along[None, :])[:, 0, :]
+        time, size = np.unravel_index(int(np.argmax(falls)), falls.shape)
+        return int(time), int(size)
+
+    @cached_property
+    def fall(self) -> float:
+        """By how much −2 ln L falls with the likeliest; zero where none shows."""
+        time, size = self.place
+        return float(self.falls(self.along[None, :])[time, 0, size]) if np.any(self.shown) else 0.0
+
+    def delays(self) -> Array:
+        """The likeliest delays, as sizes of the waves, s."""
+        time, size = self.place
+        shown, added = self.shown[time], self.added[time, size]
+        seen = shown > SHOWS * shown[0]
+        parts = (self.along @ self.left[time])[seen] / shown[seen]
+        parts *= (added / (1.0 + added))[seen]
+        return np.asarray(self.sizes[time] * (parts @ self.right[time, seen]))
+
+    def drawn(self) -> Array:
+        """Such a fall in recordings with a constant delay."""
+        random = np.random.default_rng(0)
+        along = random.standard_normal((DRAWS, WAVES))
+        rest = random.chisquare(max(self.freedom - WAVES, 1), DRAWS)
+        along *= np.sqrt(self.freedom / (np.sum(along**2, axis=1) + rest))[:, None]
+        return np.asarray(np.max(self.falls(along), axis=(0, 2)))
 
 
-def _scored(fit: NoiseFit, run: int) -> tuple[float, Array]:
-    """The statistic for the noise of the fit, and the likeliest change at each command, s."""
-    rows, one = fit.runs[run], fit.with_gain
-    shapes = _shapes(rows)
-    numbers = PlantNumbers(one.delay, one.lags, [one.noise[run]], fit.gain, one.zero)
-    step = STEP * rows.row_time
-    mean = _residuals(fit, rows, numbers)
-    changes = [_with_later(rows, step * shape) for shape in shapes]
-    columns = [(mean - _residuals(fit, one, numbers)) / step for one in changes]
-    others = [(mean - _residuals(fit, rows, one)) / step for one in _neighbours(fit, numbers, step)]
-    own, followed = (_whitened(fit, rows, numbers, some) for some in (columns, others))
-    basis = np.linalg.qr(followed)[0]
-    left = own - basis @ (basis.T @ own)
-    seen = np.linalg.norm(left, axis=0) > LEFT * np.linalg.norm(own, axis=0)
-    if not np.any(seen):
-        return 0.0, np.zeros(rows.command_time.size)
-    basis, factor = np.linalg.qr(left[:, seen])
-    part = fit.parts[run]
-    along = basis.T @ part.whitened
-    size = math.sqrt(part.variance)
-    return float(along @ along), size * np.linalg.lstsq(factor, along)[0] @ shapes[seen]
+def _wandering(fit: NoiseFit, run: int) -> _Wandering:
+    factor, along, freedom = fit.likelihood.waves(run, fit.with_gain, _waves(fit.runs[run]))
+    # Variances of the waves of a first-order noise; those of each correlation time add to one.
+    phase = np.pi * np.outer(CORRELATION_TIMES, np.arange(1, WAVES + 1))
+    variances = 1.0 / (1.0 + phase**2)
+    sizes = np.sqrt(variances / np.sum(variances, axis=1, keepdims=True))
+    left, shown, right = np.linalg.svd(factor.reshape(WAVES, WAVES) * sizes[:, None, :])
+    return _Wandering(left, shown, right, sizes, along, freedom)
 
 
-def _with_later(rows: FlightRows, delays: Array) -> FlightRows:
-    """The rows with commands that are later by these times, as far as they keep their order."""
-    closer = -np.diff(delays) / np.diff(rows.command_time)
-    share = min(1.0, CLOSER / max(float(np.max(closer, initial=0.0)), CLOSER))
-    return rows._replace(command_time=rows.command_time + share * delays)
-
-
-def _shapes(rows: FlightRows) -> Array:
-    """The changes of the delay at each command, shape (2, n)."""
+def _waves(rows: FlightRows) -> Array:
+    """The waves of the delay, each at every command, shape (WAVES, n)."""
     since = rows.command_time - rows.time[0]
     share = np.clip(since / (rows.time[-1] - rows.time[0]), 0.0, 1.0)
-    return np.cos(np.pi * np.outer(WAVES, share))
-
-
-def _neighbours(fit: NoiseFit, numbers: PlantNumbers, step: float) -> Iterator[PlantNumbers]:
-    """The numbers with each time that is fitted larger by a step."""
-    one, lags = numbers, numbers.lags
-
-    def at(delay: float, lags: Sequence[float], zero: float) -> PlantNumbers:
-        return PlantNumbers(delay, lags, one.noise, one.gain, zero)
-
-    yield at(one.delay + step, lags, one.zero)
-    for place, free in enumerate(fit.model.free_lags):
-        if free:
-            longer = [lag + step * (i == place) for i, lag in enumerate(lags)]
-            yield at(one.delay, longer, one.zero)
-    if "zero" in fit.model.names:
-        yield at(one.delay, lags, one.zero + step)
-
-
-def _residuals(fit: NoiseFit, rows: FlightRows, numbers: PlantNumbers) -> Array:
-    return fit.model.likelihood([rows], fit.trim).at(0, numbers).residuals
-
-
-def _whitened(
-    fit: NoiseFit, rows: FlightRows, numbers: PlantNumbers, columns: Sequence[Array]
-) -> Array:
-    """Columns of the rows, whitened, less what gain, offset and trim follow; shape (n, k)."""
-    found = []
-    for column in columns:
-        part = fit.model.likelihood([rows._replace(output=column)], fit.trim).at(0, numbers)
-        found.append(part.whitened * math.sqrt(part.variance))
-    return np.stack(found, axis=1)
+    return np.cos(np.pi * np.outer(np.arange(1, WAVES + 1), share))

@@ -18,8 +18,8 @@ from deadtime._base.progress import Stages, stage_report
 from deadtime.estimation import SharedNumber, shared_number
 from deadtime.recordings import Log, LogLoop, Recording, open_log
 from deadtime.recordings.logs import Link
-from deadtime.reports.latencies._axes import doubted_by_axes
 from deadtime.reports.latencies._budget import Stage, stages_of
+from deadtime.reports.latencies._contradictions import doubted_by_others
 from deadtime.reports.latencies._controller import (
     Command,
     between_rows,
@@ -281,7 +281,7 @@ def latency(
         log = open_log(log)
     chosen = _chosen(log, axes, loops)
     wanted = [(loop, one) for loop in chosen for one in _commands(loop)]
-    found = doubted_by_axes(_all_told(log, wanted, report))
+    found = doubted_by_others(_all_told(log, wanted, report))
     filters = filters_of(log)
     stages = {loop.name: stages_of(log, loop.name, found, filters) for loop in chosen}
     vehicle = " ".join(one for one in (log.autopilot, log.vehicle, log.firmware) if one)

@@ -9,6 +9,7 @@ use super::quotients::{Function, Slack, Value, Variable};
 use super::rows::Rows;
 use super::search::minimise;
 use super::variables::{Free, SHORTEST_LAG, Slot, Variables, mean_slots, put};
+use super::waves::{Waves, waves};
 use crate::{Error, Task};
 
 /// Rise of the objective by a row of negative delay.
@@ -159,6 +160,26 @@ impl Model {
         let noises: Vec<Through> = noises.iter().map(|one| one.through(&values)).collect();
         let wanted = Wanted::Covariance;
         evaluations(rows, &self.plant, &values, &noises, &by, wanted, task)
+    }
+
+    /// What delays that change by waves over the commands do to the rows of one recording; each wave has a
+    /// value in s for each command, one wave after the other.
+    ///
+    /// # Errors
+    ///
+    /// As for `at`, and for waves that do not have a finite value for each command.
+    pub fn waves(
+        &self,
+        run: usize,
+        point: &Point,
+        each: &[f64],
+        task: &Task,
+    ) -> Result<Waves, Error> {
+        self.check(point)?;
+        let (values, by) = self.mean(point, None);
+        let (rows, noise) = self.recorded(run, point)?;
+        let through = noise.through(&values);
+        waves(rows, &self.plant, &values, &through, &by, each, task)
     }
 
     /// The rows of a recording and its noise.

@@ -19,9 +19,9 @@ use super::mean::{Derivatives, Gain, Mean, Values, sizes};
 use super::noises::{One, Shared, triangles};
 use super::orthogonal::Triangle;
 use super::path::dot;
-use super::plant::Plant;
+use super::plant::{Plant, PlantSpace};
 use super::rows::Rows;
-use super::whiten::{Known, whiten_in_place};
+use super::whiten::{Kick, Known, whiten_in_place};
 use crate::{Error, Task, memory};
 
 /// Smallest sum of squares, as a share of that of the output: below is rounding.
@@ -120,6 +120,55 @@ impl Through {
     }
 }
 
+/// What makes noise that is not white alone white.
+pub(super) struct Whitening<'a> {
+    rows: &'a Rows,
+    variances: Vec<f64>,
+    joint: Joint,
+    kicks: Vec<Kick>,
+}
+
+impl<'a> Whitening<'a> {
+    /// None where the noise is white alone.
+    pub(super) fn new(
+        rows: &'a Rows,
+        plant: &Plant,
+        space: &PlantSpace,
+        values: &Values,
+        through: &Through,
+    ) -> Result<Option<Self>, Error> {
+        let noise = through.noise;
+        let scatter = noise.arrivals.hypot(noise.stamps);
+        let kicks = kicks(rows, space, values.delay, scatter, noise.sensor.hypot(1.0))?;
+        let variances = noise.variances(rows)?;
+        if noise.disturbances().is_empty() && kicks.is_empty() && variances.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Self {
+            rows,
+            variances,
+            joint: through.joint(plant)?,
+            kicks,
+        }))
+    }
+
+    /// Whiten columns in place. Returns ln det V.
+    pub(super) fn whiten(&self, columns: &mut [f64], task: &Task) -> Result<f64, Error> {
+        let known = Known {
+            used: &self.rows.used,
+            variances: &self.variances,
+        };
+        whiten_in_place(
+            &self.rows.time,
+            known,
+            columns,
+            &self.joint,
+            &self.kicks,
+            task,
+        )
+    }
+}
+
 /// The likelihood at one set of numbers, and the best linear unknowns there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
@@ -189,7 +238,7 @@ pub(super) struct Counts {
 
 impl Counts {
     /// The rows and unknowns of a mean, whose columns are cleared in rows that are not used.
-    fn of(rows: &Rows, mean: &mut Mean, values: &Values, count: usize) -> Self {
+    pub(super) fn of(rows: &Rows, mean: &mut Mean, values: &Values, count: usize) -> Self {
         let n = rows.time.len();
         let used = rows.used.iter().filter(|used| **used).count();
         if used < n {
@@ -336,7 +385,7 @@ pub(super) fn evaluations(
 }
 
 /// An error unless there are more rows than unknowns.
-fn check_count(rows: &Rows, values: &Values, by: &Derivatives) -> Result<(), Error> {
+pub(super) fn check_count(rows: &Rows, values: &Values, by: &Derivatives) -> Result<(), Error> {
     let used = rows.used.iter().filter(|used| **used).count();
     let (_, count) = sizes(rows, values, by);
     refuse_if!(
@@ -356,7 +405,6 @@ pub(super) fn evaluate(
     wanted: Wanted,
     task: &Task,
 ) -> Result<Evaluation, Error> {
-    let noise = through.noise;
     let n = rows.time.len();
     check_count(rows, values, by)?;
     let none = Derivatives::none();
@@ -373,34 +421,15 @@ pub(super) fn evaluate(
     }
     let counts = Counts::of(rows, &mut mean, values, count);
     let first = counts.first;
-    let kicks = kicks(
-        rows,
-        &space,
-        values.delay,
-        noise.arrivals.hypot(noise.stamps),
-        noise.sensor.hypot(1.0),
-    )?;
-    let variances = noise.variances(rows)?;
     let mut log_det = 0.0;
     let mut log_gram = 0.0;
-    let is_white = noise.disturbances().is_empty() && kicks.is_empty() && variances.is_empty();
-    if !is_white {
+    let whitening = Whitening::new(rows, plant, &space, values, through)?;
+    if let Some(whitening) = &whitening {
         log_gram = -Triangle::new(&mean.columns, n, first, task)?.log_det(first);
-        let joint = through.joint(plant)?;
-        log_det = whiten_in_place(
-            &rows.time,
-            Known {
-                used: &rows.used,
-                variances: &variances,
-            },
-            &mut mean.columns,
-            &joint,
-            &kicks,
-            task,
-        )?;
+        log_det = whitening.whiten(&mut mean.columns, task)?;
     }
     let triangle = Triangle::new(&mean.columns, n, all, task)?;
-    if !is_white {
+    if whitening.is_some() {
         log_gram += triangle.log_det(first);
     }
     let mut found = counts.evaluation(&triangle, values.gain, (log_det, log_gram), wanted)?;
@@ -457,7 +486,7 @@ fn subtract(from: &mut [f64], factors: &[f64], columns: &[f64]) {
     }
 }
 
-fn clear(column: &mut [f64], used: &[bool]) {
+pub(super) fn clear(column: &mut [f64], used: &[bool]) {
     for (entry, used) in column.iter_mut().zip(used) {
         if !used {
             *entry = 0.0;

@@ -32,6 +32,7 @@ mod steps;
 #[cfg(test)]
 mod tests;
 mod variables;
+mod waves;
 mod whiten;
 
 pub use disturbance::{Disturbance, Entry};
@@ -44,4 +45,5 @@ pub use point::{Point, Quantity, Timing};
 pub use profile::Limits;
 pub use rows::{Commands, Rows};
 pub use variables::Free;
+pub use waves::Waves;
 pub use whiten::whiten;
