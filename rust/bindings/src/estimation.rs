@@ -287,18 +287,17 @@ impl FlightLikelihood {
             .collect())
     }
 
-    /// What waves of the delay over the commands do to the rows of one recording: R of Q R, row-major, the
-    /// residuals along Q, and their sum of squares.
+    /// What so many waves of the delay over the commands do to the rows of one recording: R of Q R,
+    /// row-major, the residuals along Q, and the sum of squares of all.
     fn waves(
         &self,
         py: Python<'_>,
         run: usize,
         numbers: &PlantNumbers,
-        each: Floats<'_>,
+        number: usize,
     ) -> PyResult<(Array, Array, usize)> {
         let point = numbers.fit().point;
-        let each = owned(&each)?;
-        let found = run_here(py, |task| self.model.waves(run, &point, &each, task))?;
+        let found = run_here(py, |task| self.model.waves(run, &point, number, task))?;
         let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
         Ok((array(found.factor), array(found.along), found.freedom))
     }

@@ -173,7 +173,7 @@ class _Wandering:
 
 
 def _wandering(fit: NoiseFit, run: int) -> _Wandering:
-    factor, along, freedom = fit.likelihood.waves(run, fit.with_gain, _waves(fit.runs[run]))
+    factor, along, freedom = fit.likelihood.waves(run, fit.with_gain, WAVES)
     # Variances of the waves of a first-order noise; those of each correlation time add to one.
     phase = np.pi * np.outer(CORRELATION_TIMES, np.arange(1, WAVES + 1))
     variances = 1.0 / (1.0 + phase**2)

@@ -162,24 +162,23 @@ impl Model {
         evaluations(rows, &self.plant, &values, &noises, &by, wanted, task)
     }
 
-    /// What delays that change by waves over the commands do to the rows of one recording; each wave has a
-    /// value in s for each command, one wave after the other.
+    /// What delays that change by so many waves over the commands do to the rows of one recording.
     ///
     /// # Errors
     ///
-    /// As for `at`, and for waves that do not have a finite value for each command.
+    /// As for `at`.
     pub fn waves(
         &self,
         run: usize,
         point: &Point,
-        each: &[f64],
+        number: usize,
         task: &Task,
     ) -> Result<Waves, Error> {
         self.check(point)?;
         let (values, by) = self.mean(point, None);
         let (rows, noise) = self.recorded(run, point)?;
         let through = noise.through(&values);
-        waves(rows, &self.plant, &values, &through, &by, each, task)
+        waves(rows, &self.plant, &values, &through, &by, number, task)
     }
 
     /// The rows of a recording and its noise.

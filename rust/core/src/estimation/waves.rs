@@ -1,8 +1,11 @@
 //! What delays that change from command to command do to the rows.
 //!
 //! To first order, a command that comes later by w s moves the output as its jump times −w would move
-//! the slope of the response. Delays that are a sum of waves over the commands therefore add a column
-//! for each wave, which is whitened as the rows are; what the unknowns of the mean follow is taken off.
+//! the slope of the response. Delays that are a sum of waves over the commands, with 1, 2, ... half
+//! periods from the first row to the last, therefore add a column for each wave, which is whitened as
+//! the rows are; what the unknowns of the mean follow is taken off.
+
+use std::f64::consts::PI;
 
 use super::likelihood::{Counts, Through, Whitening, check_count, clear};
 use super::mean::{Derivatives, Gain, Mean, Values, base_of, sizes};
@@ -30,26 +33,17 @@ pub struct Waves {
     pub freedom: usize,
 }
 
-/// These waves, each with a value in s for each command, one wave after the other.
+/// So many waves, each of 1 s.
 pub(super) fn waves(
     rows: &Rows,
     plant: &Plant,
     values: &Values,
     through: &Through,
     by: &Derivatives,
-    waves: &[f64],
+    number: usize,
     task: &Task,
 ) -> Result<Waves, Error> {
-    let (n, commands) = (rows.time.len(), rows.commands.time.len());
-    let number = waves.len() / commands;
-    refuse_if!(
-        waves.len() != number * commands,
-        "{} values of waves for {commands} commands: give one of each wave for each command",
-        waves.len()
-    );
-    if let Some(value) = waves.iter().find(|value| !value.is_finite()) {
-        refuse!("a wave has the value {value}: give finite numbers");
-    }
+    let n = rows.time.len();
     check_count(rows, values, by)?;
     let (_, count) = sizes(rows, values, by);
     let space = plant.space(&values.lags, values.zero);
@@ -58,12 +52,15 @@ pub(super) fn waves(
     // The columns of the mean, of the waves, and of the output.
     let end = count * n;
     let output = memory::copied(WHAT, &mean.columns[end..])?;
-    let mut columns = mean.columns;
-    columns.truncate(end);
-    let own = later(rows, plant, &space, values.delay, waves, task)?;
-    memory::append(WHAT, &mut columns, &own)?;
+    let mut columns = memory::reserved(WHAT, (count + number + 1).saturating_mul(n))?;
+    memory::append(WHAT, &mut columns, &mean.columns[..end])?;
+    drop(mean);
+    for wave in 1..=number {
+        let own = later(rows, plant, &space, values.delay, wave, task)?;
+        memory::append(WHAT, &mut columns, &own)?;
+    }
     memory::append(WHAT, &mut columns, &output)?;
-    drop((own, output));
+    drop(output);
     if let Some(whitening) = Whitening::new(rows, plant, &space, values, through)? {
         whitening.whiten(&mut columns, task)?;
     }
@@ -97,36 +94,38 @@ pub(super) fn waves(
     })
 }
 
-/// The change of the output of a plant of unit gain by each of the waves; zero in rows not used.
+/// The change of the output of a plant of unit gain by a wave; zero in rows not used.
 fn later(
     rows: &Rows,
     plant: &Plant,
     space: &PlantSpace,
     delay: f64,
-    waves: &[f64],
+    wave: usize,
     task: &Task,
 ) -> Result<Vec<f64>, Error> {
-    let (n, commands) = (rows.time.len(), &rows.commands);
-    let size = commands.time.len();
-    let mut found = memory::filled(WHAT, 0.0, (waves.len() / size).saturating_mul(n))?;
-    let mut response = memory::filled(WHAT, 0.0, n)?;
-    let mut moved = memory::filled(WHAT, 0.0, size)?;
-    for (wave, change) in waves.chunks_exact(size).zip(found.chunks_exact_mut(n)) {
-        let (mut before, mut sum) = (base_of(plant, rows), 0.0);
-        for ((moved, wave), value) in moved.iter_mut().zip(wave).zip(&commands.value) {
-            sum -= wave * (value - before);
+    let commands = &rows.commands;
+    let mut response = memory::filled(WHAT, 0.0, rows.time.len())?;
+    let mut change = memory::filled(WHAT, 0.0, rows.time.len())?;
+    let (mut before, mut sum) = (base_of(plant, rows), 0.0);
+    let moved = commands
+        .time
+        .iter()
+        .zip(&commands.value)
+        .map(|(time, value)| {
+            let share = ((time - rows.time[0]) / rows.span()).clamp(0.0, 1.0);
+            sum -= (PI * wave as f64 * share).cos() * (value - before);
             before = *value;
-            *moved = sum;
-        }
-        let held = Held {
-            time: &commands.time,
-            value: &moved,
-        };
-        let (out, slope) = (response.as_mut_slice(), Some(&mut *change));
-        respond([space], held, delay, &rows.time, [out], slope, task)?;
-        clear(change, &rows.used);
-    }
-    Ok(found)
+            sum
+        });
+    let moved = memory::collected(WHAT, moved)?;
+    let held = Held {
+        time: &commands.time,
+        value: &moved,
+    };
+    let (out, slope) = (response.as_mut_slice(), Some(change.as_mut_slice()));
+    respond([space], held, delay, &rows.time, [out], slope, task)?;
+    clear(&mut change, &rows.used);
+    Ok(change)
 }
 
 #[cfg(test)]
