@@ -27,8 +27,9 @@ from deadtime.estimation.likelihood._start import is_long
 
 Array = NDArray[np.float64]
 
-#: Delays that wander are sums of so many waves, with 1, 2, ... half periods in the window.
-WAVES = 12
+#: Delays that wander are sums of so many waves at most, with 1, 2, ... half periods in the window,
+#: one for so many rows.
+WAVES, ROWS = 12, 3
 
 #: Correlation times of the delays, as shares of the window.
 CORRELATION_TIMES = np.array([1 / 16, 1 / 8, 1 / 4, 1.0])
@@ -75,7 +76,7 @@ def delay_change(fit: NoiseFit, run: int) -> DelayChange:
 
     rows = fit.runs[run]
     jumps = np.diff(rows.command, prepend=rows.command[0])
-    if "delay" not in fit.model.names or not np.any(jumps):
+    if "delay" not in fit.model.names or not np.any(jumps) or _number(rows) == 0:
         return NONE_SEEN
     found = _wandering(fit, run)
     own = fit.numbers.noise[run]
@@ -166,24 +167,30 @@ class _Wandering:
     def drawn(self) -> Array:
         """Such a fall in recordings with a constant delay."""
         random = np.random.default_rng(0)
-        along = random.standard_normal((DRAWS, WAVES))
-        rest = random.chisquare(max(self.freedom - WAVES, 1), DRAWS)
+        along = random.standard_normal((DRAWS, self.along.size))
+        rest = random.chisquare(max(self.freedom - self.along.size, 1), DRAWS)
         along *= np.sqrt(self.freedom / (np.sum(along**2, axis=1) + rest))[:, None]
         return np.asarray(np.max(self.falls(along), axis=(0, 2)))
 
 
 def _wandering(fit: NoiseFit, run: int) -> _Wandering:
-    factor, along, freedom = fit.likelihood.waves(run, fit.with_gain, WAVES)
+    number = _number(fit.runs[run])
+    factor, along, freedom = fit.likelihood.waves(run, fit.with_gain, number)
     # Variances of the waves of a first-order noise; those of each correlation time add to one.
-    phase = np.pi * np.outer(CORRELATION_TIMES, np.arange(1, WAVES + 1))
+    phase = np.pi * np.outer(CORRELATION_TIMES, np.arange(1, number + 1))
     variances = 1.0 / (1.0 + phase**2)
     sizes = np.sqrt(variances / np.sum(variances, axis=1, keepdims=True))
-    left, shown, right = np.linalg.svd(factor.reshape(WAVES, WAVES) * sizes[:, None, :])
+    left, shown, right = np.linalg.svd(factor.reshape(number, number) * sizes[:, None, :])
     return _Wandering(left, shown, right, sizes, along, freedom)
 
 
+def _number(rows: FlightRows) -> int:
+    """How many waves these rows can tell."""
+    return min(WAVES, int(np.sum(rows.used)) // ROWS)
+
+
 def _waves(rows: FlightRows) -> Array:
-    """The waves of the delay, each at every command, shape (WAVES, n)."""
+    """The waves of the delay, each at every command, shape (k, n)."""
     since = rows.command_time - rows.time[0]
     share = np.clip(since / (rows.time[-1] - rows.time[0]), 0.0, 1.0)
-    return np.cos(np.pi * np.outer(np.arange(1, WAVES + 1), share))
+    return np.cos(np.pi * np.outer(np.arange(1, _number(rows) + 1), share))
