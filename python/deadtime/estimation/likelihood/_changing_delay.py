@@ -72,8 +72,6 @@ NONE_SEEN = DelayChange(1.0, 0.0)
 
 def delay_change(fit: NoiseFit, run: int) -> DelayChange:
     """The test for one of the recordings."""
-    from scipy import special
-
     rows = fit.runs[run]
     jumps = np.diff(rows.command, prepend=rows.command[0])
     if "delay" not in fit.model.names or not np.any(jumps) or _number(rows) == 0:
@@ -93,17 +91,8 @@ def delay_change(fit: NoiseFit, run: int) -> DelayChange:
         return NONE_SEEN
     delays = found.delays() @ _waves(rows)
     weights = jumps**2 / np.sum(jumps**2)
-    return DelayChange(
-        _above(found.drawn(), found.fall)
-        if found.fall > DRAWN
-        else SOME * float(special.chdtrc(1, found.fall)),
-        math.sqrt(float(weights @ (delays - weights @ delays) ** 2)),
-    )
-
-
-def _above(drawn: Array, value: float) -> float:
-    """Probability of such a value among drawn ones (Dufour 2006)."""
-    return (1.0 + float(np.sum(drawn >= value))) / (drawn.size + 1.0)
+    spread = math.sqrt(float(weights @ (delays - weights @ delays) ** 2))
+    return DelayChange(found.p_value(), spread)
 
 
 @dataclass(frozen=True)
@@ -143,21 +132,28 @@ class _Wandering:
         return np.asarray(-self.freedom * np.log1p(-explained) - large[:, None, :])
 
     @cached_property
-    def place(self) -> tuple[int, int]:
-        """Correlation time and size of the likeliest."""
+    def likeliest(self) -> tuple[float, int, int]:
+        """By how much −2 ln L falls with the likeliest, its correlation time, and its size."""
         falls = self.falls(self.along[None, :])[:, 0, :]
         time, size = np.unravel_index(int(np.argmax(falls)), falls.shape)
-        return int(time), int(size)
+        return float(falls[time, size]), int(time), int(size)
 
-    @cached_property
+    @property
     def fall(self) -> float:
         """By how much −2 ln L falls with the likeliest; zero where none shows."""
-        time, size = self.place
-        return float(self.falls(self.along[None, :])[time, 0, size]) if np.any(self.shown) else 0.0
+        return self.likeliest[0] if np.any(self.shown) else 0.0
+
+    def p_value(self) -> float:
+        """Probability of such a fall where the delay is constant (Dufour 2006)."""
+        from scipy import special
+
+        if self.fall <= DRAWN:
+            return SOME * float(special.chdtrc(1, self.fall))
+        return (1.0 + float(np.sum(self.drawn() >= self.fall))) / (DRAWS + 1.0)
 
     def delays(self) -> Array:
         """The likeliest delays, as sizes of the waves, s."""
-        time, size = self.place
+        _, time, size = self.likeliest
         shown, added = self.shown[time], self.added[time, size]
         seen = shown > SHOWS * shown[0]
         parts = (self.along @ self.left[time])[seen] / shown[seen]
@@ -174,6 +170,7 @@ class _Wandering:
 
 
 def _wandering(fit: NoiseFit, run: int) -> _Wandering:
+    """Delays that wander beside the fit of one recording."""
     number = _number(fit.runs[run])
     factor, along, freedom = fit.likelihood.waves(run, fit.with_gain, number)
     # Variances of the waves of a first-order noise; those of each correlation time add to one.
