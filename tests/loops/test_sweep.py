@@ -64,6 +64,11 @@ LOOPS = [
     ),
     dtm.ControlLoop(dtm.kit_plant(), dtm.PI(0.8, 0.1), delay=0.2),
     dtm.ControlLoop(dtm.Integrator(1.0, 0.3), dtm.P(1.3), delay=0.0, limit=0.8),
+    dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=0.36, limit=0.6),
+    dtm.ControlLoop(
+        dtm.Integrator(1.0, 0.2), dtm.P(1.6), delay=0.2, limit=0.5, delay_path="measurement"
+    ),
+    dtm.ControlLoop(dtm.FirstOrder(2.0, 0.5), dtm.PI(0.4, 0.6), delay=0.3, limit=0.3),
 ]
 
 
@@ -283,7 +288,7 @@ def bits(found):
 
 
 @pytest.mark.parametrize(
-    "loop", [LOOPS[i] for i in (0, 5, 6, 11, 14, 16, 17)], ids=(0, 5, 6, 11, 14, 16, 17)
+    "loop", [LOOPS[i] for i in (0, 5, 6, 11, 14, 16, 17, 20)], ids=(0, 5, 6, 11, 14, 16, 17, 20)
 )
 def test_a_set_has_its_own_bits(loop):
     values = random_values(loop, 50, seed=3)
@@ -303,7 +308,10 @@ found = dtm.sweep(loop, {"Kp": np.linspace(0.5, 2.5, 40), "delay": np.linspace(0
 outputs = dtm.sweep(loop, {"delay": np.linspace(0.1, 0.5, 9)}, [0.0, 1.0, 3.3], responses=True)
 loop = loop.replace(sample_time=None, limit=None)
 smooth = dtm.sweep(loop, {"Kp": np.linspace(0.5, 2.5, 40), "delay": np.linspace(0.1, 0.5, 40)}, 9.0)
-columns = [*found.metrics.values(), *smooth.metrics.values(), smooth.status, outputs.outputs]
+bound = loop.replace(controller=dtm.P(1.0), limit=0.8)
+bound = dtm.sweep(bound, {"Kp": np.linspace(0.5, 2.5, 40), "delay": np.linspace(0.1, 0.5, 40)}, 9.0)
+columns = [*found.metrics.values(), *smooth.metrics.values(), *bound.metrics.values()]
+columns += [smooth.status, bound.status, outputs.outputs]
 print([c.tobytes().hex() for c in columns])
 """
 

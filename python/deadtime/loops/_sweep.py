@@ -247,9 +247,9 @@ def sweep(
     evidence, not a proof; `design` proves the stability of its result.
 
     Loops with up to four states are computed with SIMD instructions, several sets at once, if they
-    are sampled, or have a delay and a command that stays within its limit; the others one at a time
-    on each thread. The result for a set does not depend on the other sets, on the number of threads
-    or on the machine's instruction set.
+    are sampled, or have a delay and a command that does not exceed its limit once it is within it;
+    the others one at a time on each thread. The result for a set does not depend on the other sets,
+    on the number of threads or on the machine's instruction set.
 
     Examples
     --------

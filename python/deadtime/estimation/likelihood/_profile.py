@@ -363,6 +363,9 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
     singles = [{i: step} for step in (h, -h) for i in range(count)]
     noises = [at(steps) for steps in ({}, *singles, *({i: h, j: h} for i, j in pairs))]
     objectives, variances = _under(fit, noises, weights)
+    if not np.all(np.isfinite(objectives)):
+        # At some noise near by one unknown cannot be told from others.
+        return dict.fromkeys(weights, LEAST_FREEDOM)
     middle, above, below = objectives[0], objectives[1 : count + 1], objectives[count + 1 :]
     hessian = np.zeros((count, count))
     for i in range(count):
@@ -372,9 +375,6 @@ def degrees_of_freedom(fit: NoiseFit, weights: Mapping[str, Array], rows: int) -
     logs = np.log(np.maximum(variances, 1e-300))
     quotients = (logs[1 : count + 1] - logs[count + 1 : 2 * count + 1]) / (2.0 * h)
     slopes = dict(zip(weights, quotients.T, strict=True))
-    if not np.all(np.isfinite(hessian)):
-        # At some noise near by one unknown cannot be told from others.
-        return dict.fromkeys(weights, LEAST_FREEDOM)
     values, vectors = np.linalg.eigh(0.5 * hessian)
     spread = (vectors / np.maximum(values, LEAST_CURVATURE)) @ vectors.T
     return {

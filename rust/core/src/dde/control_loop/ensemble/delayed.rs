@@ -4,8 +4,9 @@
 //! that of the same part of the delay before, so that its polynomial needs no shift: with the local
 //! time σ ∈ [0, 1], x_{j+1} = h (A x_j + B w_j + E r_j)/(j + 1) and u_j = K x_j + L w_j + M r_j,
 //! where only r₀ is not zero. Parts are short enough for terms after the last one to be below
-//! rounding (`shape`). A loop whose command may exceed its limit is left to the code for single
-//! loops, since every such crossing cuts the parts anew.
+//! rounding (`shape`). A command may be at its limit from the start on (`saturated`). A loop whose
+//! command may exceed its limit later is left to the code for single loops, since every such crossing
+//! cuts the parts anew.
 
 #![expect(
     clippy::needless_range_loop,
@@ -18,6 +19,7 @@ use super::block::{Block, Number};
 use super::decay::Decay;
 use super::loops::{Part, Plants};
 use super::piece::LONG;
+use super::saturated::Saturated;
 use super::trace::{CHUNK, Summary, Trace, delays};
 use super::transition::{Map, row};
 use super::walk::{Ends, Run, are_sound, longer};
@@ -28,13 +30,20 @@ const CHORDS: [f64; LONG - 1] = [
     0.758, 0.7692, 0.7793, 0.7885, 0.7968, 0.8045, 0.8115,
 ];
 
-/// Loops in lanes. A sample is one delay.
+/// A command that comes from its limit is beyond it by rounding errors, this share of what it would
+/// be without the limit.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Loops in lanes. A sample is one delay, but for the second one where the command is at its limit
+/// at first.
 pub(super) struct Delayed<S: Simd, const N: usize> {
     pub(super) plants: Plants<S, N>,
     k: [Real<S>; N],
     l: Real<S>,
     /// Length of a part.
     h: Real<S>,
+    /// None, if no command begins beyond its limit.
+    saturated: Option<Saturated<S>>,
 }
 
 impl<S: Simd, const N: usize> Delayed<S, N> {
@@ -77,12 +86,16 @@ impl<S: Simd, const N: usize> Outlined for Made<'_, S, N> {
                 is_jump: false,
             });
         }
-        Delayed {
+        let mut loops = Delayed {
             plants,
             k: block.column(simd, N * N + 2 * N, pair),
             l: block.number(simd, Number::L, pair),
             h,
-        }
+            saturated: None,
+        };
+        loops.saturated = Saturated::of(&loops.plants, (&loops.k, loops.l), h);
+        loops.plants.share = loops.saturated.as_ref().map(|saturated| saturated.share);
+        loops
     }
 }
 
@@ -102,15 +115,16 @@ pub(super) struct Steps<'a, S: Simd, const N: usize> {
 
 impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
     pub(super) fn new(loops: &'a Delayed<S, N>) -> Self {
-        let zero = loops.plants.zero;
+        let (zero, no_lane) = (loops.plants.zero, loops.plants.no_lane);
+        let saturated = loops.saturated.as_ref();
         Self {
             loops,
             x: [zero; N],
             output: zero,
             inside: zero,
             number: 0,
-            lost: loops.plants.no_lane,
-            limited: loops.plants.no_lane,
+            lost: no_lane,
+            limited: saturated.map_or(no_lane, |saturated| saturated.unfit),
         }
     }
 
@@ -151,22 +165,21 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             run_end: loops.end,
             latest: loops.latest,
         };
+        let highest = (loops.command.abs() + loops.limit).mul_add(ROUNDING, loops.limit);
         for _ in 0..CHUNK {
-            let now = loops.sample_time * self.number as f64;
-            self.number += 1;
-            let mut begin = now;
+            let sample = zero.constant(self.number as f64);
+            let mut begin = loops.time(sample, zero);
             for number in 1..=per_sample {
                 let (bulge, command) = if loops.is_limited {
                     self.element::<true>(trace, part, number - 1, terms)
                 } else {
                     self.element::<false>(trace, part, number - 1, terms)
                 };
-                self.limited = self.limited | (begin.lt(loops.end) & command.gt(loops.limit));
+                self.limited = self.limited | (begin.lt(loops.end) & command.gt(highest));
                 summary.bulge = summary.bulge.max(bulge);
-                let end = if let Some(next) = loops.parts.get(number) {
-                    now + next.offset
-                } else {
-                    loops.sample_time * self.number as f64
+                let end = match loops.parts.get(number) {
+                    Some(next) => loops.time(sample, next.offset),
+                    None => loops.time(sample + 1.0, zero),
                 };
                 // The first coefficient of the new polynomial of the command is its value there.
                 let u = trace.commands.get((number - 1) * terms).copied();
@@ -182,6 +195,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
                 begin = end;
                 part += 1;
             }
+            self.number += 1;
         }
         (trace.count, trace.is_cut) = (ends.count, ends.is_cut);
         self.inside = ends.inside;
@@ -203,7 +217,10 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
         let plants = &loops.plants;
         let zero = plants.zero;
         let (mut x, mut change, mut bulge) = (self.x, [zero; N], zero);
-        let (mut most, mut least) = (zero, zero);
+        // Partial sums of the coefficients of the command, of which each of its values is a mean.
+        let (mut sum, mut most, mut least) = (zero, zero, zero);
+        let sample = zero.constant(self.number as f64);
+        let h = plants.length(sample, loops.h);
         let commands = trace.commands.get_mut(number * terms..(number + 1) * terms);
         let outputs = trace.pieces.get_mut(part * terms..(part + 1) * terms);
         let (Some(commands), Some(outputs)) = (commands, outputs) else {
@@ -220,7 +237,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             outputs[j] = y.lanes();
             let mut u = row(&loops.k, &x, loops.l * w);
             let old = x;
-            let factor = loops.h * (1.0 / (j + 1) as f64);
+            let factor = h * (1.0 / (j + 1) as f64);
             for i in 0..N {
                 x[i] = row(&plants.a[i], &old, plants.b[i] * w);
             }
@@ -235,12 +252,19 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             for i in 0..N {
                 x[i] = x[i] * factor;
             }
-            commands[j] = u;
             if IS_LIMITED {
-                // σ^j is between 0 and 1, and 1 for j = 0.
-                most = most + if j == 0 { u } else { u.max(zero) };
-                least = least + if j == 0 { u } else { u.min(zero) };
+                if let Some(saturated) = &loops.saturated {
+                    let held = if j == 0 { saturated.command } else { zero };
+                    u = saturated.samples.gt(sample).select(held, u);
+                }
+                sum = sum + u;
+                (most, least) = if j == 0 {
+                    (sum, sum)
+                } else {
+                    (most.max(sum), least.min(sum))
+                };
             }
+            commands[j] = u;
         }
         for i in 0..N {
             self.x[i] = self.x[i] + change[i];

@@ -65,6 +65,8 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) limit: Real<S>,
     pub(super) is_limited: bool,
     pub(super) sample_time: Real<S>,
+    /// The part of a sample that the second one takes (`saturated`); none if it takes a whole one.
+    pub(super) share: Option<Real<S>>,
     /// Time by which the output is read ahead.
     pub(super) ahead: Real<S>,
     /// The time after which a loop reacts to its own output.
@@ -237,6 +239,7 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             limit,
             is_limited: limit.lt(f64::INFINITY).any(),
             sample_time,
+            share: None,
             ahead,
             wait: delay + block.number(simd, Number::SampleTime, pair),
             end,
@@ -262,8 +265,29 @@ impl<S: Simd, const P: usize> Plants<S, P> {
     /// Are the runs of all loops over before sample `number`? One at the end belongs to the run.
     #[inline(always)]
     pub(super) fn are_over(&self, number: usize) -> bool {
-        let now = self.sample_time * number as f64;
-        !now.le(self.latest).any()
+        let number = self.zero.constant(number as f64);
+        !self.time(number, self.zero).le(self.latest).any()
+    }
+
+    /// The time `offset` after a sample; in the second sample its share of `offset`.
+    #[inline(always)]
+    pub(super) fn time(&self, sample: Real<S>, offset: Real<S>) -> Real<S> {
+        let time = self.sample_time * sample;
+        let Some(share) = self.share else {
+            return time + offset;
+        };
+        let lacks = self.sample_time - self.sample_time * share;
+        let time = sample.gt(1.0).select(time - lacks, time);
+        time + self.length(sample, offset)
+    }
+
+    /// The length of a part of a sample; in the second sample its share of `length`.
+    #[inline(always)]
+    pub(super) fn length(&self, sample: Real<S>, length: Real<S>) -> Real<S> {
+        match self.share {
+            Some(share) => sample.eq(1.0).select(length * share, length),
+            None => length,
+        }
     }
 
     /// C x.

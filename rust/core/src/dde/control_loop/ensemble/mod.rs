@@ -7,8 +7,8 @@
 //! bound on how far they are exceeded in between ([`walk`]); the metrics are found from the trace,
 //! by polynomials only where the bound says that they matter ([`rounds`]). Sets whose delays hold
 //! the same number of whole samples share a block ([`shape`]), so that its lanes read their delayed
-//! commands from the same index. Continuous loops with a delay run in lanes as long as their
-//! command stays within its limit, by the method of steps ([`delayed`]). All other sets are run one
+//! commands from the same index. Continuous loops with a delay run in lanes, by the method of steps,
+//! if their command is at its limit at first at most ([`delayed`]). All other sets are run one
 //! by one by the code for single loops ([`each`]). The result of a set has the same bits for any
 //! neighbours, number of threads and instruction set.
 
@@ -24,6 +24,7 @@ mod metrics;
 mod piece;
 mod responses;
 mod rounds;
+mod saturated;
 mod search;
 mod sets;
 mod shape;

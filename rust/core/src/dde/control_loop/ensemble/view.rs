@@ -50,29 +50,46 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         for (number, part) in self.loops.parts.iter().enumerate().skip(1) {
             offset = numbers.eq(number as f64).select(part.offset, offset);
         }
-        let time = self.loops.sample_time * (samples + self.trace.first as f64) + offset;
+        let time = self.loops.time(samples + self.trace.first as f64, offset);
         time.smaller(self.loops.end)
     }
 
     /// Lengths of parts; zero for jumps.
     #[inline(always)]
     pub(super) fn lengths(&self, parts: Real<S>) -> Real<S> {
-        let (_, numbers) = self.split(parts);
+        let (samples, numbers) = self.split(parts);
         let mut length = parts.constant(0.0);
         for (number, part) in self.loops.parts.iter().enumerate() {
             length = numbers.eq(number as f64).select(part.length, length);
         }
-        length
+        let sample = samples + self.trace.first as f64;
+        self.loops.length(sample, length)
     }
 
     /// Time at which a part begins.
     #[inline]
     fn begin(&self, lane: usize, part: usize) -> f64 {
         let (sample, number) = self.trace.split(part);
-        let sample = (self.trace.first + sample) as f64;
         let offset = self.loops.parts.get(number);
-        of(&self.loops.sample_time, lane) * sample
-            + offset.map_or(0.0, |part| of(&part.offset, lane))
+        self.time(
+            lane,
+            (self.trace.first + sample) as f64,
+            offset.map_or(0.0, |part| of(&part.offset, lane)),
+        )
+    }
+
+    /// [`Plants::time`] of a lane.
+    #[inline]
+    fn time(&self, lane: usize, sample: f64, offset: f64) -> f64 {
+        let sample_time = of(&self.loops.sample_time, lane);
+        let time = sample_time * sample;
+        match &self.loops.share {
+            Some(share) if sample == 1.0 => time + offset * of(share, lane),
+            Some(share) if sample > 1.0 => {
+                time - (sample_time - sample_time * of(share, lane)) + offset
+            }
+            _ => time + offset,
+        }
     }
 
     /// σ at the ends of parts, inside of which the runs may end.
@@ -118,11 +135,14 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         let sample_time = of(&self.loops.sample_time, lane);
         // A time at which a part begins, but for rounding errors, is in that part.
         let reached = time + slack(time, sample_time);
-        let mut sample = (reached / sample_time).floor();
-        // The quotient may be rounded to the next whole number, or down from it.
-        if sample * sample_time > reached {
+        // What the second sample lacks of a whole one.
+        let lacks = 2.0 * sample_time - self.time(lane, 2.0, 0.0);
+        let mut sample = ((reached + lacks) / sample_time).floor();
+        // The quotient may be rounded to the next whole number, or down from it, and belongs to the
+        // sample before if that is the first one.
+        if self.time(lane, sample, 0.0) > reached {
             sample -= 1.0;
-        } else if (sample + 1.0) * sample_time <= reached {
+        } else if self.time(lane, sample + 1.0, 0.0) <= reached {
             sample += 1.0;
         }
         let sample = (sample as usize).checked_sub(self.trace.first)?;
