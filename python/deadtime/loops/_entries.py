@@ -85,7 +85,7 @@ def vector(entries: Sequence[Any]) -> NDArray[Any]:
     """Array of the entries."""
     if not entries:
         return _NO_VECTOR
-    if any(type(entry) is Each for entry in entries):
+    if Each in map(type, entries):
         # NumPy would ask each of these whether it is an array.
         array = np.empty(len(entries), dtype=object)
         for place, entry in enumerate(entries):
