@@ -12,6 +12,7 @@
     reason = "indices as in the formulas; closures would not be compiled for the vectors"
 )]
 
+use crate::dde::limits::DIVERGED;
 use crate::simd::{Mask, Real, Simd};
 
 use super::loops::Plants;
@@ -46,12 +47,20 @@ impl<S: Simd> Saturated<S> {
         let one = zero.constant(1.0);
         let command = plants.command.lt(0.0).select(-plants.limit, plants.limit);
         // A command that depends on the one of a delay before does not stay constant.
-        let mut open = beyond & l.eq(0.0);
+        let mut open = beyond & l.eq(0.0) & plants.command.abs().le(DIVERGED);
         let (mut samples, mut share, mut unfit) = (zero, one, beyond & !open);
         let parts = plants.parts.len();
         let mut x = [zero; N];
         let mut number = 0;
-        while open.any() && !plants.are_over(number) {
+        loop {
+            // A run ends where its own loop does, not where its neighbours do.
+            let begin = plants.time(zero.constant(number as f64), zero);
+            let over = open & !begin.le(plants.latest);
+            samples = over.select(f64::INFINITY, samples);
+            open = open & !over;
+            if !open.any() {
+                break;
+            }
             let held = if number == 0 { zero } else { command };
             for part in 0..parts {
                 let excess = Excess::of(plants, k, h, &mut x, held);
@@ -70,7 +79,7 @@ impl<S: Simd> Saturated<S> {
         }
         Some(Self {
             command,
-            samples: open.select(f64::INFINITY, samples),
+            samples,
             share,
             unfit,
         })
