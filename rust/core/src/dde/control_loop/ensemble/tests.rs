@@ -8,8 +8,6 @@ use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::row::Row;
 use proptest::prelude::*;
 
-mod saturated;
-
 const CRITERIA: Criteria = Criteria {
     rise: (0.1, 0.9),
     settling: 0.02,
@@ -417,4 +415,71 @@ fn a_chaotic_loop_agrees_as_far_as_it_is_known() {
         1.347836762890999,
     )];
     assert_eq!(unlike(&rows, false, 10.11026738622043), None);
+}
+
+/// Responses to a step of integrators of a gain under P control, with a delay and a limit, in lanes;
+/// none of those that have to run alone.
+fn in_lanes(
+    numbers: &[(f64, f64, f64, f64)],
+    step: f64,
+    times: &[f64],
+) -> Result<Vec<Option<Vec<f64>>>, crate::Error> {
+    let rows = numbers.iter().map(|&(gain, kp, delay, limit)| {
+        let controller = controller(0, kp, 0.0);
+        row(&plant(0, gain, 1.0), &controller, delay, 0.0, limit)
+    });
+    let columns = columns(&rows.collect::<Vec<_>>());
+    let entries: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let sets = Sets::new(1, numbers.len(), &entries, step, false)?;
+    let span = times.last().copied().unwrap_or(0.0);
+    let (alike, _) = shape::Shapes::new(&sets)?.sorted(span)?;
+    let mut found = vec![None; sets.len()];
+    for (shape, members) in &alike {
+        let (mut rows, blocks) = (Vec::new(), [(*shape, &members[..])]);
+        let job = responses::ResponsesJob { times };
+        through::through(&sets, 1, &blocks, (span, &job), &mut rows);
+        for (&set, row) in members.iter().zip(rows.into_iter().flatten()) {
+            found[set] = row.map(|(outputs, _)| outputs);
+        }
+    }
+    Ok(found)
+}
+
+/// The search for the end of the time at the limit went on for as long as a neighbour ran.
+#[test]
+fn a_run_that_ends_at_its_limit_has_its_bits_beside_any_neighbour() -> Result<(), crate::Error> {
+    let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i)).collect();
+    let pair = [(1.0, 0.3, 1.0, 0.01), (1.0, 1.0, 0.03, 0.01)];
+    let alone = in_lanes(&pair[..1], 1.0, &times)?;
+    assert!(alone[0].is_some());
+    assert_eq!(alone[0], in_lanes(&pair, 1.0, &times)?[0]);
+    Ok(())
+}
+
+/// An integrator at gain g whose command is at its limit L at first moves by g L for each second
+/// after the delay τ. The command K (r − y) leaves the limit at t₁, and the plant receives
+/// L − K g L (t − t₁ − τ) from t₁ + τ to t₁ + 2 τ.
+#[test]
+fn commands_that_begin_at_their_limit_are_those_of_the_closed_form() -> Result<(), crate::Error> {
+    let all = [
+        (0.85, 1.6, 0.3, 0.6),
+        (0.85, 2.4, 0.1, 1.0),
+        (1.3, 1.1, 0.45, 0.25),
+        (0.4, 4.0, 0.02, 0.69),
+    ];
+    for (step, numbers) in [1.0, -0.7].iter().flat_map(|r| all.map(|n| (*r, n))) {
+        let (gain, kp, delay, limit) = numbers;
+        let leaves = delay + (f64::abs(step) - limit / kp) / (gain * limit);
+        let part = (leaves + 2.0 * delay) / 39.0;
+        let times: Vec<f64> = (0..40).map(|i| part * f64::from(i)).collect();
+        let found = in_lanes(&[numbers], step, &times)?.swap_remove(0);
+        assert!(found.is_some(), "{numbers:?} had to run alone");
+        for (t, found) in times.iter().zip(found.unwrap_or_default()) {
+            let late = (t - leaves - delay).max(0.0);
+            let moved = (t - delay).max(0.0) - kp * gain * late * late / 2.0;
+            let truth = f64::signum(step) * gain * limit * moved;
+            assert!((found - truth).abs() < 1e-13, "{found} at {t}: {truth}");
+        }
+    }
+    Ok(())
 }
