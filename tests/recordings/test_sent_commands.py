@@ -124,3 +124,65 @@ def test_any_window_has_the_commands_of_the_whole(cut):
     whole = recording()
     part = whole.window(cut, None)
     assert part.command.tolist() == whole.command[whole.rows(cut, None)].tolist()
+
+
+SAMPLE = 0.065
+
+
+def flown(seed):
+    """Two steps of a P loop whose height is read in steps of 1 mm: its numbers, rows, commands."""
+    random = np.random.default_rng(seed)
+    delay, gain, lag = random.uniform([0.2, 0.7, 0.08], [0.4, 1.0, 0.2])
+    loop = dtm.ControlLoop(
+        dtm.Integrator(gain, lag), dtm.P(1.6), delay=delay, sample_time=SAMPLE, limit=1.0
+    )
+    time = SAMPLE * np.arange(150)
+    reference = np.where(time < 1.5, 0.0, np.where(time < 5.5, 1.0, 0.4))
+    noise = random.normal(0.0, 0.002, time.size)
+    # Later rows do not move earlier ones: after as many rounds as rows all are rounded.
+    for _ in range(time.size):
+        run = loop.simulate(time, reference - noise, reference_time=time, initial_output=0.0)
+        rounded = 1e-3 * np.round(1e3 * (run.outputs + noise)) - run.outputs
+        if np.allclose(rounded, noise, rtol=0.0, atol=1e-12):
+            break
+        noise = rounded
+    return loop, time, reference, run.outputs + noise, run.inputs
+
+
+def estimated(seeds, kept):
+    """Errors of the sum of delay and lag, s, and how many fits are adequate and hold it."""
+    errors, adequate, held = [], 0, 0
+    for seed in range(seeds):
+        loop, time, reference, output, command = flown(seed)
+        rows = kept(seed, reference, command)
+        told = dtm.Recording(time, reference, output, sent=(time[rows], command[rows]))
+        fit = dtm.estimate_delay(told, loop.replace(delay=None), free=["delay", "gain", "lag"])
+        low, high = fit.ci(0.95, "delay+lag")
+        late = loop.delay + loop.plant.lag
+        errors.append(fit.delay_plus_lag - late)
+        adequate += fit.adequate
+        held += fit.adequate and low < late < high
+    return np.sqrt(np.mean(np.square(errors))), adequate, held
+
+
+def test_commands_that_are_logged_when_they_change_hold_until_the_next():
+    # A rounded height gives the same command again and again.
+    def kept(seed, reference, command):
+        return np.append(True, np.abs(np.diff(command)) > 1e-12)
+
+    error, adequate, held = estimated(20, kept)
+    assert error < 0.001  # 0.7 ms, and 7 where those left out count as lost
+    assert adequate >= 17
+    assert held >= adequate - 4
+
+
+def test_commands_that_the_log_has_lost_at_a_step_are_unknown():
+    def kept(seed, reference, command):
+        rows = np.random.default_rng(100 + seed).uniform(size=command.size) > 0.1
+        rows[np.flatnonzero(np.diff(reference)) + 1] = False
+        return rows | (np.arange(command.size) == 0)
+
+    error, adequate, held = estimated(20, kept)
+    assert error < 0.005  # 3.5 ms, and 8 where each is the mean of those around it
+    assert adequate >= 15
+    assert held >= adequate - 4

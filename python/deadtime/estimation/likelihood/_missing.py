@@ -36,7 +36,11 @@ HOLE = 3
 #: Commands with times of their own: fewest that show how they were logged, the share of steps that
 #: are alike where that was regular, the share of changes where each was logged, and the share of
 #: the rows at the end in which lost ones may have no effect yet.
-FEWEST, REGULAR, MOVES, END = 16, 0.8, 0.5, 0.2
+FEWEST, REGULAR, MOVES, END = 16, 0.6, 0.5, 0.2
+
+#: Change of the command across a gap, as a share of the range of all and over the usual change,
+#: from which the mean of those around it says too little of the lost ones.
+STEP, UNUSUAL = 0.05, 3.0
 
 #: Error of the output that is predicted in such a hole, in deviations of the white noise.
 SHARED = 2.0
@@ -72,6 +76,8 @@ class HeldCommands(NamedTuple):
         In how many ways the reference may have changed between rows.
     longest : int
         Most samples in a row that are missing.
+    lost : bool
+        Whether commands with times of their own may be missing in their log.
     """
 
     time: Array
@@ -80,14 +86,15 @@ class HeldCommands(NamedTuple):
     computed: tuple[tuple[float, float, float], ...] = ()
     steps: int = 1
     longest: int = 0
+    lost: bool = False
 
 
 def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
     """Commands with times of their own, without holding one where the next ones were lost.
 
     Commands that were logged regularly, each time they were computed, leave a gap where some were
-    lost. After a usual step the mean of those around it is taken; where many were lost, it is an
-    unknown. Near the end of the rows it has no effect yet.
+    lost. After a usual step the mean of those around it is taken; where many were lost, or the
+    command changes much, it is an unknown. Near the end of the rows it has no effect yet.
     """
     plain = HeldCommands(time, command)
     steps = np.diff(time)
@@ -98,14 +105,19 @@ def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
     if not regular or np.mean(np.diff(command) != 0.0) <= MOVES:
         return plain
     gaps = np.flatnonzero(steps > 1.5 * usual)
+    if gaps.size == 0:
+        return plain
     every = np.concatenate([time, time[gaps] + usual])
     values = np.concatenate([command, 0.5 * (command[gaps] + command[gaps + 1])])
     order = np.argsort(every, kind="stable")
     last = rows[-1] - END * (rows[-1] - rows[0])
-    many = gaps[(steps[gaps] > HOLE * usual) & (time[gaps] >= rows[0]) & (time[gaps + 1] <= last)]
+    change = np.abs(np.diff(command))
+    jumps = change > max(STEP * float(np.ptp(command)), UNUSUAL * float(np.median(change)))
+    open_ = (steps > HOLE * usual) | jumps
+    many = gaps[open_[gaps] & (time[gaps] >= rows[0]) & (time[gaps + 1] <= last)]
     many = many[np.argsort(-steps[many], kind="stable")][: int(MOST_UNKNOWN * rows.size)]
     unknown = [(float(time[k] + usual), float(time[k + 1])) for k in np.sort(many)]
-    return HeldCommands(every[order], values[order], tuple(unknown))
+    return HeldCommands(every[order], values[order], tuple(unknown), lost=True)
 
 
 def with_missing(

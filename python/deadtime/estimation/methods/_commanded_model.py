@@ -55,6 +55,8 @@ class Assumed(NamedTuple):
     output_filter : KnownFilter, optional
     air : {"command", "vehicle"}
     intervals : {"all", "sum"}
+    complete : bool
+        Whether commands with times of their own are all there: each holds until the next.
     """
 
     initial_output: float | None = None
@@ -62,6 +64,7 @@ class Assumed(NamedTuple):
     output_filter: KnownFilter | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
+    complete: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +195,7 @@ class CommandedModel(ModelOfOne):
 def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> CommandedModel:
     """Commands up to the end of the window, including those before its start where known."""
     recording, loop, window, _ = run
-    initial_output, computed, known, air, _ = assumed
+    initial_output, computed, known, air, _, complete = assumed
     rows = recording.rows(*window)
     data = recording.window(*window) if known is None else before_filter(recording, rows, known)
     command, source = commands_of(recording, loop, computed)
@@ -204,7 +207,8 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
         )
     check_moves(data.output, command)
     if data.sent is not None and not computed:
-        commands = with_lost(data.sent.time, limited(data.sent.values, loop), data.time)
+        sent = data.sent.time, limited(data.sent.values, loop)
+        commands = HeldCommands(*sent) if complete else with_lost(*sent, data.time)
     else:
         commands = with_missing(recording, loop, command)
     missing = data.sent is None and commands.time.size > command.size

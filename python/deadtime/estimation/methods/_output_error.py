@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import product
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,7 @@ from deadtime.estimation.methods._method import (
     check_initial_output,
 )
 from deadtime.estimation.methods._rounded_conclusion import read_as_intervals, rounding_is_all
+from deadtime.recordings import RecordingCheck
 
 Array = NDArray[np.float64]
 
@@ -196,15 +197,15 @@ def _estimated(
     names = checked_names(free, runs[0].loop, known)
     # What least squares with all derivatives knows; the likelihood knows other plants too.
     common = tuple(name for name in names if name in VEHICLE_PARAMETERS)
-    models = [commanded_model(run, common, assumed) for run in runs]
-    fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
-    in_kernel = names_in_kernel(fitted[0].loop.plant)
+    in_kernel = names_in_kernel(runs[0].loop.plant)
     linear = tuple(name for name in names if name in in_kernel)
     others = [name for name in names if name not in in_kernel]
-    _check_others(others, models[0].known)
-    checks = [run.check if known_filter is None else None for run in runs]
-    rows = [one.rows(initial_output, check) for one, check in zip(models, checks, strict=True)]
-    white, numbers = _first(linear, models, rows, others)
+    begun = _begun(runs, common, linear, others, assumed)
+    if any(one.commands.lost for one in begun.models):
+        held = _begun(runs, common, linear, others, assumed._replace(complete=True))
+        begun = min(begun, held, key=lambda one: one.criterion)
+    models, rows, checks, white, numbers, whole = begun
+    fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
     sources = {one.source for one in models}
     message = f"over {', '.join(names)} on the response to the command"
     if computed:
@@ -239,7 +240,6 @@ def _estimated(
 
     if common == names and _is_nearly_exact(white) and is_exact(*plain(), fitted):
         return concluded_plain()
-    whole = replace(white, runs=tuple(_given(linear, models, rows, numbers)[1]))
     kept = [
         one._replace(used=one.used & ~spikes(part.residuals, one.rounding))
         for one, part in zip(whole.runs, whole.parts, strict=True)
@@ -308,6 +308,53 @@ def _estimated(
         repeated = [np.empty(0, int) if one is None else one.repeated for one in checks]
         return read_as_intervals(found, models, rows, repeated)
     return found
+
+
+class _Begun(NamedTuple):
+    """Recordings with their commands, and least squares on them.
+
+    Attributes
+    ----------
+    models : list of CommandedModel
+    rows : list of FlightRows
+    checks : list of RecordingCheck or None
+    white : NoiseFit
+        The fit to parts of the rows.
+    numbers : dict of str to float
+        The numbers that the kernel does not fit.
+    whole : NoiseFit
+        The same with all rows.
+    """
+
+    models: list[CommandedModel]
+    rows: list[FlightRows]
+    checks: list[RecordingCheck | None]
+    white: NoiseFit
+    numbers: dict[str, float]
+    whole: NoiseFit
+
+    @property
+    def criterion(self) -> float:
+        """Akaike's criterion, in which an unknown command is a number."""
+        return self.whole.criterion + 2.0 * sum(len(one.unknown) for one in self.rows)
+
+
+def _begun(
+    runs: Sequence[Run],
+    common: tuple[str, ...],
+    linear: tuple[str, ...],
+    others: Sequence[str],
+    assumed: Assumed,
+) -> _Begun:
+    models = [commanded_model(run, common, assumed) for run in runs]
+    _check_others(others, models[0].known)
+    checks = [run.check if assumed.output_filter is None else None for run in runs]
+    rows = [
+        one.rows(assumed.initial_output, check) for one, check in zip(models, checks, strict=True)
+    ]
+    white, numbers = _first(linear, models, rows, others)
+    whole = replace(white, runs=tuple(_given(linear, models, rows, numbers)[1]))
+    return _Begun(models, rows, checks, white, numbers, whole)
 
 
 def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
