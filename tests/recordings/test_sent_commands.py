@@ -150,8 +150,8 @@ def flown(seed):
 
 
 def estimated(seeds, kept):
-    """Errors of the sum of delay and lag, s, and how many fits are adequate and hold it."""
-    errors, adequate, held = [], 0, 0
+    """Error of delay + lag, s; how many fits are adequate, hold it, tell of lost commands."""
+    errors, adequate, held, known = [], 0, 0, 0
     for seed in range(seeds):
         loop, time, reference, output, command = flown(seed)
         rows = kept(seed, reference, command)
@@ -162,7 +162,8 @@ def estimated(seeds, kept):
         errors.append(fit.delay_plus_lag - late)
         adequate += fit.adequate
         held += fit.adequate and low < late < high
-    return np.sqrt(np.mean(np.square(errors))), adequate, held
+        known += "taken for lost" in fit.message
+    return np.sqrt(np.mean(np.square(errors))), adequate, held, known
 
 
 def test_commands_that_are_logged_when_they_change_hold_until_the_next():
@@ -170,7 +171,8 @@ def test_commands_that_are_logged_when_they_change_hold_until_the_next():
     def kept(seed, reference, command):
         return np.append(True, np.abs(np.diff(command)) > 1e-12)
 
-    error, adequate, held = estimated(20, kept)
+    error, adequate, held, known = estimated(20, kept)
+    assert known == 0
     assert error < 0.001  # 0.7 ms, and 7 where those left out count as lost
     assert adequate >= 17
     assert held >= adequate - 4
@@ -182,7 +184,8 @@ def test_commands_that_the_log_has_lost_at_a_step_are_unknown():
         rows[np.flatnonzero(np.diff(reference)) + 1] = False
         return rows | (np.arange(command.size) == 0)
 
-    error, adequate, held = estimated(20, kept)
+    error, adequate, held, known = estimated(20, kept)
+    assert known == 20
     assert error < 0.005  # 3.5 ms, and 8 where each is the mean of those around it
     assert adequate >= 15
     assert held >= adequate - 4

@@ -76,8 +76,8 @@ class HeldCommands(NamedTuple):
         In how many ways the reference may have changed between rows.
     longest : int
         Most samples in a row that are missing.
-    lost : bool
-        Whether commands with times of their own may be missing in their log.
+    lost : int
+        Gaps in the log of commands with times of their own, in which some are taken for lost.
     """
 
     time: Array
@@ -86,7 +86,7 @@ class HeldCommands(NamedTuple):
     computed: tuple[tuple[float, float, float], ...] = ()
     steps: int = 1
     longest: int = 0
-    lost: bool = False
+    lost: int = 0
 
 
 def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
@@ -117,7 +117,7 @@ def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
     many = gaps[open_[gaps] & (time[gaps] >= rows[0]) & (time[gaps + 1] <= last)]
     many = many[np.argsort(-steps[many], kind="stable")][: int(MOST_UNKNOWN * rows.size)]
     unknown = [(float(time[k] + usual), float(time[k + 1])) for k in np.sort(many)]
-    return HeldCommands(every[order], values[order], tuple(unknown), lost=True)
+    return HeldCommands(every[order], values[order], tuple(unknown), lost=gaps.size)
 
 
 def with_missing(
