@@ -50,7 +50,7 @@ FEWEST, FARTHEST = 10, 6.0
 
 
 class Effects(NamedTuple):
-    """Commands that took effect.
+    """Commands, and when they took effect; one without an effect repeats the one before.
 
     Attributes
     ----------
