@@ -87,8 +87,8 @@ class Recording(ReadOnlyArrays):
     sent : (array_like, array_like), each of shape (m,), optional
         Instead of `command`: times at which commands were sent and their values, where these are
         not the times of the rows. The first is not after the first row. `command` then has the
-        last one sent at each row. Estimates take a gap in regular times for commands that the log
-        has lost, unless that none is missing is likelier.
+        last one sent at each row. Where regular times have gaps, estimates take it that the log has
+        lost commands there, or that each command holds until the next, whichever is likelier.
 
     Raises
     ------

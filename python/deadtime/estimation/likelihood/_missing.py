@@ -113,10 +113,10 @@ def with_lost(time: Array, command: Array, rows: Array) -> HeldCommands:
     last = rows[-1] - END * (rows[-1] - rows[0])
     change = np.abs(np.diff(command))
     jumps = change > max(STEP * float(np.ptp(command)), UNUSUAL * float(np.median(change)))
-    open_ = (steps > HOLE * usual) | jumps
-    many = gaps[open_[gaps] & (time[gaps] >= rows[0]) & (time[gaps + 1] <= last)]
-    many = many[np.argsort(-steps[many], kind="stable")][: int(MOST_UNKNOWN * rows.size)]
-    unknown = [(float(time[k] + usual), float(time[k + 1])) for k in np.sort(many)]
+    doubtful = gaps[(steps[gaps] > HOLE * usual) | jumps[gaps]]
+    kept = doubtful[(time[doubtful] >= rows[0]) & (time[doubtful + 1] <= last)]
+    kept = kept[np.argsort(-steps[kept], kind="stable")][: int(MOST_UNKNOWN * rows.size)]
+    unknown = [(float(time[k] + usual), float(time[k + 1])) for k in np.sort(kept)]
     return HeldCommands(every[order], values[order], tuple(unknown), lost=gaps.size)
 
 

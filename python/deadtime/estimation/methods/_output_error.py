@@ -348,6 +348,7 @@ def _begun(
     others: Sequence[str],
     assumed: Assumed,
 ) -> _Begun:
+    """Least squares on recordings whose commands are as `assumed`."""
     models = [commanded_model(run, common, assumed) for run in runs]
     _check_others(others, models[0].known)
     checks = [run.check if assumed.output_filter is None else None for run in runs]
