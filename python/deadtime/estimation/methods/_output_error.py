@@ -213,7 +213,7 @@ def _estimated(
     elif sources != {"logged"}:
         message += ", which was not logged but computed from reference and output"
     elif lost := sum(one.commands.lost for one in models):
-        message += f", with commands taken for lost in {lost} gaps of their log"
+        message += f", with commands taken for lost in {lost} gap{'s' * (lost > 1)} of their log"
     if known_filter is not None:
         message += f", before the filter, in means of {known_filter.together} rows"
     details: dict[str, Any] = {
