@@ -21,8 +21,7 @@ from typing import Any
 
 import deadtime as dtm
 import numpy as np
-from drivers import by_hand
-from drivers import dde as peers
+from drivers import by_hand, dde as peers
 from drivers.dde import Run, Values
 from scipy.sparse import random_array
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from deadtime.dde import solve_dde
     from deadtime.estimation import damping_ratio, estimate_delay, identifiability
     from deadtime.experiments import Experiment
+    from deadtime.logs import latency, open_log
     from deadtime.loops import (
         PD,
         PI,
@@ -47,8 +48,7 @@ if TYPE_CHECKING:
         simulate_fixed_step,
         sweep,
     )
-    from deadtime.recordings import Recording, open_log, read_recording
-    from deadtime.reports import latency
+    from deadtime.recordings import Recording, read_recording
     from deadtime.roots import (
         QuasiPolynomial,
         crossings,
@@ -85,13 +85,14 @@ _ROOMS = {
         "ParametricPlant RateLimited RationalPlant kit_plant simulate_fixed_step sweep"
     ),
     "stability": "largest_stable_box proved_boxes robust_map stability_map stability_radius",
-    "recordings": "Recording open_log read_recording",
+    "recordings": "Recording read_recording",
     "experiments": "Experiment",
     "gallery": "",
     "links": "",
     "estimation": "damping_ratio estimate_delay identifiability",
     "tuning": "design design_filter",
-    "reports": "latency",
+    "reports": "",
+    "logs": "latency open_log",
     "flights": "",
     "internet": "",
     "paper": "",

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 from delay_problems import CASES, truth
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 
 def decay(t, y, z):

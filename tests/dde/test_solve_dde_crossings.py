@@ -3,8 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 
 def rest(t, y, z):

@@ -9,8 +9,7 @@ from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.methods._arx_scan import F_TEST_LEVEL, _check_response
 from deadtime.estimation.methods._gcc import _whitener
 from deadtime.estimation.models._held import HeldResponse
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import brentq
 from scipy.stats import kstest
 from step_recordings import (

@@ -22,8 +22,7 @@ from deadtime.estimation import (
 from deadtime.estimation._estimate import METHODS
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime.estimation.methods._overshoot import dominant_x, exact_overshoot, exact_x
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.signal import lfilter
 
 TS = 0.065

@@ -4,8 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Frequency
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from step_recordings import (
     TS,
     delay_errors,

@@ -15,8 +15,7 @@ from deadtime._base.digits import stated
 from deadtime.estimation import Overshoot
 from deadtime.estimation.models._held import HeldResponse
 from deadtime.estimation.planning._planned_bound import from_the_command, from_the_reference
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from loops import TS, held_loop
 
 BENCHES = Path(__file__).resolve().parents[2] / "benches"

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import OutputError
 from deadtime.estimation.data._known_filter import KnownFilter
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy import signal
 
 RATE = 1000.0

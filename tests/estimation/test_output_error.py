@@ -7,8 +7,7 @@ import step_recordings
 from deadtime.estimation import OutputError
 from deadtime.estimation.models._held import HeldResponse
 from flights import flight_path
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.signal import lsim
 
 TS = 0.065

@@ -8,8 +8,7 @@ import pytest
 from deadtime.estimation import Decay, Graphical, Overshoot
 from deadtime.estimation.methods._decrement import loop_with_root
 from deadtime.estimation.models._held import held_transfer
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from step_recordings import (
     TS,
     delay_errors,

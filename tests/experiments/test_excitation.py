@@ -6,8 +6,7 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 TS = 0.065
 

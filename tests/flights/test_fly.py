@@ -13,16 +13,14 @@ import pytest
 from deadtime import FlightAbortedError, NotIdentifiableError
 from deadtime._base.digits import between, stated
 from deadtime._cli.fly import _print_study
-from deadtime.flights import FlightPlan, FlownSteps, fly_experiment
-from deadtime.flights import _learn as learn_module
+from deadtime.flights import FlightPlan, FlownSteps, _learn as learn_module, fly_experiment
 from deadtime.flights._axis_control import AxisControl, Velocity
 from deadtime.flights._fly import PlannedFlight, fly_all
 from deadtime.flights._learn import learn
 from deadtime.flights._runs import telemetry_of
 from deadtime.flights._split import split_delay
 from deadtime.flights._step_test import HEIGHT, StepProgramme, check_gain, row_columns
-from deadtime.links import Limits, run
-from deadtime.links import journal as journal_module
+from deadtime.links import Limits, journal as journal_module, run
 from deadtime.links.journal import _Writer
 from deadtime.loops._derivative_filter import PAPER_FILTER
 from emulated import connecting

@@ -26,39 +26,12 @@ ROOMS = [
     "estimation",
     "tuning",
     "reports",
+    "logs",
     "flights",
     "internet",
     "paper",
     "_cli",
 ]
-
-#: The rooms that may import the native module.
-NUMERICS = {"special", "dde", "roots", "systems", "loops", "stability"}
-#: The files after the numerics that may import the kernel of the likelihood.
-LIKELIHOOD = {
-    "estimation.likelihood._adequacy",
-    "estimation.likelihood._agreement",
-    "estimation.likelihood._air_at_rest",
-    "estimation.likelihood._changing_delay",
-    "estimation.likelihood._colour_at_rest",
-    "estimation.likelihood._lost_commands",
-    "estimation.likelihood._power",
-    "estimation.likelihood._profile",
-    "estimation.likelihood._search",
-    "estimation.likelihood._start",
-    "estimation.methods._flight_conclusion",
-    "estimation.planning._whitening",
-    "estimation.running._estimator",
-}
-#: The files after the numerics that may import the native module: its wire formats.
-WIRE = {
-    "links.ardrone2.commands",
-    "links.ardrone2.configuration",
-    "links.ardrone2.navdata",
-    "links.udp.packets",
-    "recordings.logs._blackbox_frames",
-    "recordings.readers._csv",
-}
 
 #: Imports for types from a later room, with the reason.
 BACKWARDS = {
@@ -141,13 +114,23 @@ def test_no_files_of_a_room_import_in_a_circle(which):
             used -= set(last)
 
 
-def test_only_numerics_import_the_native_module():
+def is_native(module, imported):
+    return module == "_deadtime" or (module == "" and imported == "_deadtime")
+
+
+def test_each_room_imports_the_native_module_in_one_file():
+    for name, path in modules():
+        if name != f"{room(name)}._native":
+            for module, imported in imports(path):
+                assert not is_native(module, imported), f"{name} imports _deadtime"
+
+
+def test_no_import_reaches_into_a_private_file_of_another_room():
     for name, path in modules():
         for module, imported in imports(path):
-            if module == "_deadtime" or (module == "" and imported == "_deadtime"):
-                assert room(name) in NUMERICS or name in WIRE | LIKELIHOOD, (
-                    f"{name} imports _deadtime"
-                )
+            if module and room(module) not in (room(name), "_base", "_deadtime"):
+                inside = [*module.split(".")[1:], imported]
+                assert not any(part.startswith("_") for part in inside), f"{name}: {module}"
 
 
 def test_public_names_are_those_of_the_rooms():

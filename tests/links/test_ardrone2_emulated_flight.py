@@ -19,8 +19,7 @@ from deadtime.links.ardrone2.emulator import (
 )
 from deadtime.links.ardrone2.emulator.motion import GRAVITY, LINEAR_PLANTS, LinearMotion
 from deadtime.links.ardrone2.navdata import parse_navdata
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pilot import DOWN, UP, Pilot, configured
 
 # --- navdata ---------------------------------------------------------------------------------

@@ -22,8 +22,7 @@ from deadtime.links.ardrone2.emulator import (
     Phase,
 )
 from deadtime.links.ardrone2.navdata import parse_navdata
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pilot import COMMANDS, NAVDATA, UP, WAKE, Pilot, configured
 
 #: The keys of the developer guide of the SDK 2.0.

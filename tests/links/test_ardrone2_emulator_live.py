@@ -11,16 +11,14 @@ import sys
 import textwrap
 
 import pytest
-from deadtime import DeadtimeError
-from deadtime import links as dtl
+from deadtime import DeadtimeError, links as dtl
 from deadtime._base.errors import LinkError
 from deadtime._cli.emulate import print_address
 from deadtime.links.ardrone2.commands import Config, Control, Move, Ref, Watchdog, encode
 from deadtime.links.ardrone2.configuration import parse_configuration
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase
 from deadtime.links.ardrone2.navdata import parse_navdata
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 #: Time that a busy machine may add to a time that is exact in virtual time, s.
 SLACK = 0.25

@@ -6,8 +6,7 @@ import pytest
 from deadtime import LinkError
 from deadtime.links import run
 from emulated import connected
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from worst_case_drone import connected_drone
 
 

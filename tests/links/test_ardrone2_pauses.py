@@ -14,8 +14,7 @@ from deadtime.links.ardrone2.commands import Move, Ref
 from deadtime.links.ardrone2.emulator import Phase
 from deadtime.links.ardrone2.sender import CYCLE, CommandSender
 from emulated import emulator, skip_if_too_busy
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from worst_case_drone import connected_drone
 
 

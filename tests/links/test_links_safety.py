@@ -14,8 +14,7 @@ import pytest
 from deadtime import FlightAbortedError
 from deadtime.links import Journal, Limits, UnitCommand, VehicleState, Watch, largest_gain
 from deadtime.links.safety import BUMP, jumps
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 STATE = VehicleState(
     time=10.0, height=1.0, flying=True, landed=False, sequence=7, vehicle_time=3.0, battery=80.0

@@ -20,8 +20,7 @@ from deadtime.links.udp import (
     RelayOptions,
     run_plant,
 )
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 FIELDS = ("flags", "sequence", "echo_sequence", "sent", "echo_sent", "held", "value", "reference")
 LIMIT, DURATION = 5.0, 0.4

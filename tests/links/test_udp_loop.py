@@ -32,8 +32,7 @@ from deadtime.links.udp import (
     run_plant,
     run_trial,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 WAY = Network(delay=0.05)
 WATCHDOG, LIMIT = 0.5, 5.0

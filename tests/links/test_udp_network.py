@@ -17,8 +17,7 @@ from deadtime.links.udp import (
     network_of,
 )
 from deadtime.links.udp.described import network_from, network_text
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 FULL = Network(
     delay=LogNormal(0.04, 0.05, 0.02),

@@ -6,8 +6,7 @@ import math
 import pytest
 from deadtime import LinkError
 from deadtime.links import run
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 
 class Collector(asyncio.DatagramProtocol):

@@ -20,8 +20,7 @@ from deadtime.links.ardrone2.commands import (
     decode,
     encode,
 )
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 GOLDEN = [
     (7, Move(gaz=0.5), b"AT*PCMD=7,1,0,0,1056964608,0\r"),

@@ -8,8 +8,7 @@ import pytest
 from deadtime._base.errors import PacketError
 from deadtime.links.ardrone2.configuration import parse_configuration, write_configuration
 from deadtime.links.udp.packets import LoopPacket, decode_doubles, encode_doubles
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 ANSWER = LoopPacket(9, 100.0, 8, 12.5, 1e-4, value=0.5, reference=1.0, flags=3)
 

@@ -18,8 +18,7 @@ from deadtime.links.ardrone2.navdata import (
     parse_navdata,
 )
 from deadtime.links.ardrone2.navdata_options import AltitudeOption, Demo, KalmanPressure, Pwm
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from navdata_packets import BOOTSTRAP, demo_packet, full_packets, older_packet
 
 TAGS = [*range(30)]

@@ -3,8 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.signal import cont2discrete
 
 TS = 0.065

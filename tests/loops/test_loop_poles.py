@@ -7,8 +7,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from loops import INTEGRATOR, controllers, plants
 from scipy.special import lambertw
 

@@ -5,8 +5,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from loops import loops
 
 TIMES = np.linspace(0.0, 5.0, 101)

@@ -6,8 +6,7 @@ from dataclasses import replace
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 SMOOTH = dtm.DerivativeFilter(38.0)
 TUSTIN = dtm.DerivativeFilter(38.0, discretisation="tustin")

@@ -7,8 +7,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.loops._stability import _highest_crossing
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 Z, W = 0.1, 2.0
 

@@ -14,8 +14,7 @@ import scipy.linalg
 from deadtime.loops._model import rest_of
 from deadtime.loops._settled import TIME_CONSTANTS
 from deadtime.loops._sweep import _Sets
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from loops import loops
 
 DRONE = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.3), delay=0.36, sample_time=0.065, limit=1.0)

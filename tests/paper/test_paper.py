@@ -18,8 +18,7 @@ from deadtime import paper
 from deadtime.estimation import Overshoot
 from deadtime.paper import Comparison, Verdict, agreeing_digits, printed_digits
 from deadtime.paper._page import render_reproduction, write_reproduction
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.optimize import brentq
 
 ROOT = Path(__file__).resolve().parents[2]

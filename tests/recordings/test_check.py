@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import OutputError
 from flights import flight_path
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 TS = 0.065
 LOOP = dtm.ControlLoop(dtm.Integrator(0.85), dtm.P(1.6), delay=0.3, sample_time=TS, limit=1.0)

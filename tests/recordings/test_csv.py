@@ -8,8 +8,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import assume, example, given
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, strategies as st
 from step_table import COLUMNS, NAMES, as_csv, assert_is_the_table
 
 

@@ -5,8 +5,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 ROWS = [(k * 0.1, 0.0 if k < 5 else 1.0, 0.01 * k) for k in range(20)]
 

@@ -3,8 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from step_table import COLUMNS, NAMES, assert_is_the_table
 
 ENDINGS = [".csv", ".parquet"]

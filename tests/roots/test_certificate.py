@@ -19,8 +19,7 @@ from deadtime.roots.certificate._check import _dominates_rightward
 from deadtime.roots.certificate._enclosures import angle, cos_sin, dyadic, exponential, pi
 from deadtime.roots.certificate._function import ExactFunction
 from deadtime.roots.certificate._parts import Monotone, Segment
-from hypothesis import assume, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, settings, strategies as st
 from root_cases import CASES, ROOT_ON_AN_EDGE
 
 # A multiple root or a cluster lies on the real axis, which is an edge.

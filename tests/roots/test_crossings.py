@@ -7,8 +7,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import delay, s
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 Kp, Kv, K, T = dtm.parameters("Kp Kv K T")
 

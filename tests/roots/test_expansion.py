@@ -5,8 +5,7 @@ import pytest
 from deadtime import QuasiPolynomial, delay, s
 from deadtime.roots import Expansion
 from flint import acb, acb_series, arb, ctx, fmpq
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 DIGITS = 400
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from deadtime import QuasiPolynomial, delay, s
 from deadtime._base.errors import ContourError
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 # Fewer roots than this are found without the laws of chains.
 FEW = 60

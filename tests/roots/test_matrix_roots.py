@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from deadtime import DelaySystem
 from deadtime.roots._matrix_roots import MatrixDeterminant
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 
 def matrix_of(system):

@@ -6,8 +6,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import delay, s
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 (T, K) = dtm.parameters("T K")
 

@@ -10,8 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from deadtime import QuasiPolynomial, delay, s
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 numbers = st.floats(-10, 10, allow_subnormal=False)
 times = st.floats(0, 3, allow_subnormal=False)

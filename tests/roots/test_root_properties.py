@@ -3,8 +3,7 @@
 import numpy as np
 from deadtime import QuasiPolynomial, delay, s
 from deadtime._base.errors import ContourError
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 # Thousandths: what a loop has. Coefficients of 1e-300 are refused with the reason, not solved.
 gains = st.integers(-3000, 3000).filter(bool).map(lambda n: n / 1000)

@@ -9,8 +9,7 @@ import pytest
 from deadtime import QuasiPolynomial, delay, s
 from deadtime._base.errors import ContourError
 from deadtime.roots import RootSet
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from root_cases import CASES, ULP, make
 
 # Closed forms

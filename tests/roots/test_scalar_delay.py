@@ -6,8 +6,7 @@ import deadtime as dtm
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from lambertw_points import EPS, bits, log_of
 
 

@@ -9,8 +9,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from deadtime import delay, s
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 CASES = {
     case["name"]: case

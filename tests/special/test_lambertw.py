@@ -9,8 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import scipy.special
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from lambertw_points import BRANCH_POINT, EPS, bits, log_of, one_by_one
 
 TABLE = Path(__file__).parents[1] / "reference" / "lambertw.npz"

@@ -12,8 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 import scipy.special
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 EPS = 2.0**-52
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, -5e-324, 1e-9, -1e-9, 1024.0]

@@ -8,8 +8,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import delay, s
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 Kp, Kv, T, T2 = dtm.parameters("Kp Kv T T2")
 VELOCITY = s + (Kp + Kv * s) * delay(0.36)

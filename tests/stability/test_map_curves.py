@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from deadtime import delay, s
 from deadtime.stability import MapStatus
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from map_families import FAMILIES, LAG, OMEGA, ZETA, assert_roots_on_the_axis
 
 names = pytest.mark.parametrize("name", FAMILIES)

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from deadtime import delay, s
 from deadtime.stability import MapStatus
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from map_families import assert_roots_on_the_axis
 
 T1, T2, K, T, a = dtm.parameters("T1 T2 K T a")

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from deadtime.recordings.logs._autopilots import names_of
-from deadtime.recordings.logs._contents import LogContents, Topic
-from deadtime.recordings.logs._log import Log, log_of
+from deadtime.logs._autopilots import names_of
+from deadtime.logs._contents import LogContents, Topic
+from deadtime.logs._log import Log, log_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

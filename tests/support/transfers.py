@@ -3,8 +3,7 @@
 import deadtime as dtm
 import numpy as np
 from deadtime import TransferFunction, delay, s
-from hypothesis import assume
-from hypothesis import strategies as st
+from hypothesis import assume, strategies as st
 
 numbers = st.floats(-5, 5, allow_subnormal=False).map(lambda x: round(x, 3))
 times = st.floats(0, 2, allow_subnormal=False).map(lambda x: round(x, 3))

@@ -12,8 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from deadtime.gallery import _access as gallery
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy import signal
 
 PROBLEMS = {

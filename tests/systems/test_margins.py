@@ -6,8 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from deadtime import TransferFunction, delay, feedback, s
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from transfers import LOOPS, quasi_polynomials, times
 
 

@@ -9,8 +9,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from deadtime import DelaySystem, delay, s
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 RNG = np.random.default_rng(20)
 

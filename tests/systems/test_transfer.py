@@ -10,8 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from deadtime import TransferFunction, delay, feedback, s
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from transfers import close, error, points, terms, transfer_functions
 
 # What it is

@@ -6,8 +6,7 @@ import deadtime as dtm
 import numpy as np
 from deadtime.loops._model import LoopRun
 from deadtime.tuning._tail import Fundamental, tail_bound
-from hypothesis import assume, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, settings, strategies as st
 from loops import loops
 
 #: Steps of a simulation in a delay.

@@ -7,9 +7,13 @@ from typing import Literal
 
 from rich.table import Table
 
-from deadtime.estimation import Comparison, PlantChoice
-from deadtime.estimation._choose import COLUMNS as PLANT_COLUMNS
-from deadtime.estimation._compare import COLUMNS, truth_row
+from deadtime.estimation import (
+    COLUMNS,
+    COLUMNS as PLANT_COLUMNS,
+    Comparison,
+    PlantChoice,
+    truth_row,
+)
 
 
 def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = None) -> Table:

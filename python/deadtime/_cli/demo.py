@@ -15,8 +15,7 @@ from deadtime._cli.comparisons import estimates_table
 from deadtime._cli.show import print_json, print_points, print_table, print_text, stages
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-from deadtime.reports import demo_recording, study
-from deadtime.reports._page import write_report
+from deadtime.reports import demo_recording, study, write_report
 
 
 def command(

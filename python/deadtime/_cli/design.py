@@ -10,8 +10,7 @@ from deadtime._base.validation import finite
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
-from deadtime.tuning import Design
-from deadtime.tuning import design as find_design
+from deadtime.tuning import Design, design as find_design
 
 Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
 Kind = Literal["P", "PV", "PD", "PI", "PID"]

@@ -19,18 +19,22 @@ from deadtime._cli.plants import with_names
 from deadtime._cli.show import print_json, print_points, print_table, print_text, save_figure
 from deadtime._cli.windows import files_and_windows
 from deadtime.estimation import (
+    JOINT,
+    METHODS,
     Comparison,
     DelayEstimate,
     Method,
+    NoisePath,
+    OvershootMap,
     PlantChoice,
+    automatic_method,
     choose_plant,
     compare_methods,
+    estimate_axes,
     estimate_delay,
+    plot_estimate,
+    plot_fits,
 )
-from deadtime.estimation._estimate import JOINT, METHODS, automatic_method
-from deadtime.estimation._plots import estimate_axes, plot_estimate, plot_fits
-from deadtime.estimation.methods._overshoot import OvershootMap
-from deadtime.estimation.methods._waveform import NoisePath
 from deadtime.recordings import read_recording
 
 Each = TypeVar("Each")

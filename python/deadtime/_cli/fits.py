@@ -7,8 +7,7 @@ import re
 
 from deadtime._base.digits import between, stated
 from deadtime._cli.show import print_text
-from deadtime.estimation import DelayEstimate
-from deadtime.estimation.likelihood._power import unseen_in_words
+from deadtime.estimation import DelayEstimate, unseen_in_words
 
 #: What begins the reasons in the message of an estimate.
 _NOT_ADEQUATE = "; not adequate: "

@@ -20,6 +20,9 @@ from deadtime._cli.show import (
 )
 from deadtime._cli.vehicles import flown_vehicle
 from deadtime.flights import (
+    COLUMNS,
+    PARTS,
+    USUAL,
     AdaptivePlan,
     AdaptiveStudy,
     FlightPlan,
@@ -27,10 +30,8 @@ from deadtime.flights import (
     MovingDelay,
     fly_adaptive,
     fly_axes,
+    write_flight_page,
 )
-from deadtime.flights._page import PARTS, write_flight_page
-from deadtime.flights._plan import USUAL
-from deadtime.flights._study import COLUMNS
 from deadtime.links import Limits
 from deadtime.links.ardrone2.emulator.motion import PlantName
 from deadtime.links.axes import AxisName

@@ -9,7 +9,7 @@ import typer
 
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_points, print_table, print_text, results_table
-from deadtime.recordings import Log, LogLoop, open_log
+from deadtime.logs import Log, LogLoop, open_log
 
 
 def command(

@@ -20,9 +20,14 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
-from deadtime.internet._loop import GAINS, run_internet_loop
-from deadtime.internet._plots import LABELS, plot_internet_loop
-from deadtime.internet._result import InternetRun, Spread
+from deadtime.internet import (
+    GAINS,
+    LABELS,
+    InternetRun,
+    Spread,
+    plot_internet_loop,
+    run_internet_loop,
+)
 from deadtime.links.udp import Trial, network_of, policy_of
 from deadtime.paper import PRINTED_OVERSHOOTS, delay_by_dominant_root
 

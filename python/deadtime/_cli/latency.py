@@ -11,9 +11,7 @@ from deadtime._base.digits import between, stated
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_table, print_text, results, results_table
-from deadtime.recordings import Log, open_log
-from deadtime.reports import Latency, compare_latencies, latency
-from deadtime.reports.latencies._latency import loops_asked_for
+from deadtime.logs import Latency, Log, compare_latencies, latency, loops_asked_for, open_log
 
 LEFT = ("loop", "from", "why")
 

@@ -11,8 +11,7 @@ from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_text, stages
 from deadtime.recordings import read_recording
-from deadtime.reports import study
-from deadtime.reports._page import write_report
+from deadtime.reports import study, write_report
 
 
 def command(

@@ -18,8 +18,7 @@ from deadtime._cli.show import (
     save_figure,
     stages,
 )
-from deadtime.paper import PARTS, TITLES, Part, Verdict, reproduce
-from deadtime.paper._page import HEADS, write_reproduction
+from deadtime.paper import HEADS, PARTS, TITLES, Part, Verdict, reproduce, write_reproduction
 
 STYLES = {
     Verdict.EXACT: "green",

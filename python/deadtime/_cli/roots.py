@@ -12,8 +12,7 @@ from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_table, print_text, results_table, save_figure
 from deadtime._cli.verdicts import listed, verdict
-from deadtime.roots._plots import plot_root_set
-from deadtime.roots.certificate._plots import plot_certificate
+from deadtime.roots import plot_certificate, plot_root_set
 
 HEADS = ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius")
 

@@ -13,7 +13,7 @@ from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.show import print_json, print_text, save_figure
 from deadtime._cli.verdicts import verdict
-from deadtime.systems._plots import plot_responses
+from deadtime.systems import plot_responses
 
 #: Metrics that a step response has also without a steady state.
 PEAK = ("peak", "peak_time")

@@ -11,10 +11,8 @@ from statistics import median
 
 from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime._cli.own_emulator import own_emulator
-from deadtime.flights._fly import Connect, Flown
-from deadtime.flights._moving_delay import MovingDelay
-from deadtime.links import Limits, Vehicle
-from deadtime.links import run as run_virtual
+from deadtime.flights import Connect, Flown, MovingDelay
+from deadtime.links import Limits, Vehicle, run as run_virtual
 from deadtime.links.ardrone2 import ARDrone2
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
 from deadtime.links.ardrone2.emulator.motion import PlantName

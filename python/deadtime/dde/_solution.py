@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays, equal
 from deadtime._base.validation import real_array
-from deadtime._deadtime import DelayPieces
+from deadtime.dde._native import DelayPieces
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime import _deadtime
+import deadtime.dde._native as native
 from deadtime._base.validation import finite, positive, real_array, whole_number
 from deadtime.dde._compiled import addresses
 from deadtime.dde._solution import DelayResult, DelaySolution
@@ -163,7 +163,7 @@ def solve_dde(
         raise TypeError(f"fun={fun!r} is no function")
     if compiled is not None and args:
         raise ValueError("args: a compiled function takes its data from its LowLevelCallable")
-    run = _deadtime.solve_dde(
+    run = native.solve_dde(
         DelayProblem(
             fun=fun if compiled is None else compiled,
             t_span=(start, end),
@@ -244,7 +244,7 @@ class DelayProblem:
     jac_sparsity: tuple[list[int], list[int]] | None
 
 
-def _message(run: _deadtime.DelayRun) -> str:
+def _message(run: native.DelayRun) -> str:
     if run.outcome == "finished":
         return "The end of t_span was reached."
     if run.outcome == "event":

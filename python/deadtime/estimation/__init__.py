@@ -12,12 +12,36 @@ while the loop runs. Each method is a class that holds its options.
 # profiles and residuals, `planning` the bounds of planned experiments, `running` what is
 # estimated while a loop runs.
 
-from deadtime.estimation._choose import PlantChoice, choose_plant
-from deadtime.estimation._compare import Comparison, MethodDifference, compare_methods
-from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._choose import (
+    PlantChoice,
+    bic as bic,
+    choose_plant,
+    likeliest as likeliest,
+    with_pair as with_pair,
+)
+from deadtime.estimation._compare import (
+    COLUMNS as COLUMNS,
+    Comparison,
+    MethodDifference,
+    compare_methods,
+    truth_row as truth_row,
+)
+from deadtime.estimation._estimate import (
+    JOINT as JOINT,
+    METHODS as METHODS,
+    automatic_method as automatic_method,
+    estimate_delay,
+)
+from deadtime.estimation._plots import (
+    estimate_axes as estimate_axes,
+    plot_estimate as plot_estimate,
+    plot_fits as plot_fits,
+)
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
+from deadtime.estimation.fit._profile import unit_of as unit_of
 from deadtime.estimation.fit._residuals import Whiteness
+from deadtime.estimation.likelihood._power import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
@@ -28,9 +52,16 @@ from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
 from deadtime.estimation.methods._method import Method
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.methods._overshoot import Overshoot, damping_ratio
+from deadtime.estimation.methods._overshoot import (
+    Overshoot,
+    OvershootMap as OvershootMap,
+    damping_ratio,
+    dominant_x as dominant_x,
+    exact_x as exact_x,
+)
 from deadtime.estimation.methods._relay import Relay
-from deadtime.estimation.methods._waveform import Waveform
+from deadtime.estimation.methods._waveform import NoisePath as NoisePath, Waveform
+from deadtime.estimation.models._held import HeldResponse as HeldResponse, path_of as path_of
 from deadtime.estimation.planning._identifiability import Identifiability, identifiability
 from deadtime.estimation.planning._monte_carlo import MonteCarlo
 from deadtime.estimation.planning._planned_bound import PlannedBound

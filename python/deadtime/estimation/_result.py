@@ -27,8 +27,8 @@ from deadtime.loops import (
     Integrator,
     ParametricPlant,
     RateLimited,
+    explorer_of,
 )
-from deadtime.loops._explored import explorer_of
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:

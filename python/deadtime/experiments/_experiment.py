@@ -30,8 +30,7 @@ from deadtime.experiments._waves import (
     whole_period,
 )
 from deadtime.loops import ControlLoop, P
-from deadtime.recordings import Recording
-from deadtime.recordings._recording import MINIMUM_SAMPLES
+from deadtime.recordings import MINIMUM_SAMPLES, Recording
 
 Array = NDArray[np.float64]
 

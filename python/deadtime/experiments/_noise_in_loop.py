@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime.experiments._noise import DisturbanceModel, NoiseModel, Seed
-from deadtime.loops import PV, ControlLoop, DerivativeFilter
-from deadtime.loops._derivative_filter import discretised
+from deadtime.loops import PV, ControlLoop, DerivativeFilter, discretised
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops import Plant
-from deadtime.loops._plants import realise
+from deadtime.loops import Plant, realise
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import positive, whole_number
-from deadtime.recordings._recording import MINIMUM_SAMPLES
+from deadtime.recordings import MINIMUM_SAMPLES
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

@@ -30,9 +30,16 @@ from deadtime.flights._step_test import StepProgramme, fly_steps, row_columns
 from deadtime.flights._study import FlightStudy
 from deadtime.links.clock import now
 from deadtime.links.journal import Journal
-from deadtime.loops import PV, ControlLoop, DerivativeFilter, Integrator, P, RateLimited
-from deadtime.loops._derivative_filter import PAPER_FILTER
-from deadtime.loops._plants import steady_lag
+from deadtime.loops import (
+    PAPER_FILTER,
+    PV,
+    ControlLoop,
+    DerivativeFilter,
+    Integrator,
+    P,
+    RateLimited,
+    steady_lag,
+)
 from deadtime.recordings import Recording, read_recording
 from deadtime.tuning import GainSchedule, adaptive_gains
 

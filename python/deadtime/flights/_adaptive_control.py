@@ -10,8 +10,7 @@ import numpy as np
 from deadtime.estimation import OnlineEstimator
 from deadtime.flights._axis_control import AxisControl
 from deadtime.links.clock import now
-from deadtime.loops import PV, P, RateLimited
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER, PV, P, RateLimited
 from deadtime.tuning import GainSchedule
 
 #: Commands that are kept to shape the newest one: it takes a few seconds to follow any.

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from deadtime.loops import PV, DerivativeFilter, P
-from deadtime.loops._derivative_filter import PAPER_FILTER, discretised
+from deadtime.loops import PAPER_FILTER, PV, DerivativeFilter, P, discretised
 
 
 class Velocity:

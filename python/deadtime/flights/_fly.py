@@ -26,8 +26,7 @@ from deadtime.links.axes import AxisReader
 from deadtime.links.clock import now
 from deadtime.links.journal import Journal
 from deadtime.links.vehicle import Echo, Vehicle, VehicleState
-from deadtime.loops import PV, P
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER, PV, P
 from deadtime.recordings import read_recording
 
 #: Flights, and how the vehicle limits the changes of commands by axis.

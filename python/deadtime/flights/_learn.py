@@ -17,8 +17,7 @@ from deadtime.flights._plants import (
 )
 from deadtime.flights._runs import FlownSteps, read_columns, read_telemetry
 from deadtime.flights._split import DelaySplit, split_delay
-from deadtime.loops import PV, ControlLoop, Integrator, P
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER, PV, ControlLoop, Integrator, P
 from deadtime.tuning import Design, design
 
 

@@ -13,7 +13,7 @@ from deadtime.flights._adaptive import STEP_COLUMNS, AdaptiveStudy
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 from deadtime.flights._study import COLUMNS, FlightStudy
-from deadtime.tuning._live import live_design
+from deadtime.tuning import live_design
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation.methods._overshoot import dominant_x, exact_x
+from deadtime.estimation import dominant_x, exact_x
 from deadtime.links.udp import HeldIntegrator, Trial
 
 Array = NDArray[np.float64]

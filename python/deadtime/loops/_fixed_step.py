@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, positive
-from deadtime._deadtime import fixed_step_run
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import LoopRun, reference_jumps, refuse_discretised
+from deadtime.loops._native import fixed_step_run
 from deadtime.loops._plants import realise
 from deadtime.systems import Response
 

@@ -14,8 +14,7 @@ from deadtime.loops._characteristic import closed_loop, open_loop
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.loops._specification import LoopSpecification
 from deadtime.loops._stability import sampled_is_stable
-from deadtime.systems import Margins, TransferFunction
-from deadtime.systems._margins import margins_of
+from deadtime.systems import Margins, TransferFunction, margins_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -196,7 +195,7 @@ class LoopGain:
             As in `frequency_response` and `margin`.
         """
         from deadtime._base.drawing import shown_rows
-        from deadtime.systems._plots import plot_bode
+        from deadtime.systems import plot_bode
 
         loop, found = self.specification, self.margin()
         if omega is None:

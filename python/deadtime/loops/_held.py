@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.progress import Report
-from deadtime._deadtime import (
+from deadtime.loops._controllers import Controller
+from deadtime.loops._model import LoopModel, refuse_discretised
+from deadtime.loops._native import (
     MapBoundary,
     MapCells,
     held_boundaries,
     held_crossings,
     held_map,
 )
-from deadtime.loops._controllers import Controller
-from deadtime.loops._model import LoopModel, refuse_discretised
 from deadtime.loops._plants import Plant
 
 Floats = NDArray[np.float64]

@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import finite, one_dimensional
-from deadtime._deadtime import LoopResponse, on_samples
 from deadtime.loops._characteristic import closed_loop
 from deadtime.loops._model import LoopRun, reference_jumps
+from deadtime.loops._native import LoopResponse, on_samples
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
-from deadtime.systems import Response
-from deadtime.systems._response import response_of, until_settled
+from deadtime.systems import Response, response_of, until_settled
 
 Vector = NDArray[np.float64]
 

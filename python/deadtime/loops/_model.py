@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import increasing, real_array
-from deadtime._deadtime import LinearLoop
 from deadtime.loops._controllers import Controller, FilterUpdate
 from deadtime.loops._entries import Each, number, vector, zeros
+from deadtime.loops._native import LinearLoop
 from deadtime.loops._plants import Plant, StateSpace, realise, rest
 
 Vector = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import held_response
+from deadtime.loops._native import held_response
 from deadtime.loops._plants import Plant
 
 Vector = NDArray[np.float64]

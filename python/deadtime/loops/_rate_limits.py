@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import positive
-from deadtime._deadtime import rate_limited
+from deadtime.loops._native import rate_limited
 from deadtime.loops._plants import Plant, RationalPlant
 from deadtime.systems import TransferFunction
 

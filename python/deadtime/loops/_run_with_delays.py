@@ -15,8 +15,7 @@ from deadtime._base.validation import finite, one_dimensional
 from deadtime.loops._characteristic import closed_loop, reference_to_command
 from deadtime.loops._model import reference_jumps
 from deadtime.loops._specification import LoopSpecification
-from deadtime.systems import Response, TransferFunction
-from deadtime.systems._run import respond, step_response
+from deadtime.systems import Response, TransferFunction, respond, step_response
 
 Vector = NDArray[np.float64]
 

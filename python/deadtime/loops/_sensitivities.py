@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import loop_sensitivities
 from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
+from deadtime.loops._native import loop_sensitivities
 from deadtime.loops._specification import LoopSpecification
 
 Vector = NDArray[np.float64]

@@ -21,7 +21,7 @@ from deadtime.loops._model import LoopModel, LoopRun, rest_of, state_at_rest
 from deadtime.loops._plants import Plant
 
 if TYPE_CHECKING:
-    from deadtime._deadtime import LinearLoop, LoopResponse
+    from deadtime.loops._native import LinearLoop, LoopResponse
 
 
 #: Where the delay of a loop can sit.

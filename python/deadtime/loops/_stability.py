@@ -12,13 +12,13 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime import _deadtime
-from deadtime._deadtime import sampled_abscissa_grid
+import deadtime.loops._native as native
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
 from deadtime.loops._factored_plant import PAIR
 from deadtime.loops._held import HeldFamily
 from deadtime.loops._model import LoopModel, refuse_discretised
+from deadtime.loops._native import sampled_abscissa_grid
 from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import Plant
 from deadtime.loops._sampled_ranges import SampledNumber
@@ -137,11 +137,11 @@ def continuous_range(
     value = values[name]
     family = characteristic(plant, controller, {**values, name: Parameter(name)})
     if name == "delay":
-        return _deadtime.delay_range(family._family, value)
+        return native.delay_range(family._family, value)
     if name in _OF_FILTER:
-        seek = _deadtime.damping_range if name == "damping" else _deadtime.corner_range
+        seek = native.damping_range if name == "damping" else native.corner_range
         return seek(family._family, value, _highest_crossing(plant, controller, values))
-    return _deadtime.gain_range(family._family, value, _bounds(plant, name, value))
+    return native.gain_range(family._family, value, _bounds(plant, name, value))
 
 
 def _highest_crossing(plant: Plant, controller: Controller, values: Mapping[str, float]) -> float:
@@ -156,7 +156,7 @@ def _highest_crossing(plant: Plant, controller: Controller, values: Mapping[str,
     feedback = [abs(terms.derivative) / least, abs(terms.proportional), abs(terms.integral)]
     gain = np.polymul(np.abs(b), feedback)[::-1]
     rest = np.append(0.0, np.asarray(a, dtype=np.float64)[::-1])
-    return _deadtime.end_of_gain(
+    return native.end_of_gain(
         QuasiPolynomial([gain], [0.0])._native, QuasiPolynomial([rest], [0.0])._native, 1.0
     )
 
@@ -306,7 +306,7 @@ def _grid_of_gains(
     decay: float,
     threads: int | None,
     progress: Callable[[int], object] | None,
-) -> _deadtime.SampledCells:
+) -> native.SampledCells:
     """Like `sampled_grid`, where only gains, delay and sample time vary."""
     fixed = {name: float(array[0]) for name, array in arrays.items()} | {"gain": 1.0}
     gains = controller._gains()

@@ -28,13 +28,13 @@ from deadtime._base.validation import (
     real_array,
     thread_number,
 )
-from deadtime._deadtime import sweep_abscissae, sweep_decay, sweep_metrics, sweep_responses
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._entries import Each
 from deadtime.loops._model import refuse_discretised, rest_of
+from deadtime.loops._native import sweep_abscissae, sweep_decay, sweep_metrics, sweep_responses
 from deadtime.loops._settled import TIME_CONSTANTS, slowest_times
 from deadtime.loops._stability import sampled_grid
-from deadtime.systems._response import first_duration
+from deadtime.systems import first_duration
 
 Vector = NDArray[np.float64]
 

@@ -8,7 +8,8 @@ data; `reproduce` runs them all, and ``deadtime reproduce`` prints them and writ
 Import it with ``from deadtime import paper``.
 """
 
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER
+from deadtime.paper._page import HEADS as HEADS, write_reproduction as write_reproduction
 from deadtime.paper.comparison import Comparison, Verdict, agreeing_digits, printed_digits
 from deadtime.paper.figure2 import Figure2, Scenario, Trial, figure2
 from deadtime.paper.figure3 import Figure3, coarse_limit, figure3

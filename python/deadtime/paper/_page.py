@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from deadtime._base.page import page, write_page
 from deadtime.loops import PV, ControlLoop, Integrator
-from deadtime.paper import TITLES, Comparison, Reproduction, Verdict
+from deadtime.paper.comparison import Comparison, Verdict
+from deadtime.paper.reproduction import TITLES, Reproduction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

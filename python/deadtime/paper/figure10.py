@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import deadtime as dtm
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figures6and7 import DELAY
 from deadtime.paper.part import Grid, Part

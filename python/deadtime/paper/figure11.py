@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER
 from deadtime.paper.comparison import Comparison
 from deadtime.paper.figure10 import velocity_loop
 from deadtime.paper.figures6and7 import DELAY

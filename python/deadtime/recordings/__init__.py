@@ -1,22 +1,34 @@
 """Recordings of control loops, their checks, and their readers, one file for each format."""
 
 from deadtime.recordings._check import RecordingCheck
-from deadtime.recordings._check_rows import Hole
-from deadtime.recordings._findings import Finding
-from deadtime.recordings._recording import Recording, SentCommands, Step
-from deadtime.recordings.logs import Log, LogLoop, Series, open_log
+from deadtime.recordings._check_excitation import (
+    copied_setpoint as copied_setpoint,
+    no_excitation as no_excitation,
+    no_motion as no_motion,
+)
+from deadtime.recordings._check_rows import Hole, repeated_rows as repeated_rows
+from deadtime.recordings._findings import Columns as Columns, Finding
+from deadtime.recordings._first_bytes import (
+    HEAD as HEAD,
+    format_of as format_of,
+    opened as opened,
+    whole as whole,
+)
+from deadtime.recordings._recording import (
+    LARGEST as LARGEST,
+    MINIMUM_SAMPLES as MINIMUM_SAMPLES,
+    Recording,
+    SentCommands,
+    Step,
+)
 from deadtime.recordings.readers._read import read_recording
 
 __all__ = [
     "Finding",
     "Hole",
-    "Log",
-    "LogLoop",
     "Recording",
     "RecordingCheck",
     "SentCommands",
-    "Series",
     "Step",
-    "open_log",
     "read_recording",
 ]

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 from deadtime._base.drawing import new_figure
 from deadtime._base.page import page, write_page
-from deadtime.estimation._compare import COLUMNS, truth_row
-from deadtime.estimation._plots import plot_fits
+from deadtime.estimation import COLUMNS, plot_fits, truth_row
 from deadtime.reports._study import Study
-from deadtime.systems._plots import plot_responses
-from deadtime.tuning._live import live_design
+from deadtime.systems import plot_responses
+from deadtime.tuning import live_design
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

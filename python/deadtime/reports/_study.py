@@ -10,8 +10,7 @@ from deadtime._base.progress import Stages, stage_report
 from deadtime._base.validation import OpenRange
 from deadtime.estimation import Comparison, DelayEstimate, compare_methods
 from deadtime.experiments import Experiment, Noise
-from deadtime.loops import PV, Controller, ControlLoop, Integrator, P, kit_plant
-from deadtime.loops._derivative_filter import PAPER_FILTER
+from deadtime.loops import PAPER_FILTER, PV, Controller, ControlLoop, Integrator, P, kit_plant
 from deadtime.recordings import Recording
 from deadtime.systems import Response
 from deadtime.tuning import Design, critical_gain, design

@@ -13,14 +13,31 @@ independent program checks.
 # program that checks them.
 
 from deadtime.roots._chains import Chain
-from deadtime.roots._crossings import Crossings, crossings, delay_margin
+from deadtime.roots._characteristic import Edge as Edge
+from deadtime.roots._crossings import (
+    Crossings,
+    crossings,
+    delay_margin,
+    margin_of_family as margin_of_family,
+)
+from deadtime.roots._determinant import (
+    LARGEST as LARGEST,
+    NotExpandedError as NotExpandedError,
+    expanded as expanded,
+)
 from deadtime.roots._expansion import Expansion
+from deadtime.roots._family import HasFamily as HasFamily, family_of as family_of
+from deadtime.roots._matrix_roots import MatrixDeterminant as MatrixDeterminant
 from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial, parameters
-from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, s
+from deadtime.roots._plots import plot_root_set as plot_root_set
+from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, is_number as is_number, s
 from deadtime.roots._root_set import RootSet
 from deadtime.roots._scalar_delay import dde_roots, rightmost_branches
 from deadtime.roots._sensitivity import RootSensitivity
+from deadtime.roots._text import latex as latex
 from deadtime.roots.certificate._certificate import Certificate
+from deadtime.roots.certificate._enclosures import exponential as exponential
+from deadtime.roots.certificate._plots import plot_certificate as plot_certificate
 
 __all__ = [
     "Certificate",

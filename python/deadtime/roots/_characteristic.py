@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
+import deadtime.roots._native as native
 from deadtime._base.validation import OpenRange, open_interval
 from deadtime.roots._chains import Chain, chains_of
 from deadtime.roots._root_set import RootSet, root_set
@@ -26,7 +26,7 @@ class Characteristic:
 
     __slots__ = ()
 
-    _native: _deadtime.QuasiPolynomial
+    _native: native.QuasiPolynomial
     _coefficients: NDArray[np.float64]
     _delays: NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from typing import Any, Protocol, SupportsFloat, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
+import deadtime.roots._native as native
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.validation import Range, interval, numbers_at
@@ -194,7 +194,7 @@ def crossings(
     name, ends = _one_range(ranges)
     equation = family_of(family, (name,), at)
     equation.at(**{name: ends[0]}), equation.at(**{name: ends[1]})
-    found = _deadtime.crossings(equation._family, ends)
+    found = native.crossings(equation._family, ends)
     return Crossings(
         parameter=name,
         range=ends,
@@ -280,7 +280,7 @@ def margin_of_family(family: ParametricQuasiPolynomial, at: Mapping[str, float])
     (name,) = delays
     start = at[name]
     others = {other: value for other, value in at.items() if other != name}
-    return _deadtime.delay_margin(family_of(family, (name,), others)._family, start)
+    return native.delay_margin(family_of(family, (name,), others)._family, start)
 
 
 def _one_range(ranges: Any) -> tuple[str, Range]:

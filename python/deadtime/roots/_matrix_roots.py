@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
+import deadtime.roots._native as native
 from deadtime._base.validation import OpenRange, open_interval
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots.certificate._certificate import Certificate
@@ -32,13 +32,13 @@ class MatrixDeterminant:
 
     __slots__ = ("_native",)
 
-    _native: _deadtime.CharacteristicMatrix
+    _native: native.CharacteristicMatrix
 
     def __init__(self, E: _Matrix, N: Mapping[float, _Matrix], A: Mapping[float, _Matrix]) -> None:
         def listed(group: Mapping[float, _Matrix]) -> list[tuple[float, _Matrix]]:
             return [(tau, np.ascontiguousarray(matrix)) for tau, matrix in group.items()]
 
-        self._native = _deadtime.CharacteristicMatrix(np.ascontiguousarray(E), listed(N), listed(A))
+        self._native = native.CharacteristicMatrix(np.ascontiguousarray(E), listed(N), listed(A))
 
     @property
     def is_invertible(self) -> bool:

@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, SupportsFloat, cast
 
 from deadtime._base.validation import finite, numbers_at
-from deadtime._deadtime import Family
+from deadtime.roots._native import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
 from deadtime.roots._text import Delay, Monomial, Powers, Terms, family_text, latex
 

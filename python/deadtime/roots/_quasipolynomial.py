@@ -22,7 +22,7 @@ from typing import (
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime import _deadtime
+import deadtime.roots._native as native
 from deadtime._base.validation import Range, unmasked
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
@@ -77,7 +77,7 @@ class QuasiPolynomial(Characteristic):
     # NumPy leaves `array * h` and `number * h` to this class.
     __array_ufunc__ = None
 
-    _native: _deadtime.QuasiPolynomial
+    _native: native.QuasiPolynomial
     _coefficients: NDArray[np.float64]
     _delays: NDArray[np.float64]
 
@@ -89,15 +89,15 @@ class QuasiPolynomial(Characteristic):
                 f"{len(rows)} rows of coefficients but {len(times)} delays: "
                 "give one delay for every row"
             )
-        self._adopt(_deadtime.QuasiPolynomial(rows, times))
+        self._adopt(native.QuasiPolynomial(rows, times))
 
     @classmethod
-    def _wrap(cls, native: _deadtime.QuasiPolynomial) -> QuasiPolynomial:
+    def _wrap(cls, native: native.QuasiPolynomial) -> QuasiPolynomial:
         new = object.__new__(cls)
         new._adopt(native)
         return new
 
-    def _adopt(self, native: _deadtime.QuasiPolynomial) -> None:
+    def _adopt(self, native: native.QuasiPolynomial) -> None:
         put = object.__setattr__
         put(self, "_native", native)
         put(self, "_coefficients", _frozen(native.coefficients()))
@@ -204,7 +204,7 @@ class QuasiPolynomial(Characteristic):
             divisor = float(cast(float, other))
             if divisor == 0.0:
                 raise ZeroDivisionError("division of a quasi-polynomial by zero")
-            return self._wrap(_deadtime.QuasiPolynomial(self._coefficients / divisor, self._delays))
+            return self._wrap(native.QuasiPolynomial(self._coefficients / divisor, self._delays))
         if isinstance(other, QuasiPolynomial):
             return _quotient(self, other)
         return NotImplemented

@@ -15,7 +15,7 @@ from deadtime._base.notebook import Pictured
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from deadtime import _deadtime
+    import deadtime.roots._native as native
     from deadtime.roots._chains import Chain
 
 
@@ -132,7 +132,7 @@ class RootSet(ReadOnlyArrays, Pictured):
         return "\n".join(lines)
 
 
-def root_set(found: _deadtime.RootSet) -> RootSet:
+def root_set(found: native.RootSet) -> RootSet:
     """The roots that the native part found."""
     return RootSet(
         roots=found.roots,

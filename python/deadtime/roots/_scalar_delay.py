@@ -8,8 +8,8 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime import _deadtime
-from deadtime.special._ufunc import UfuncOptions, apply, branches, finite, foreign, refuse
+import deadtime.roots._native as native
+from deadtime.special import UfuncOptions, apply, branches, finite, foreign, refuse
 
 
 def dde_roots(
@@ -78,7 +78,7 @@ def dde_roots(
            -6.6601-20.9621j])
     """
     if out is None and threads is None and where is True and not options:
-        number = _deadtime.dde_root_number(a0, a1, delay, k)
+        number = native.dde_root_number(a0, a1, delay, k)
         if number is not None:
             return number
     present, delayed = finite("a0", a0, where), finite("a1", a1, where)
@@ -86,7 +86,7 @@ def dde_roots(
     if not foreign(delays):
         refuse(delays, delays < 0, where, "delay must not be negative")
     arguments = (present, delayed, delays, branches(k))
-    return apply(_deadtime.dde_roots, arguments, options, out, where, None, threads)
+    return apply(native.dde_roots, arguments, options, out, where, None, threads)
 
 
 def rightmost_branches(a1: float, n: int = 2) -> NDArray[np.int64]:

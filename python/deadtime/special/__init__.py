@@ -16,6 +16,14 @@ from deadtime.special._forms import (
     wrightomega,
 )
 from deadtime.special._lambertw import lambertw, lambertw0, lambertwm1, low_level_callable
+from deadtime.special._ufunc import (
+    UfuncOptions as UfuncOptions,
+    apply as apply,
+    branches as branches,
+    finite as finite,
+    foreign as foreign,
+    refuse as refuse,
+)
 
 __all__ = [
     "OffsetW",

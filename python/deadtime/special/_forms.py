@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Unpack
 
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from deadtime import _deadtime
+import deadtime.special._native as native
 from deadtime.special._ufunc import UfuncOptions, apply, branches
 
 
@@ -68,7 +68,7 @@ def lambertw_log(
     True
     """
     arguments = (log_z, branches(k))
-    return apply(_deadtime.lambertw_log, arguments, options, out, where, dtype, threads)
+    return apply(native.lambertw_log, arguments, options, out, where, dtype, threads)
 
 
 def wrightomega(
@@ -120,7 +120,7 @@ def wrightomega(
     >>> dtm.wrightomega([1.0, 1e10]).round(6)
     array([1.00000000e+00, 9.99999998e+09])
     """
-    return apply(_deadtime.wrightomega, (z,), options, out, where, dtype, threads)
+    return apply(native.wrightomega, (z,), options, out, where, dtype, threads)
 
 
 def lambertw_derivative(
@@ -171,7 +171,7 @@ def lambertw_derivative(
     True
     """
     arguments = (z, branches(k))
-    return apply(_deadtime.lambertw_derivative, arguments, options, out, where, dtype, threads)
+    return apply(native.lambertw_derivative, arguments, options, out, where, dtype, threads)
 
 
 class OffsetW(NamedTuple):
@@ -236,5 +236,5 @@ def lambertw_offset(
     (2.3316439814159054e-10+0j)
     """
     arguments = (delta, branches(k))
-    both = apply(_deadtime.lambertw_offset, arguments, options, out, where, dtype, threads)
+    both = apply(native.lambertw_offset, arguments, options, out, where, dtype, threads)
     return OffsetW(*both)

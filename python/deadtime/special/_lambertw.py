@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from deadtime import _deadtime
+import deadtime.special._native as native
 from deadtime.special._ufunc import UfuncOptions, apply, branches
 
 if TYPE_CHECKING:
@@ -105,10 +105,10 @@ def lambertw(
     True
     """
     if out is None and threads is None and where is True and dtype is None and not options:
-        number = _deadtime.lambertw_number(z, k)
+        number = native.lambertw_number(z, k)
         if number is not None:
             return number
-    return apply(_deadtime.lambertw, (z, branches(k)), options, out, where, dtype, threads)
+    return apply(native.lambertw, (z, branches(k)), options, out, where, dtype, threads)
 
 
 def lambertw0(
@@ -162,10 +162,10 @@ def lambertw0(
     array([-0.259171,  0.      ,  1.      ])
     """
     if out is None and threads is None and where is True and dtype is None and not options:
-        number = _deadtime.lambertw0_number(x)
+        number = native.lambertw0_number(x)
         if number is not None:
             return number
-    return apply(_deadtime.lambertw0, (x,), options, out, where, dtype, threads)
+    return apply(native.lambertw0, (x,), options, out, where, dtype, threads)
 
 
 def lambertwm1(
@@ -215,10 +215,10 @@ def lambertwm1(
     array([-1.781337, -2.542641,      -inf])
     """
     if out is None and threads is None and where is True and dtype is None and not options:
-        number = _deadtime.lambertwm1_number(x)
+        number = native.lambertwm1_number(x)
         if number is not None:
             return number
-    return apply(_deadtime.lambertwm1, (x,), options, out, where, dtype, threads)
+    return apply(native.lambertwm1, (x,), options, out, where, dtype, threads)
 
 
 def low_level_callable(
@@ -268,7 +268,7 @@ def low_level_callable(
     """
     import scipy
 
-    if name not in _deadtime.__pyx_capi__:
-        names = ", ".join(sorted(_deadtime.__pyx_capi__))
+    if name not in native.module.__pyx_capi__:
+        names = ", ".join(sorted(native.module.__pyx_capi__))
         raise ValueError(f"name={name!r}: give one of {names}")
-    return scipy.LowLevelCallable.from_cython(_deadtime, name)
+    return scipy.LowLevelCallable.from_cython(native.module, name)

@@ -7,7 +7,7 @@ from typing import Any, Literal, TypedDict, cast
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from deadtime import _deadtime
+import deadtime.special._native as native
 from deadtime._base.validation import thread_number
 
 
@@ -36,14 +36,14 @@ def apply(
         keywords["where"] = where
     if dtype is not None:
         keywords["dtype"] = dtype
-    before = None if threads is None else _deadtime.limit_threads(thread_number(threads))
+    before = None if threads is None else native.limit_threads(thread_number(threads))
     try:
         return ufunc(*arguments, **keywords)
     except (TypeError, ValueError, OverflowError) as error:
         refused = error
     finally:
         if threads is not None:
-            _deadtime.limit_threads(before)
+            native.limit_threads(before)
     _explain(ufunc, arguments)
     raise refused
 
@@ -51,14 +51,14 @@ def apply(
 # The names of the arguments in messages, and the widest type that each may have.
 _COMPLEX, _FLOAT, _BRANCH = np.complex128, np.float64, np.int64
 _ARGUMENTS: dict[np.ufunc, dict[str, type]] = {
-    _deadtime.lambertw: {"z": _COMPLEX, "k": _BRANCH},
-    _deadtime.lambertw0: {"x": _FLOAT},
-    _deadtime.lambertwm1: {"x": _FLOAT},
-    _deadtime.lambertw_log: {"log_z": _COMPLEX, "k": _BRANCH},
-    _deadtime.wrightomega: {"z": _COMPLEX},
-    _deadtime.lambertw_derivative: {"z": _COMPLEX, "k": _BRANCH},
-    _deadtime.lambertw_offset: {"delta": _COMPLEX, "k": _BRANCH},
-    _deadtime.dde_roots: {"a0": _FLOAT, "a1": _FLOAT, "delay": _FLOAT, "k": _BRANCH},
+    native.lambertw: {"z": _COMPLEX, "k": _BRANCH},
+    native.lambertw0: {"x": _FLOAT},
+    native.lambertwm1: {"x": _FLOAT},
+    native.lambertw_log: {"log_z": _COMPLEX, "k": _BRANCH},
+    native.wrightomega: {"z": _COMPLEX},
+    native.lambertw_derivative: {"z": _COMPLEX, "k": _BRANCH},
+    native.lambertw_offset: {"delta": _COMPLEX, "k": _BRANCH},
+    native.dde_roots: {"a0": _FLOAT, "a1": _FLOAT, "delay": _FLOAT, "k": _BRANCH},
 }
 
 

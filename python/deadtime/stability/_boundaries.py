@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._deadtime import MapBoundary
 from deadtime.roots import ParametricQuasiPolynomial
 from deadtime.stability._arguments import Floats
+from deadtime.stability._native import MapBoundary
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime import _deadtime
+import deadtime.stability._native as native
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
@@ -28,7 +28,7 @@ from deadtime._base.validation import (
     thread_number,
     whole_number,
 )
-from deadtime.roots._family import HasFamily, family_of
+from deadtime.roots import HasFamily, family_of
 from deadtime.stability._arguments import Floats, Given, ranges_of, side
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ def proved_boxes(
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
     with nullcontext() if progress is False else reported(progress) as report:
-        found = _deadtime.proved_boxes(
+        found = native.proved_boxes(
             family_of(family, tuple(ends), at)._family,
             ends,
             tol=share,
@@ -316,7 +316,7 @@ def largest_stable_box(
     ends = ranges_of(ranges)
     step = positive("tol", tol)
     with nullcontext() if progress is False else reported(progress) as report:
-        found = _deadtime.largest_stable_box(
+        found = native.largest_stable_box(
             family_of(family, tuple(ends), at)._family,
             ends,
             around=None if around is None else _point(around, ends),

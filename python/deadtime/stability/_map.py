@@ -18,11 +18,8 @@ from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
-from deadtime.loops import ControlLoop, Explorer
-from deadtime.loops._characteristic import numbers_of
-from deadtime.loops._held import HeldFamily, Question
-from deadtime.roots import ParametricQuasiPolynomial
-from deadtime.roots._family import HasFamily, family_of
+from deadtime.loops import ControlLoop, Explorer, HeldFamily, Question, numbers_of
+from deadtime.roots import HasFamily, ParametricQuasiPolynomial, family_of
 from deadtime.stability._arguments import Floats, damping_demand, map_axes, sides
 from deadtime.stability._boundaries import Boundary, boundaries_along, boundaries_of
 

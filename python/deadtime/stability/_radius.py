@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import SupportsFloat
 
-from deadtime import _deadtime
+import deadtime.stability._native as native
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import Range, finite, positive
-from deadtime.roots._family import HasFamily, family_of
+from deadtime.roots import HasFamily, family_of
 from deadtime.stability._arguments import MOST_MOVING
 
 #: Upper limit on the boxes of a search for a radius (bounds memory and time); what is proved until
@@ -103,7 +103,7 @@ def stability_radius(
     if len(names) > MOST_MOVING:
         raise ValueError(f"more than {MOST_MOVING} parameters move: give the others in at={{...}}")
     known = family_of(family, names, at)
-    found = _deadtime.stability_radius(
+    found = native.stability_radius(
         known._family, values, units, tol=positive("tol", tol), max_boxes=_RADIUS_BOXES
     )
     # Parameters that a delay depends on.

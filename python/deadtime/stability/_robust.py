@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, SupportsFloat
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
+import deadtime.stability._native as native
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, Range, thread_number
-from deadtime.roots._family import HasFamily, family_of
+from deadtime.roots import HasFamily, family_of
 from deadtime.stability._arguments import Floats, Given, map_axes, ranges_of, side, sides
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def robust_map(
     known = family_of(family, (first, second, *held), at)
     cells = math.prod(len(points) for points in axes.values())
     with nullcontext() if progress is False else reported(progress, cells) as report:
-        unstable = _deadtime.robust_map(
+        unstable = native.robust_map(
             known._family,
             axes,
             held,

@@ -11,7 +11,7 @@ from typing import Any, SupportsFloat
 
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import Points, numbers_at, points_of
-from deadtime.roots._family import HasFamily
+from deadtime.roots import HasFamily
 from deadtime.stability._arguments import Floats
 from deadtime.stability._map import StabilityMap, stability_map
 

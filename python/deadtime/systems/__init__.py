@@ -11,8 +11,15 @@ converted from and to those of other packages.
 # and `_run` simulate; `_response` is the result.
 
 from deadtime.systems._delay_system import DelaySystem
-from deadtime.systems._margins import Margins
-from deadtime.systems._response import Response
+from deadtime.systems._margins import Margins, margins_of as margins_of
+from deadtime.systems._plots import plot_bode as plot_bode, plot_responses as plot_responses
+from deadtime.systems._response import (
+    Response,
+    first_duration as first_duration,
+    response_of as response_of,
+    until_settled as until_settled,
+)
+from deadtime.systems._run import respond as respond, step_response as step_response
 from deadtime.systems._transfer import TransferFunction, feedback
 
 __all__ = ["DelaySystem", "Margins", "Response", "TransferFunction", "feedback"]

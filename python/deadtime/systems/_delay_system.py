@@ -20,11 +20,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.validation import OpenRange
-from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial, RootSet
-from deadtime.roots._crossings import margin_of_family
-from deadtime.roots._determinant import LARGEST, NotExpandedError, expanded
-from deadtime.roots._family import family_of
-from deadtime.roots._matrix_roots import MatrixDeterminant
+from deadtime.roots import (
+    LARGEST,
+    MatrixDeterminant,
+    NotExpandedError,
+    ParametricQuasiPolynomial,
+    QuasiPolynomial,
+    RootSet,
+    expanded,
+    family_of,
+    margin_of_family,
+)
 from deadtime.systems._delay_matrices import DelayMatrices, Matrices, Matrix
 from deadtime.systems._margins import Margins
 from deadtime.systems._poles import HasPoles

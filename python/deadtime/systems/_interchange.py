@@ -19,8 +19,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.roots import QuasiPolynomial
-from deadtime.roots._determinant import expanded
+from deadtime.roots import QuasiPolynomial, expanded
 
 Vector = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime import _deadtime
+import deadtime.systems._native as native
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._deadtime import loop_margins
 from deadtime.roots import QuasiPolynomial
+from deadtime.systems._native import loop_margins
 
 Vector = NDArray[np.float64]
 
@@ -120,6 +120,6 @@ def margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins:
     return margins_of(loop_margins(n._native, d._native))
 
 
-def margins_of(found: _deadtime.Margins) -> Margins:
+def margins_of(found: native.Margins) -> Margins:
     """Margins as the kernel returns them."""
     return Margins(**{field.name: getattr(found, field.name) for field in fields(Margins)})

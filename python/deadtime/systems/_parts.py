@@ -9,8 +9,7 @@ from typing import Any, TypeAlias, cast
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import real_array
-from deadtime.roots import QuasiPolynomial
-from deadtime.roots._quasipolynomial import is_number
+from deadtime.roots import QuasiPolynomial, is_number
 
 Polynomial: TypeAlias = QuasiPolynomial | float | Sequence[float] | NDArray[Any]
 

@@ -10,13 +10,13 @@ from deadtime._base.validation import OpenRange, Range
 from deadtime.roots import (
     Certificate,
     Crossings,
+    Edge,
+    MatrixDeterminant,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
     RootSet,
     crossings,
 )
-from deadtime.roots._characteristic import Edge
-from deadtime.roots._matrix_roots import MatrixDeterminant
 
 
 class HasPoles(ABC):

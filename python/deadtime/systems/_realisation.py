@@ -17,8 +17,8 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import LinearSystem
 from deadtime.roots import QuasiPolynomial
+from deadtime.systems._native import LinearSystem
 
 Group = Mapping[float, NDArray[np.float64]]
 _Terms: TypeAlias = Sequence[tuple[float, NDArray[np.float64]]]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import deadtime.systems._signals as signals
 from deadtime._base.validation import finite, increasing, positive, real_array
-from deadtime._deadtime import Signal
+from deadtime.systems._native import Signal
 from deadtime.systems._realisation import Differentiable, Realisable, Realisation
 from deadtime.systems._response import Response, until_settled
 

@@ -14,7 +14,7 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.validation import real_array
-from deadtime._deadtime import Signal
+from deadtime.systems._native import Signal
 from deadtime.systems._signals_fit import RESOLUTION, pieces
 
 Vector = NDArray[np.float64]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from deadtime._deadtime import legendre_tables
+from deadtime.systems._native import legendre_tables
 
 Vector = NDArray[np.float64]
 Blocks = NDArray[np.float64]

@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import OpenRange, non_negative, unmasked
-from deadtime._deadtime import ratio
 from deadtime.roots import (
     Parameter,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
     RootSet,
     delay,
+    is_number,
+    latex,
     s,
 )
-from deadtime.roots._quasipolynomial import is_number
-from deadtime.roots._text import latex
 from deadtime.systems._frequency_domain import FrequencyDomain
 from deadtime.systems._interchange import Writable, polynomials_of_control, polynomials_of_scipy
+from deadtime.systems._native import ratio
 from deadtime.systems._parts import (
     Polynomial,
     quasi_polynomial,

@@ -13,6 +13,7 @@ makes a list of gains for a delay that moves, with a proof.
 
 from deadtime.tuning._design import design
 from deadtime.tuning._filter_choice import design_filter
+from deadtime.tuning._live import live_design as live_design
 from deadtime.tuning._region import ConfidenceRegion
 from deadtime.tuning._result import Design, FilterChoice, LeastMargins, Trade
 from deadtime.tuning._stabilising import critical_gain

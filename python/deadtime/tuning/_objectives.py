@@ -22,8 +22,7 @@ from typing import get_args
 
 import numpy as np
 
-from deadtime.loops import ControlLoop, sweep
-from deadtime.loops._model import rest_of
+from deadtime.loops import ControlLoop, rest_of, sweep
 from deadtime.tuning._problem import ObjectiveName, Problem, Scenario, Vector
 from deadtime.tuning._settling import BAND, proved_step
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from deadtime._base.digits import between
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
-from deadtime.loops import ControlLoop, Explorer
-from deadtime.loops._explored import explorer_of
+from deadtime.loops import ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
 from deadtime.tuning._problem import ObjectiveName, Scenario, Vector
 from deadtime.tuning._region import ConfidenceRegion

@@ -31,9 +31,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops import ControlLoop
-from deadtime.loops._model import LoopModel, LoopRun
-from deadtime.loops._sampled_gain import SampledLoopGain
+from deadtime.loops import ControlLoop, LoopModel, LoopRun, SampledLoopGain
 
 Vector = NDArray[np.float64]
 

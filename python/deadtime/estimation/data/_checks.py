@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, Plant
-from deadtime.recordings import Finding, Recording
-from deadtime.recordings._check_excitation import copied_setpoint, no_excitation, no_motion
+from deadtime.recordings import Finding, Recording, copied_setpoint, no_excitation, no_motion
 
 Array = NDArray[np.float64]
 

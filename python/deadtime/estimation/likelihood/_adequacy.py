@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.digits import stated
-from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime.estimation._native import PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
 from deadtime.estimation.likelihood._agreement import contradictions
 from deadtime.estimation.likelihood._air_at_rest import air_at_rest

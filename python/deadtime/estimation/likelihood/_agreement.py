@@ -15,7 +15,7 @@ import numpy as np
 
 from deadtime._base.digits import stated
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._deadtime import PlantNumbers
+from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._search import ROUGH

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import RowLikelihood, RowNoise
+from deadtime.estimation._native import RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit
 

@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import PlantNumbers
+from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._air_at_rest import RESTS, SHOWS, rows_since_motion
 from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air

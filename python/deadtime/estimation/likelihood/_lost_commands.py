@@ -19,7 +19,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import PlantNumbers
+from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.likelihood._free_numbers import numbers_of
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from deadtime._deadtime import FlightLikelihood, PlantNumbers
+from deadtime.estimation._native import FlightLikelihood, PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._search import LONGEST, NoiseFit
 from deadtime.estimation.likelihood._start import excited_part, is_long

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._deadtime import PlantNumbers, RowLikelihood, RowNoise
+from deadtime.estimation._native import PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._search import (
     PARTS,
     NoiseFit,

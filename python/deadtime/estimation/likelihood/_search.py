@@ -16,7 +16,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
+from deadtime.estimation._native import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.loops import (
     PAIR,

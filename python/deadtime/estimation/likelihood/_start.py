@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime.estimation._native import PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows, is_outlier
 from deadtime.estimation.likelihood._search import (
     LONGEST,

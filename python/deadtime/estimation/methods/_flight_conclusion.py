@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._deadtime import PlantNumbers, RowNoise
+from deadtime.estimation._native import PlantNumbers, RowNoise
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy

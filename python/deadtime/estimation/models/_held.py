@@ -30,8 +30,7 @@ from typing import NamedTuple, TypeAlias, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops import FactoredPlant, Integrator, Plant, RateLimited
-from deadtime.loops._open_run import open_response
+from deadtime.loops import FactoredPlant, Integrator, Plant, RateLimited, open_response
 
 Array = NDArray[np.float64]
 

@@ -26,10 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._deadtime import whitened_columns
-from deadtime.experiments import Experiment, FlightNoise
-from deadtime.experiments._noise_in_loop import check_reads_samples
-from deadtime.experiments._random_process import RandomProcess
+from deadtime.estimation._native import whitened_columns
+from deadtime.experiments import Experiment, FlightNoise, RandomProcess, check_reads_samples
 from deadtime.loops import ControlLoop, P
 from deadtime.roots import delay
 from deadtime.systems import TransferFunction

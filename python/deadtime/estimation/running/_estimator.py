@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, positive
-from deadtime._deadtime import OnlineBank
 from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._native import OnlineBank
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of, not_yet
 from deadtime.estimation.running._settings import (

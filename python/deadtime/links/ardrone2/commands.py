@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 
-from deadtime._deadtime import at_read, at_write
+from deadtime.links._native import at_read, at_write
 from deadtime.links.safety import UnitCommand
 
 NONE = UnitCommand(0.0)

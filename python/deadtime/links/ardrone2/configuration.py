@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from deadtime._deadtime import configuration_read, configuration_write
+from deadtime.links._native import configuration_read, configuration_write
 
 
 def parse_configuration(dump: bytes) -> dict[str, str]:

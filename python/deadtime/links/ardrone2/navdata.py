@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import Any, TypeAlias, get_args, get_type_hints
 
-from deadtime._deadtime import navdata_full, navdata_layouts, navdata_read, navdata_write
+from deadtime.links._native import navdata_full, navdata_layouts, navdata_read, navdata_write
 from deadtime.links.ardrone2.navdata_options import (
     AltitudeOption,
     Demo,

@@ -12,7 +12,7 @@ from collections import deque
 from enum import Enum
 
 from deadtime.links.udp.packets import LoopPacket
-from deadtime.recordings._recording import LARGEST
+from deadtime.recordings import LARGEST
 
 #: Number of remembered packets, sent or received.
 REMEMBERED = 4096

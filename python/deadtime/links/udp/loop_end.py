@@ -11,8 +11,7 @@ from deadtime.links.addresses import Address
 from deadtime.links.journal import Journal
 from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.statistics import KEPT
-from deadtime.recordings import Recording
-from deadtime.recordings._recording import MINIMUM_SAMPLES
+from deadtime.recordings import MINIMUM_SAMPLES, Recording
 
 
 class LoopEnd:

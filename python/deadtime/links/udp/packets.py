@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Self
 
-from deadtime._deadtime import doubles_read, doubles_write, loop_packet_read, loop_packet_write
+from deadtime.links._native import doubles_read, doubles_write, loop_packet_read, loop_packet_write
 
 
 @dataclass(frozen=True)

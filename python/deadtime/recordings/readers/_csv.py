@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import replace as changed
+from dataclasses import dataclass, replace as changed
 
-from deadtime import _deadtime
+import deadtime.recordings._native as native
 from deadtime._base.errors import RecordingError
 from deadtime._base.validation import Range
 from deadtime.recordings.readers._columns import Signals, time_error
@@ -35,7 +34,7 @@ def read_csv(text: Text, names: dict[str, str], ends: Range) -> Signals:
     columns = [(place, names[signal]) for signal, place in indices(text, names).items()]
     layout = Layout(text.start, ord(text.delimiter), len(text.header), columns, ends, text.line)
     try:
-        found = _deadtime.csv_columns(text.raw, layout)
+        found = native.csv_columns(text.raw, layout)
     except RecordingError as error:
         raise RecordingError(f"{text.path}, {error}") from None
     if found.backward is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from deadtime import _deadtime
+import deadtime.roots._native as native
 from deadtime.roots.certificate._certificate import Certificate
 from deadtime.roots.certificate._parts import Contour, Monotone, Segment
 
@@ -12,7 +12,7 @@ _T = TypeVar("_T")
 
 
 def proved(
-    coefficients: list[list[float]], delays: list[float], proof: _deadtime.Certificate
+    coefficients: list[list[float]], delays: list[float], proof: native.Certificate
 ) -> Certificate:
     """Make the certificate of a function from a proof of the native part."""
     return _copied(
@@ -34,7 +34,7 @@ def _copied(kind: type[_T], native: Any, **made: Any) -> _T:
     return kind(**{name: made[name] if name in made else getattr(native, name) for name in names})
 
 
-def _copied_part(part: _deadtime.Segment | _deadtime.Monotone) -> Segment | Monotone:
-    if isinstance(part, _deadtime.Monotone):
+def _copied_part(part: native.Segment | native.Monotone) -> Segment | Monotone:
+    if isinstance(part, native.Monotone):
         return _copied(Monotone, part)
     return _copied(Segment, part)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from deadtime.roots.certificate._enclosures import exponential
+from deadtime.roots import exponential
 
 #: Binary digits after the point to which ends are rounded: more take longer, fewer leave errors
 #: that a form has to bear.

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.loops._derivative_filter import discretised
-from deadtime.loops._plants import realise
+from deadtime.loops import discretised, realise
 from deadtime.tuning.adaptive._claims import Claims
 
 Array = NDArray[np.float64]

@@ -17,8 +17,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from deadtime.links.ardrone2.emulator.clock import SECOND, Micros
-from deadtime.loops import Integrator, Plant, kit_plant
-from deadtime.loops._plants import rest
+from deadtime.loops import Integrator, Plant, kit_plant, rest
 
 PlantName: TypeAlias = Literal["kit", "paper", "real", "thrust"]
 

@@ -1,0 +1,163 @@
+"""Loops of ArduPilot in its DataFlash logs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from deadtime.logs._ardupilot_modes import HORIZONTAL, UNCONTROLLED, VERTICAL
+from deadtime.logs._conditions import in_modes, in_the_air, not_in_modes, state
+from deadtime.logs._contents import LogContents
+from deadtime.logs._names import AutopilotNames, Condition, LoopNames, Signal
+from deadtime.logs._rotations import unwrapped
+
+DEGREE = np.pi / 180.0
+
+ARMED = Condition(state("armed", "state", lambda values: values > 0), "the vehicle is disarmed")
+IN_THE_AIR = Condition(
+    in_the_air("landed", "state", lambda values: values == 0),
+    "the vehicle is on the ground or touches down",
+)
+CONTROLLED = Condition(not_in_modes(UNCONTROLLED), "the mode does not close it")
+HELD_HEIGHT = Condition(in_modes(VERTICAL), "the mode does not close it")
+HELD_PLACE = Condition(in_modes(HORIZONTAL), "the mode does not close it")
+
+#: Firmware of 2014 logs 0 for a height that it does not hold, as in the descent of RTL.
+SET_HEIGHT = Condition(
+    state("CTUN", "DAlt", lambda values: values != 0.0),
+    "the log says 0 for a height that is not set",
+)
+
+#: Letter of an axis in the messages RATE, name of its columns in ATT.
+AXES = (("roll", "R", "Roll"), ("pitch", "P", "Pitch"), ("yaw", "Y", "Yaw"))
+
+DOWN = "downwards to upwards"
+
+
+def _inner_loops(rate: str) -> list[LoopNames]:
+    """Rate and attitude of each axis; the yaw in ATT jumps at north."""
+    rates, angles = [], []
+    for axis, letter, column in AXES:
+        asked = Signal("RATE", (f"{letter}Des",), rate)
+        rates.append(
+            LoopNames(
+                f"{axis} rate", axis, "rate",
+                setpoint=(asked,),
+                response=(Signal("RATE", (letter,), rate),),
+                actuator=(Signal("RATE", (f"{letter}Out",)),),
+                conditions=(ARMED, IN_THE_AIR, CONTROLLED),
+            )
+        )  # fmt: skip
+        desired, found = (_angle(axis, name) for name in (f"Des{column}", column))
+        angles.append(
+            LoopNames(
+                axis, axis, "attitude", (desired,), (found,), (asked,),
+                conditions=(ARMED, IN_THE_AIR, CONTROLLED),
+            )
+        )  # fmt: skip
+    return [*rates, *angles]
+
+
+def _angle(axis: str, column: str) -> Signal:
+    if axis != "yaw":
+        return Signal("ATT", (column,), "deg")
+    return Signal(
+        "ATT", (column,), "rad",
+        derive=lambda degrees: unwrapped(degrees * DEGREE),
+        rule="[deg] to rad without jumps of a turn",
+    )  # fmt: skip
+
+
+def _horizontal(axis: str, k: int) -> list[LoopNames]:
+    """Velocity and position towards north or east, in messages of three generations."""
+    letter, old = "NE"[k], "XY"[k]
+    new = f"PSC{letter}"
+    asked = (
+        Signal(new, (f"TV{letter}",), "m/s"),
+        Signal("PSC", (f"TV{old}",), "m/s"),
+        Signal("NTUN", (f"DVel{old}",), "cm/s"),
+    )
+    velocity = LoopNames(
+        f"{axis} velocity", axis, "velocity", asked,
+        response=(
+            Signal(new, (f"V{letter}",), "m/s"),
+            Signal("PSC", (f"V{old}",), "m/s"),
+            Signal("NTUN", (f"Vel{old}",), "cm/s"),
+        ),
+        actuator=(
+            Signal(new, (f"TA{letter}",), "m/s/s"),
+            Signal("PSC", (f"TA{old}",), "m/s/s"),
+            Signal("NTUN", (f"DAcc{old}",), "cm/s/s"),
+        ),
+        conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
+    )  # fmt: skip
+    position = LoopNames(
+        f"{axis} position", axis, "position",
+        setpoint=(
+            Signal(new, (f"TP{letter}",), "m"),
+            Signal("PSC", (f"TP{old}",), "m"),
+            Signal("NTUN", (f"DPos{old}",), "cm"),
+        ),
+        response=(
+            Signal(new, (f"P{letter}",), "m"),
+            Signal("PSC", (f"P{old}",), "m"),
+            Signal("NTUN", (f"Pos{old}",), "cm"),
+        ),
+        actuator=asked,
+        conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
+    )  # fmt: skip
+    return [velocity, position]
+
+
+def _vertical() -> list[LoopNames]:
+    """Vertical speed and altitude: from PSCD, whose numbers are finer, else from CTUN."""
+    asked = (
+        Signal("PSCD", ("TVD",), "m/s", -1.0, rule=DOWN),
+        Signal("CTUN", ("DCRt",), "cm/s"),
+    )
+    speed = LoopNames(
+        "vertical speed", "vertical", "velocity", asked,
+        response=(
+            Signal("PSCD", ("VD",), "m/s", -1.0, rule=DOWN),
+            Signal("CTUN", ("CRt",), "cm/s"),
+        ),
+        actuator=(Signal("CTUN", ("ThO",)), Signal("CTUN", ("ThrOut",))),
+        conditions=(ARMED, IN_THE_AIR, HELD_HEIGHT, SET_HEIGHT),
+    )  # fmt: skip
+    altitude = LoopNames(
+        "altitude", "vertical", "position",
+        setpoint=(
+            Signal("PSCD", ("TPD",), "m", -1.0, rule=DOWN), Signal("CTUN", ("DAlt",), "m"),
+        ),
+        response=(Signal("PSCD", ("PD",), "m", -1.0, rule=DOWN), Signal("CTUN", ("Alt",), "m")),
+        actuator=asked,
+        conditions=(ARMED, IN_THE_AIR, HELD_HEIGHT, SET_HEIGHT),
+    )  # fmt: skip
+    return [speed, altitude]
+
+
+def _unit_of_rates(contents: LogContents) -> str:
+    """Unit of the messages RATE: firmware of 2014 and 2015 logs hundredths of a degree.
+
+    Logs without units of their own are told apart by the gyroscope, which is in rad/s.
+    """
+    rate, gyro = contents.topics.get("RATE"), contents.topics.get("IMU")
+    if rate is None or gyro is None or "R" not in rate.columns or "GyrX" not in gyro.columns:
+        return "deg/s"
+    logged, measured = np.nanstd(rate.columns["R"]), np.nanstd(gyro.columns["GyrX"])
+    return "cdeg/s" if logged * DEGREE > 10.0 * measured else "deg/s"
+
+
+KEY_PARAMETERS = (
+    "ATC_RAT_*_[PID]", "ATC_RAT_*_FF", "ATC_RAT_*_FLT[TED]", "ATC_ANG_*_P", "ATC_INPUT_TC",
+    "ATC_RATE_*_MAX", "RATE_*_[PID]", "STB_*_P", "PSC_*_[PID]", "PSC_*_FLT[TED]", "PSC_POSXY_P",
+    "THR_ACCEL_[PID]", "THR_RATE_P", "THR_ALT_P", "INS_GYRO_FILTER", "INS_ACCEL_FILTER",
+    "INS_HNTCH_*", "INS_MPU6K_FILTER", "SCHED_LOOP_RATE", "FSTRATE_ENABLE", "MOT_SPIN_*",
+    "MOT_*_EXPO", "MOT_SLEW_*_TIME", "MOT_PWM_TYPE", "LOG_BITMASK",
+)  # fmt: skip
+
+
+def names(contents: LogContents) -> AutopilotNames:
+    """The loops of ArduPilot in the messages of all its versions since 2014."""
+    loops = _inner_loops(_unit_of_rates(contents))
+    loops += [*_horizontal("north", 0), *_horizontal("east", 1), *_vertical()]
+    return AutopilotNames(loops, KEY_PARAMETERS)

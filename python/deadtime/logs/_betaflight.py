@@ -1,0 +1,118 @@
+"""Loops of Betaflight and INAV in their Blackbox logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.logs._blackbox_modes import INAV
+from deadtime.logs._conditions import state
+from deadtime.logs._contents import Array, LogContents
+from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
+
+
+def _has_bit(*bits: int) -> Callable[[Array], NDArray[np.bool_]]:
+    """Whether one of these bits of ``flightModeFlags`` is set."""
+    mask = sum(1 << bit for bit in bits)
+    return lambda flags: (flags.astype(np.int64) & mask) != 0
+
+
+def _in_modes(*modes: str) -> Condition:
+    """In one of these modes of INAV; several can be active at once."""
+    bits = [bit for bit, name in INAV.items() if name in modes]
+    return Condition(
+        state("slow", "flightModeFlags", _has_bit(*bits)), "the mode does not close it"
+    )
+
+
+ARMED = Condition(state("slow", "flightModeFlags", _has_bit(0)), "the vehicle is disarmed")
+#: In passthrough the sticks move the servos.
+CONTROLLED = Condition(
+    state("slow", "flightModeFlags", lambda flags: ~_has_bit(10)(flags)),
+    "the mode does not close it",
+)
+HELD_PLACE = _in_modes("NAV POSHOLD", "NAV RTH", "NAV WP")
+HELD_HEIGHT = _in_modes("NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
+
+
+def _sum(*terms: Array) -> Array:
+    total: Array = np.sum(terms, axis=0)
+    return total
+
+
+def _controller(axis: int) -> tuple[Signal, ...]:
+    """What the rate controller gives: the sum of its terms, of which D and F may be missing."""
+    return tuple(
+        Signal(
+            "main",
+            tuple(f"axis{term}[{axis}]" for term in terms),
+            derive=_sum,
+            rule=f"sum of {', '.join(terms)}",
+        )
+        for terms in ("PIDFS", "PIDF", "PIF", "PID", "PI")
+    )
+
+
+def _rate(name: str, axis: int, setpoint: str, conditions: tuple[Condition, ...]) -> LoopNames:
+    return LoopNames(
+        name=f"{name} rate",
+        axis=name,
+        kind="rate",
+        setpoint=(Signal("main", (f"{setpoint}[{axis}]",), "deg/s"),),
+        response=(Signal("main", (f"gyroADC[{axis}]",), "deg/s"),),
+        actuator=_controller(axis),
+        conditions=conditions,
+    )
+
+
+def _translation(
+    name: str, axis: str, kind: Kind, k: int, actuator: tuple[Signal, ...]
+) -> LoopNames:
+    """A velocity or a position loop of INAV; its vertical axis counts upwards."""
+    what, unit = ("Vel", "cm/s") if kind == "velocity" else ("Pos", "cm")
+    return LoopNames(
+        name=name,
+        axis=axis,
+        kind=kind,
+        setpoint=(Signal("main", (f"navTgt{what}[{k}]",), unit),),
+        response=(Signal("main", (f"nav{what}[{k}]",), unit),),
+        actuator=actuator,
+        conditions=(ARMED, HELD_HEIGHT if axis == "vertical" else HELD_PLACE),
+    )
+
+
+def _translations() -> list[LoopNames]:
+    loops = []
+    for k, axis in enumerate(("north", "east", "vertical")):
+        is_vertical = axis == "vertical"
+        speed = "vertical speed" if is_vertical else f"{axis} velocity"
+        place = "altitude" if is_vertical else f"{axis} position"
+        given = (Signal("main", (f"mcVelAxisOut[{k}]",)),)
+        asked = (Signal("main", (f"navTgtVel[{k}]",), "cm/s"),)
+        loops += [
+            _translation(speed, axis, "velocity", k, given),
+            _translation(place, axis, "position", k, asked),
+        ]
+    return loops
+
+
+KEY_PARAMETERS = (
+    "looptime", "gyro_sync_denom", "pid_process_denom", "P interval*", "gyro_l*", "gyro_notch_*",
+    "gyro_hardware_lpf", "gyro_rpm_notch_*", "rpm_filter_*", "dyn_notch_*", "dynamicGyroNotch*",
+    "dterm_*", "yaw_lowpass_hz", "rollPID*", "pitchPID*", "yawPID*", "d_min*", "d_max*",
+    "ff_weight*", "feedforward_*", "rc_rates*", "rates*", "rate_limits*", "rc_expo*",
+    "motor_poles", "motor_pwm_protocol", "motor_pwm_rate", "dshot_bidir",
+    "blackbox_high_resolution",
+)  # fmt: skip
+
+
+def names(contents: LogContents) -> AutopilotNames:
+    """Rates of both firmwares; velocities and positions where INAV navigates."""
+    axes = tuple(enumerate(("roll", "pitch", "yaw")))
+    if contents.autopilot == "Betaflight":
+        rates = [_rate(name, k, "setpoint", (ARMED,)) for k, name in axes]
+        return AutopilotNames(rates, KEY_PARAMETERS)
+    rates = [_rate(name, k, "axisRate", (ARMED, CONTROLLED)) for k, name in axes]
+    return AutopilotNames([*rates, *_translations()], KEY_PARAMETERS)

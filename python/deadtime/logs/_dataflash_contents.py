@@ -1,0 +1,88 @@
+"""What the messages of a DataFlash log tell: vehicle, parameters, modes and events."""
+
+from __future__ import annotations
+
+import re
+from collections import ChainMap
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
+from deadtime.logs._contents import Array, LogContents, Topic
+from deadtime.logs._dataflash_messages import Messages
+
+#: Numbers of events.
+ARMED, DISARMED, LANDED, FLYING = 10, 11, 18, 28
+
+#: The message that names vehicle and version.
+FIRMWARE = re.compile(r"(?:APM:|Ardu)?(?P<vehicle>Copter|Plane|Rover|Sub|Blimp\w*) V\S+.*")
+
+MODES = {"Copter": COPTER, "Plane": PLANE, "Rover": ROVER}
+
+
+def contents_of(form: str, messages: Messages, remarks: tuple[str, ...]) -> LogContents:
+    """The log's contents."""
+    texts = messages.texts("MSG", "Message")
+    firmware = next(filter(None, map(FIRMWARE.fullmatch, texts)), None)
+    vehicle = firmware["vehicle"] if firmware else ""
+    frame = next((text[6:].strip() for text in texts if text.startswith("Frame:")), "")
+    return LogContents(
+        format=form,
+        autopilot="ArduPilot",
+        vehicle=f"{vehicle} ({frame})" if vehicle and frame else vehicle or frame,
+        firmware=firmware[0] if firmware else "",
+        topics=ChainMap(_events(messages), messages),  # type: ignore[arg-type]
+        parameters=_parameters(messages),
+        modes=_modes(messages, vehicle),
+        remarks=remarks,
+    )
+
+
+def _parameters(messages: Messages) -> dict[str, float]:
+    topic = messages.get("PARM")
+    if topic is None or "Value" not in topic.columns:
+        return {}
+    pairs = zip(messages.texts("PARM", "Name"), topic.columns["Value"].tolist(), strict=False)
+    return {name: value for name, value in pairs if name}
+
+
+def _modes(messages: Messages, vehicle: str) -> tuple[tuple[float, str], ...]:
+    """The flight modes by their names."""
+    topic = messages.get("MODE")
+    if topic is None:
+        return ()
+    column = next((one for one in ("ModeNum", "Mode") if one in topic.columns), "")
+    numbers = messages.texts("MODE", column)
+    names = {str(number): name for number, name in MODES.get(vehicle, {}).items()}
+    found: list[tuple[float, str]] = []
+    for at, number in zip(topic.time.tolist(), numbers, strict=False):
+        # Text logs may hold the name in place of the number.
+        name = names.get(number, f"mode {number}" if number.isdigit() else number.upper())
+        if np.isfinite(at) and (not found or found[-1][1] != name):
+            found.append((at, name))
+    return tuple(found)
+
+
+def _events(messages: Messages) -> dict[str, Topic]:
+    """Topics "armed" and "landed" from the messages that tell their changes, if there are any."""
+    found = {}
+    arming, events = messages.get("ARM"), messages.get("EV")
+    if events is not None and "Id" in events.columns:
+        number = events.columns["Id"]
+        for name, on, off in (("armed", ARMED, DISARMED), ("landed", LANDED, FLYING)):
+            rows = (number == on) | (number == off)
+            found[name] = _changes(events.time[rows], number[rows] == on)
+    if arming is not None and "ArmState" in arming.columns:
+        found["armed"] = _changes(arming.time, arming.columns["ArmState"] > 0)
+    return {name: topic for name, topic in found.items() if topic.time.size}
+
+
+def _changes(time: Array, state: NDArray[np.bool_]) -> Topic:
+    """A state that is logged when it changes: before the first row it was the other one."""
+    rows = np.isfinite(time)
+    time, state = time[rows], state[rows]
+    if time.size:
+        time = np.concatenate(([np.nextafter(time[0], -np.inf)], time))
+        state = np.concatenate(([not state[0]], state))
+    return Topic(time, {"state": state.astype(float)})

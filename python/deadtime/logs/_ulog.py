@@ -1,0 +1,138 @@
+"""Read ULog files of PX4 with pyulog."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import Any
+
+import numpy as np
+
+from deadtime._base.errors import MissingExtraError, RecordingError
+from deadtime.logs._contents import LogContents, Topic
+from deadtime.logs._px4_modes import MODES, VEHICLES
+from deadtime.logs._series import DAY
+
+#: Seconds of one count of the clock.
+MICROSECOND = 1e-6
+
+
+def read_ulog(data: bytes, source: str) -> LogContents:
+    """All topics of a ULog file.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    source : str
+        Its name, for messages.
+
+    Raises
+    ------
+    MissingExtraError
+        When pyulog is not installed.
+    RecordingError
+        When not even the header can be read.
+    """
+    try:
+        from pyulog.core import ULog, ULogException  # type: ignore[import, unused-ignore]
+    except ImportError as error:
+        raise MissingExtraError(
+            "ULog files are read by pyulog, which is not installed; this line installs it: "
+            "pip install 'deadtime[logs]'"
+        ) from error
+    with contextlib.redirect_stdout(io.StringIO()):  # the library prints what it finds damaged
+        try:
+            log = ULog(_Endless(data))
+        except ULogException as error:
+            raise RecordingError(f"{source} is a damaged ULog file: {error}") from None
+    topics: dict[str, Topic] = {}
+    for found in log.data_list:
+        if "timestamp" in found.data and len(found.data["timestamp"]):
+            name = found.name if found.multi_id == 0 else f"{found.name}[{found.multi_id}]"
+            topics.setdefault(name, _topic(found.data))
+    if not topics:
+        raise RecordingError(f"{source} is a ULog file without a message that can be read")
+    parameters = dict(log.initial_parameters)
+    parameters.update({name: value for _, name, value in log.changed_parameters})
+    information = log.msg_info_dict
+    span = (log.start_timestamp * MICROSECOND, log.last_timestamp * MICROSECOND)
+    return LogContents(
+        format="ULog",
+        autopilot="PX4" if information.get("sys_name", "PX4") == "PX4" else "",
+        vehicle=_vehicle(topics, str(information.get("ver_hw", ""))),
+        firmware=_firmware(information),
+        topics=topics,
+        parameters={
+            name: float(value)
+            for name, value in parameters.items()
+            if isinstance(value, (int, float))  # damaged ones are bytes
+        },
+        modes=_modes(topics),
+        remarks=_remarks(log),
+        span=span if 0.0 < span[1] - span[0] < DAY else None,
+        gaps=tuple(
+            (one.timestamp * MICROSECOND, one.timestamp * MICROSECOND + 1e-3 * one.duration)
+            for one in log.dropouts
+        ),
+    )
+
+
+class _Endless(io.BytesIO):
+    """A file in which a read beyond the end moves on as if all bytes were there.
+
+    The library goes back by the length it has asked for, also where the file ended before; on a
+    file that is cut off it then reads the same bytes for ever.
+    """
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        start = self.tell()
+        found = super().read(size)
+        if size is not None and size > len(found):
+            self.seek(start + size)
+        return found
+
+
+def _topic(data: dict[str, Any]) -> Topic:
+    columns = {name: values for name, values in data.items() if "_padding" not in name}
+    return Topic(np.asarray(data["timestamp"], dtype=float) * MICROSECOND, columns)
+
+
+def _vehicle(topics: dict[str, Topic], board: str) -> str:
+    status = topics.get("vehicle_status")
+    kind = ""
+    if status is not None and "system_type" in status.columns:
+        kind = VEHICLES.get(int(status.columns["system_type"][-1]), "")
+    return f"{kind} ({board})" if kind and board else kind or board
+
+
+def _firmware(information: dict[str, Any]) -> str:
+    """Version and commit."""
+    release = information.get("ver_sw_release")
+    parts = []
+    if isinstance(release, int) and release >> 8:
+        parts.append("v" + ".".join(str(release >> shift & 0xFF) for shift in (24, 16, 8)))
+    if information.get("ver_sw"):
+        parts.append(str(information["ver_sw"])[:10])
+    return " ".join(parts)
+
+
+def _modes(topics: dict[str, Topic]) -> tuple[tuple[float, str], ...]:
+    status = topics.get("vehicle_status")
+    if status is None or "nav_state" not in status.columns:
+        return ()
+    state = np.asarray(status.columns["nav_state"])
+    rows = np.concatenate(([0], np.flatnonzero(np.diff(state.astype(float))) + 1))
+    return tuple(
+        (float(status.time[k]), MODES.get(int(state[k]), f"mode {int(state[k])}")) for k in rows
+    )
+
+
+def _remarks(log: Any) -> tuple[str, ...]:
+    remarks = []
+    if log.file_corruption:
+        remarks.append("the file is damaged: what could not be read is left out")
+    if log.dropouts:
+        lost = 1e-3 * sum(one.duration for one in log.dropouts)
+        remarks.append(f"the logger lost data {len(log.dropouts)} times, {lost:.3g} s in all")
+    return tuple(remarks)

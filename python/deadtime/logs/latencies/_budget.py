@@ -1,0 +1,97 @@
+"""Where in the vehicle the time goes, for one axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from deadtime._base.digits import stated
+from deadtime._base.plain import plain
+from deadtime.logs._log import Log
+from deadtime.logs.latencies._filters import FilterDelay
+from deadtime.logs.latencies._relation import LoopLatency
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A part of the time from setpoint to response.
+
+    Attributes
+    ----------
+    name : str
+        What takes it.
+    time : float
+        s.
+    stderr : float
+        Its standard error, s; zero for what is computed.
+    source : str
+        The parameter it is computed from, or the loop it was estimated in.
+    adequate : bool
+        Whether the estimate it comes from is adequate; true for what is computed.
+    part : bool
+        Whether it is a part of the stage before.
+    """
+
+    name: str
+    time: float
+    stderr: float
+    source: str
+    adequate: bool = True
+    part: bool = False
+
+    def line(self) -> str:
+        """The stage in one line."""
+        doubt = "" if self.adequate else "; NOT ADEQUATE"
+        indent = "  " if self.part else ""
+        return f"{indent}{self.name}: {stated(self.time, self.stderr, 's')} ({self.source}){doubt}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The stage as plain values for JSON."""
+        found: dict[str, Any] = plain(vars(self))
+        return found
+
+
+def stages_of(
+    log: Log, loop: str, relations: list[LoopLatency], filters: tuple[FilterDelay, ...]
+) -> tuple[Stage, ...]:
+    """The stages of one loop that the log tells about.
+
+    From setpoint to response the loop is closed, and this is no sum of what follows. From what the
+    controller commands to the response it is: filters are computed, and the rest is that
+    of actuators and airframe.
+    """
+    own = {one.command: one for one in relations if one.loop == loop and one.estimate is not None}
+    stages = []
+    if "setpoint" in own:
+        stages.append(_measured(own["setpoint"], "setpoint to response, loop closed"))
+    if "actuator" not in own:
+        return tuple(stages)
+    vehicle = own["actuator"]
+    whole = _measured(vehicle, "controller's command to response")
+    stages.append(whole)
+    if vehicle.kind != "rate":
+        return tuple(stages)
+    known = [one for one in filters if one.path == "response"]
+    stages += [Stage(one.name, one.delay, 0.0, one.source, part=True) for one in known]
+    computed = math.fsum(stage.time for stage in stages if stage.part)
+    if computed > 0.0:
+        rest = whole.time - computed
+        stages.append(
+            Stage(
+                "motors, airframe and the rest", rest, whole.stderr,
+                "what is left", whole.adequate and rest >= 0.0, part=True,
+            )
+        )  # fmt: skip
+    return tuple(stages)
+
+
+def _measured(one: LoopLatency, name: str) -> Stage:
+    value, error, _ = one.sum_of()
+    assert one.estimate is not None
+    start, stop = one.windows[0]
+    where = f"estimated from {start:.1f} to {stop:.1f} s"
+    if len(one.windows) > 1:
+        more = len(one.windows) - 1
+        where += f" and {more} more window{'s' if more > 1 else ''}"
+    return Stage(name, value, error, where, one.estimate.adequate)

@@ -1,0 +1,126 @@
+"""What changed between two logs of a vehicle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from deadtime._base.plain import plain
+from deadtime.logs.latencies._elsewhere import TWO_SIDED
+from deadtime.logs.latencies._latency import Latency
+
+#: Probability below which a difference counts as real.
+REAL = 0.05
+
+
+@dataclass(frozen=True)
+class LatencyChange:
+    """The time of one loop in two logs.
+
+    Attributes
+    ----------
+    loop, command : str
+        The loop, and from what the time counts.
+    before, after : float
+        Delay and lag together in the first log and in the second, s.
+    before_error, after_error : float
+        Their standard errors, s.
+    p_value : float
+        Probability of such a difference, or a larger one, if nothing had changed.
+    adequate : bool
+        Whether both estimates are adequate; if not, the probability is not known.
+    """
+
+    loop: str
+    command: str
+    before: float
+    before_error: float
+    after: float
+    after_error: float
+    p_value: float
+    adequate: bool
+
+    @property
+    def change(self) -> float:
+        """How much longer the loop takes in the second log, s."""
+        return self.after - self.before
+
+    @property
+    def stderr(self) -> float:
+        """Standard error of the change, s."""
+        return math.hypot(self.before_error, self.after_error)
+
+    @property
+    def ci(self) -> tuple[float, float]:
+        """95 % interval of the change, s."""
+        reach = TWO_SIDED * self.stderr
+        return self.change - reach, self.change + reach
+
+    @property
+    def verdict(self) -> str:
+        """Whether the difference is real, in words."""
+        if not self.adequate:
+            return "not known: an estimate is not adequate"
+        if self.p_value >= REAL:
+            return f"no difference is seen (p = {self.p_value:.2g})"
+        way = "longer" if self.change > 0.0 else "shorter"
+        return f"really {way} (p = {self.p_value:.2g})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The change as plain values for JSON."""
+        own = {"change": self.change, "interval_95": self.ci, "verdict": self.verdict}
+        found: dict[str, Any] = plain({**vars(self), **own})
+        return found
+
+
+def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, ...]:
+    """Compare the loops that two logs tell about.
+
+    Parameters
+    ----------
+    before, after : Latency
+
+    Returns
+    -------
+    tuple of LatencyChange
+        With a two-sided z test of the difference of delay and lag together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> time = np.arange(600) * 0.01
+    >>> told = np.where(time < 0.3, 0.0, 0.2 * np.sign(np.sin(3.7 * (time - 0.3))))
+    >>> noise = 0.003 * np.random.default_rng(1).standard_normal((2, 600))
+    >>> found = []
+    >>> for delay, one in zip((0.03, 0.05), noise):
+    ...     vehicle = dtm.FactoredPlant([0.08]).transfer_function() * dtm.delay(delay)
+    ...     angle = np.ravel(vehicle.simulate(time, told).outputs) + one
+    ...     found.append(dtm.latency(dtm.Recording(time, told, angle)))
+    >>> (change,) = dtm.logs.compare_latencies(*found)
+    >>> low, high = change.ci
+    >>> low < 0.02 < high, change.p_value < 0.05
+    (True, True)
+    """
+    from scipy import special
+
+    found = []
+    for one in before.estimated:
+        for other in after.estimated:
+            if (one.loop, one.command) != (other.loop, other.command):
+                continue
+            first, first_error, _ = one.sum_of()
+            second, second_error, _ = other.sum_of()
+            spread = math.hypot(first_error, second_error)
+            z = abs(second - first) / spread if spread > 0.0 else math.inf
+            adequate = all(
+                fit.estimate is not None and fit.estimate.adequate for fit in (one, other)
+            )
+            found.append(
+                LatencyChange(
+                    one.loop, one.command, first, first_error, second, second_error,
+                    float(2.0 * special.ndtr(-z)), adequate,
+                )
+            )  # fmt: skip
+    return tuple(found)

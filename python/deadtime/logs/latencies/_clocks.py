@@ -1,0 +1,230 @@
+"""Whether a response and its command are stamped by clocks that drift apart.
+
+Two clocks whose rates differ by r make the time from command to response grow by r each second.
+Rows that come regularly on both clocks show r by their stamps: their periods are in the ratio m/n
+of small whole numbers, times 1 + r. Two tasks that are run by oscillators of their own, and stamped
+by one clock, look the same; there the time from command to response does not grow. It is measured
+in windows over the log, each with the plant of the estimate moved in time and with a gain of its
+own, and a line is fitted through these times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deadtime._base.digits import stated
+from deadtime.estimation import DelayEstimate, path_of
+from deadtime.logs.latencies._windows import Window, trend_of, variance_of
+
+Array = NDArray[np.float64]
+
+#: Largest whole number of rows of one signal in a whole number of the other's, and the largest
+#: difference of two clocks that run on quartz.
+WHOLE, QUARTZ = 8, 3e-4
+
+#: Farthest stamp from its regular time, in rows, at which the number of a row is known.
+FARTHEST = 0.45
+
+#: Fewest rows whose stamps tell their rate.
+FEWEST = 50
+
+#: Level of the test of a line of times.
+SIGNIFICANCE = 0.01
+
+#: Most steps of the search for the time of a window, the share of its error at which it ends, and
+#: the largest step, as a share of the time from command to response.
+STEPS, SETTLED, LARGEST = 12, 0.1, 0.5
+
+#: Windows below which a line of times says nothing about its error.
+LEAST = 3
+
+#: Drift over the log that matters, as a share of the 95 % interval: the interval then covers 93 %.
+WORTH = 0.1
+
+#: Width of a 95 % interval in standard errors.
+TWO_SIDED = 3.92
+
+
+#: Name of a signal, and the stamps of its rows, s.
+Stamped: TypeAlias = tuple[str, Array]
+
+
+class Rate(NamedTuple):
+    """A relative difference of clocks, or a time between rows, s, and its largest error.
+
+    That is relative, too.
+    """
+
+    value: float
+    most: float
+
+
+class Growth(NamedTuple):
+    """By how much a time grows, s a second, its standard error, and its quantile of 99 %.
+
+    `start` and `start_error` are how much later than the estimate the response came at the start
+    of the log, s.
+    """
+
+    value: float
+    error: float
+    quantile: float
+    start: float
+    start_error: float
+
+    def may_be(self, value: float) -> bool:
+        """Whether the growth is not told from this one."""
+        return abs(self.value - value) <= self.quantile * self.error
+
+
+def why_two_clocks(
+    fit: DelayEstimate,
+    windows: Sequence[Window],
+    command: Stamped,
+    response: Stamped,
+) -> str:
+    """Why the clocks of a log make its estimate doubtful; empty where they do not.
+
+    Parameters
+    ----------
+    fit : DelayEstimate
+        The estimate.
+    windows : sequence of Window
+        All windows of the log that tell something.
+    command, response : (str, ndarray)
+        Name and stamps of each signal.
+    """
+    start, stop = response[1][[0, -1]].tolist()
+    length = stop - start
+    low, high = fit.ci(0.95, "delay+lag")
+    worth = WORTH * (high - low)
+    names = f"{command[0]} and {response[0]}"
+    stamps = rates_apart(command[1], response[1])
+    apart = 0.0 if stamps is None or abs(stamps.value) <= stamps.most else stamps.value
+    grows = growth_of(fit, windows, start)
+    if grows is not None and not grows.may_be(0.0) and abs(grows.value) * length > worth:
+        by = stated(grows.value, grows.error, "s")
+        error = math.hypot(grows.start_error, (high - low) / TWO_SIDED)
+        first = stated(fit.delay_plus_lag + grows.start, error, "s")
+        also = f", whose stamps do so by {1e6 * abs(apart):.3g} ppm" if apart else ""
+        return (
+            f"the time from command to response grows by {by} each second, as where {names} are "
+            f"stamped by clocks that drift apart{also}, or where the vehicle changes; when the log "
+            f"began, it was {first}"
+        )
+    if abs(apart) * length <= worth or not (grows is None or grows.may_be(apart)):
+        return ""
+    return (
+        f"the stamps of {names} drift apart by {1e6 * abs(apart):.3g} ppm: if they are those of "
+        f"two clocks, the time is wrong by {stated(abs(apart), 0.0, 's')} for each second since "
+        "both agreed"
+    )
+
+
+def rates_apart(sent: Array, received: Array) -> Rate | None:
+    """By how much faster the stamps of a response advance; None where rows are not regular."""
+    ours, theirs = _period(sent), _period(received)
+    if ours is None or theirs is None:
+        return None
+    ratio = theirs.value / ours.value
+    whole = min(_whole_ratios(), key=lambda one: abs(ratio / one - 1.0))
+    apart = ratio / whole - 1.0
+    return Rate(apart, ours.most + theirs.most) if abs(apart) < QUARTZ else None
+
+
+def _whole_ratios() -> set[float]:
+    """Ratios of small whole numbers."""
+    few = range(1, WHOLE + 1)
+    return {float(Fraction(m, n)) for m in few for n in few}
+
+
+def _period(time: Array) -> Rate | None:
+    """The time between rows, s, and its relative error; None where rows are not regular.
+
+    Stamps that are at most d from the line through them cannot turn it by more than 2 d over its
+    length.
+    """
+    if time.size < FEWEST:
+        return None
+    steps = np.diff(time)
+    # The mean of single steps: the median of scattered ones is off where others are missing.
+    between = float(np.mean(steps[steps < 1.5 * np.median(steps)]))
+    number = np.concatenate([[0.0], np.cumsum(np.rint(steps / between))])
+    if number[-1] < FEWEST:
+        return None
+    line = np.polynomial.Polynomial.fit(number, time, 1)
+    off = float(np.max(np.abs(time - line(number))))
+    period = float(line.convert().coef[1])
+    if off > FARTHEST * period:
+        return None
+    return Rate(period, 2.0 * off / float(time[-1] - time[0]))
+
+
+def growth_of(fit: DelayEstimate, windows: Sequence[Window], start: float) -> Growth | None:
+    """By how much the time from command to response grows over a log; None where it is not known.
+
+    The scatter of the times around their line widens its error where it is more than their own.
+    The errors of the best half are taken for their median: in gusts some are far too small.
+    """
+    from scipy import special
+
+    tried = [time_in(one, fit) for one in apart_from_each_other(windows)]
+    told = [one for one in tried if one is not None]
+    if len(told) < LEAST:
+        return None
+    at, times, errors = np.array(told).T
+    errors = np.maximum(errors, np.median(errors))
+    rows = np.stack([np.ones(at.size), at - start], axis=1) / errors[:, None]
+    (first, slope), *_ = np.linalg.lstsq(rows, times / errors)
+    left = times / errors - rows @ (first, slope)
+    freedom = at.size - 2
+    scale = max(1.0, float(left @ left) / freedom)
+    first_error, error = np.sqrt(scale * np.diag(np.linalg.inv(rows.T @ rows))).tolist()
+    quantile = float(special.stdtrit(freedom, 1.0 - SIGNIFICANCE / 2))
+    return Growth(float(slope), error, quantile, float(first), first_error)
+
+
+def apart_from_each_other(windows: Sequence[Window]) -> list[Window]:
+    """Windows that do not overlap, those that promise more first."""
+    chosen: list[Window] = []
+    for one in windows:
+        if all(one.stop <= other.start or one.start >= other.stop for other in chosen):
+            chosen.append(one)
+    return chosen
+
+
+def time_in(window: Window, fit: DelayEstimate) -> tuple[float, float, float] | None:
+    """When a window tells its time, how much later than the estimate that is, and its error, s.
+
+    It tells it where the response moves. Gauss and Newton's search for gain and delay, with offset
+    and trend; None where it does not end.
+    """
+    part, plant = window.recording, fit.loop.plant
+    sent = part.sent or (part.time, part.reference if part.command is None else part.command)
+    path = path_of(plant, *sent)
+    values = plant.parameters
+    basis = trend_of(part.time)
+    moved = part.output - basis @ (basis.T @ part.output)
+    largest, late = LARGEST * max(fit.delay_plus_lag, part.sample_time), 0.0
+    for _ in range(STEPS):
+        times = part.time - fit.delay - late
+        rate = path.slopes(times, values, ()).rate
+        columns = np.stack([path.value(times, values), -rate], axis=1)
+        columns -= basis @ (basis.T @ columns)
+        (gain, slope), *_ = np.linalg.lstsq(columns, moved)
+        if gain <= 0.0:
+            return None
+        left = moved - columns @ (gain, slope)
+        variance = variance_of(left) * float(np.linalg.pinv(columns.T @ columns)[1, 1])
+        step, error = float(slope / gain), math.sqrt(variance) / float(gain)
+        if abs(step) < SETTLED * error:
+            moves = columns[:, 1] ** 2
+            return float(moves @ part.time / np.sum(moves)), late + step, error
+        late += math.copysign(min(abs(step), largest), step)
+    return None

@@ -1,0 +1,162 @@
+"""Delays of the filters that a log's parameters name.
+
+A filter delays what is slow against its corner by its group delay at zero frequency. For
+1/((s/w0)^2 + 2 z s/w0 + 1) this is 2 z/w0, so 1/(2 pi f) for one pole at f, and sqrt(2)/(2 pi f)
+for two of Butterworth. A notch (s^2 + w0^2)/(s^2 + s w0/Q + w0^2) delays by 1/(Q w0).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from deadtime.logs._log import Log
+
+#: Types of low-pass filters in Betaflight's header.
+PT1, BIQUAD, PT2, PT3 = 0, 1, 2, 3
+
+
+class FilterDelay(NamedTuple):
+    """The delay of one filter.
+
+    Attributes
+    ----------
+    name : str
+        For example ``"gyro low-pass"``.
+    path : str
+        ``"response"``: on all that the controller sees; ``"D"``: on its derivative alone.
+    delay : float
+        Group delay at low frequencies, s.
+    source : str
+        The parameters that tell, with their values.
+    """
+
+    name: str
+    path: str
+    delay: float
+    source: str
+
+
+def one_pole(corner: float) -> float:
+    """Delay of a filter of one pole, s; its corner in Hz."""
+    return 1.0 / (2.0 * math.pi * corner)
+
+
+def two_poles(corner: float) -> float:
+    """Delay of a Butterworth filter of two poles, s."""
+    return math.sqrt(2.0) * one_pole(corner)
+
+
+def notch(centre: float, quality: float) -> float:
+    """Delay of a notch, s; its centre in Hz."""
+    return 1.0 / (quality * 2.0 * math.pi * centre)
+
+
+def poles_in_row(number: int, corner: float) -> float:
+    """Delay of poles of one kind in a row whose corner together, at -3 dB, is `corner`."""
+    own = corner / math.sqrt(2.0 ** (1.0 / number) - 1.0)
+    return number * one_pole(own)
+
+
+LOW_PASSES: Mapping[int, Callable[[float], float]] = {
+    PT1: one_pole,
+    BIQUAD: two_poles,
+    PT2: lambda corner: poles_in_row(2, corner),
+    PT3: lambda corner: poles_in_row(3, corner),
+}
+
+
+def filters_of(log: Log) -> tuple[FilterDelay, ...]:
+    """The filters on the rates that the parameters of a log name."""
+    readers = {"PX4": _px4, "ArduPilot": _ardupilot, "Betaflight": _betaflight}
+    reader = readers.get(log.autopilot)
+    return tuple(reader(log.parameters)) if reader else ()
+
+
+def _px4(told: Mapping[str, float]) -> list[FilterDelay]:
+    """IMU_GYRO_CUTOFF and IMU_DGYRO_CUTOFF are Butterworth filters of two poles."""
+    found = _low_pass(told, "gyro low-pass", "response", "IMU_GYRO_CUTOFF", two_poles)
+    found += _low_pass(told, "low-pass of the derivative", "D", "IMU_DGYRO_CUTOFF", two_poles)
+    found += _low_pass(told, "low-pass of the derivative", "D", "MC_DTERM_CUTOFF", two_poles)
+    for k in (0, 1):
+        centre, width = (told.get(f"IMU_GYRO_NF{k}_{end}", 0.0) for end in ("FRQ", "BW"))
+        if centre > 0.0 and width > 0.0:
+            source = f"IMU_GYRO_NF{k}_FRQ {centre:g}, IMU_GYRO_NF{k}_BW {width:g}"
+            found.append(
+                FilterDelay(f"notch {k + 1}", "response", notch(centre, centre / width), source)
+            )
+    return found
+
+
+def _ardupilot(told: Mapping[str, float]) -> list[FilterDelay]:
+    """INS_GYRO_FILTER has two poles, the filters of the rate controller have one each."""
+    found = _low_pass(told, "gyro low-pass", "response", "INS_GYRO_FILTER", two_poles)
+    centre, width = told.get("INS_HNTCH_FREQ", 0.0), told.get("INS_HNTCH_BW", 0.0)
+    if told.get("INS_HNTCH_ENABLE", 0.0) > 0.0 and centre > 0.0 and width > 0.0:
+        source = f"INS_HNTCH_FREQ {centre:g}, INS_HNTCH_BW {width:g}"
+        delay = notch(centre, centre / width)
+        found.append(FilterDelay("harmonic notch", "response", delay, source))
+    for axis, name in (("RLL", "roll"), ("PIT", "pitch"), ("YAW", "yaw")):
+        for letter, what, path in (("D", "derivative", "D"), ("E", "error", f"{name} error")):
+            parameter = f"ATC_RAT_{axis}_FLT{letter}"
+            found += _low_pass(told, f"low-pass of the {name} {what}", path, parameter, one_pole)
+    return found
+
+
+def _betaflight(told: Mapping[str, float]) -> list[FilterDelay]:
+    found = []
+    for path, name, prefix, of_type in (
+        ("response", "gyro low-pass", "gyro_lowpass", "gyro_lowpass_type"),
+        ("response", "gyro low-pass 2", "gyro_lowpass2", "gyro_lowpass2_type"),
+        ("response", "gyro low-pass", "gyro_lpf1", "gyro_lpf1_type"),
+        ("response", "gyro low-pass 2", "gyro_lpf2", "gyro_lpf2_type"),
+        ("D", "low-pass of the derivative", "dterm_lowpass", "dterm_filter_type"),
+        ("D", "low-pass 2 of the derivative", "dterm_lowpass2", "dterm_filter2_type"),
+        ("D", "low-pass of the derivative", "dterm_lpf1", "dterm_lpf1_type"),
+        ("D", "low-pass 2 of the derivative", "dterm_lpf2", "dterm_lpf2_type"),
+    ):
+        kind = int(told.get(of_type, PT1))
+        delay_of = LOW_PASSES.get(kind)
+        dynamic = [f"{prefix}_dyn_hz[0]", f"{prefix}_dyn_hz[1]"]
+        if delay_of is None:
+            continue
+        if told.get(dynamic[0], 0.0) > 0.0 and told.get(dynamic[1], 0.0) > 0.0:
+            # The corner rises with the throttle: the longest delay is that of the lowest corner.
+            low, high = (told[name] for name in dynamic)
+            source = f"{prefix}_dyn_hz {low:g} to {high:g}, at {low:g}"
+            found.append(FilterDelay(f"dynamic {name}", path, delay_of(low), source))
+            continue
+        found += _low_pass(told, name, path, f"{prefix}_hz", delay_of)
+        found += _low_pass(told, name, path, f"{prefix}_static_hz", delay_of)
+    for k in (0, 1):
+        centre, cutoff = (
+            told.get(f"gyro_notch_hz[{k}]", 0.0),
+            told.get(f"gyro_notch_cutoff[{k}]", 0.0),
+        )
+        if centre > cutoff > 0.0:
+            quality = centre * cutoff / (centre**2 - cutoff**2)
+            source = f"gyro_notch_hz {centre:g}, gyro_notch_cutoff {cutoff:g}"
+            found.append(
+                FilterDelay(f"gyro notch {k + 1}", "response", notch(centre, quality), source)
+            )
+    quality, lowest = told.get("dyn_notch_q", 0.0) / 100.0, told.get("dyn_notch_min_hz", 0.0)
+    count = told.get("dyn_notch_count", 1.0)
+    if quality > 0.0 and lowest > 0.0 and count > 0.0:
+        source = f"dyn_notch_min_hz {lowest:g}, dyn_notch_q {100.0 * quality:g}, {count:g} of them"
+        delay = count * notch(lowest, quality)
+        found.append(FilterDelay("dynamic notch, at most", "response", delay, source))
+    return found
+
+
+def _low_pass(
+    told: Mapping[str, float],
+    name: str,
+    path: str,
+    parameter: str,
+    delay_of: Callable[[float], float],
+) -> list[FilterDelay]:
+    corner = told.get(parameter, 0.0)
+    if not corner > 0.0:
+        return []
+    return [FilterDelay(name, path, delay_of(corner), f"{parameter} {corner:g}")]

@@ -1,0 +1,61 @@
+"""The explorer of a proportional controller around an estimated vehicle, for the page.
+
+A fit from setpoint to response is a closed loop, whose controller is inside of it. One from what
+the controller commands is the vehicle alone, and its cost in gain is about a gain around that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from deadtime._base.explorer import Explorer
+from deadtime.logs.latencies._relation import LoopLatency
+from deadtime.loops import P
+
+#: Ends of the map, as a share of the largest stable gain, and of delay and lag together.
+_BEYOND = 1.5
+
+
+@dataclass(frozen=True)
+class Around:
+    """A loop around the vehicle, and which it is."""
+
+    explorer: Explorer
+    words: str
+
+
+def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
+    """The loop with the gain flown, or else the well damped one; None where no fit is adequate.
+
+    Of several vehicles, such as that of the rate and that of the angle, the one whose gain is
+    known, and then the one that is told best.
+    """
+    told = [one for one in estimated if one.cost and one.estimate and one.estimate.adequate]
+    if not told:
+        return None
+    one = min(told, key=lambda one: (_flown(one) is None, one.promise))
+    assert one.estimate is not None
+    assert one.cost is not None
+    gain = _flown(one)
+    which = "the gain that is flown" if gain is not None else "the well damped gain"
+    words = (
+        f"The vehicle as estimated, {one.name}, under proportional control of the {one.loop} with "
+        f"{which}: this is the loop that its largest stable gain is about, without further terms "
+        "of the controller. The interval is that of the delay, with gain and lag as estimated."
+    )
+    controller = P(one.cost.well_damped if gain is None else gain)
+    widest, longest = (
+        float(f"{_BEYOND * end:.2g}") for end in (one.cost.largest, one.estimate.delay_plus_lag)
+    )
+    ranges = {"Kp": (min(widest, 0.0), max(widest, 0.0)), "delay": (0.0, longest)}
+    return Around(one.estimate.explore(controller, ranges), words)
+
+
+def _flown(one: LoopLatency) -> float | None:
+    """The proportional gain of the log, if it is one with which the model is stable."""
+    cost = one.cost
+    if cost is None or cost.flown is None or cost.delay_margin is None:
+        return None
+    return None if math.isnan(cost.delay_margin) else cost.flown

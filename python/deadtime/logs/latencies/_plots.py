@@ -1,0 +1,76 @@
+"""Pictures of latencies: delay and lag of each loop, and each fit over its data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from deadtime._base.digits import time_unit
+from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, new_figure
+from deadtime.logs.latencies._relation import LoopLatency
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Height of a bar's row, and of what is around them, in inches.
+ROW, AROUND = 0.34, 1.3
+
+
+def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
+    """Delay and lag of each loop as bars, with the 95 % interval of their sum."""
+    if not told:
+        raise ValueError(f"{source}: no loop tells how long it takes, so nothing is drawn")
+    figure, ax = new_figure(7.5, AROUND + ROW * len(told))
+    sums = [one.sum_of() for one in told]
+    unit, factor = time_unit(float(np.median([value for value, _, _ in sums])))
+    for place, (one, (value, _, (low, high))) in enumerate(zip(told, sums, strict=True)):
+        fit = one.estimate
+        assert fit is not None
+        look = {"alpha": 1.0 if fit.adequate else 0.35, "height": 0.6}
+        delay = fit.delay / factor
+        ax.barh(place, delay, color=COLOURS[0], **look)
+        ax.barh(place, value / factor - delay, left=delay, color=COLOURS[1], **look)
+        ax.plot([low / factor, high / factor], [place, place], color="0.15", lw=1.4, marker="|")
+    ax.set_yticks(range(len(told)))
+    doubts = ["" if one.estimate and one.estimate.adequate else " (not adequate)" for one in told]
+    ax.set_yticklabels(
+        [f"{one.loop}, {one.command}{d}" for one, d in zip(told, doubts, strict=True)]
+    )
+    ax.invert_yaxis()
+    # One loop with a long tail does not hide the others.
+    widest = max(value for value, _, _ in sums) / factor
+    ax.set_xlim(0.0, 1.6 * widest)
+    ax.set_xlabel(f"from the command to the response [{unit}]")
+    handles = [ax.barh(0, 0, color=colour) for colour in COLOURS[:2]]
+    handles += ax.plot([], [], color="0.15", lw=1.4, marker="|")
+    names = ["delay", "lag", "95 % of both"]
+    figure.legend(handles, names, loc="outside upper center", ncols=3, frameon=False)
+    return figure
+
+
+def plot_fit(one: LoopLatency) -> Figure:
+    """The response of a loop over its best window, and the fitted plant."""
+    figure, ax = new_figure(7.5, 2.8)
+    draw_fit(ax, one)
+    return figure
+
+
+def draw_fit(ax: Axes, one: LoopLatency) -> None:
+    """Draw command, response and fit of a loop."""
+    fit = one.estimate
+    assert fit is not None
+    bare_axes(ax)
+    recording = fit.recording
+    unit = recording.units.get("output", "")
+    ax.plot(recording.time, recording.output, **DATA, label="response")
+    if one.command == "setpoint":
+        ax.step(recording.time, recording.reference, where="post", **REFERENCE, label="setpoint")
+    # Air has moved the response too: the plant alone is drawn around its mean.
+    plant = recording.output - (fit.residuals - fit.residuals.mean())
+    ax.plot(recording.time, plant, color=COLOURS[1], lw=1.4, label="plant alone")
+    ax.set_xlabel("time from the start of the log [s]")
+    ax.set_ylabel(f"{one.loop} [{unit}]" if unit else one.loop)
+    ax.figure.legend(loc="outside upper center", ncols=3, frameon=False)
