@@ -22,6 +22,8 @@ from deadtime.roots.certificate._parts import Monotone, Segment
 from hypothesis import assume, example, given, settings, strategies as st
 from root_cases import CASES, ROOT_ON_AN_EDGE
 
+REFERENCE = Path(__file__).resolve().parents[1] / "reference"
+
 # A multiple root or a cluster lies on the real axis, which is an edge.
 CLUSTER_ON_THE_AXIS = {"double_at_0", "near_double", "mazanti_mult6", "mid_mult4_exact0"}
 
@@ -310,6 +312,13 @@ def test_json_keeps_every_bit(name):
     assert Certificate.from_json(half_plane.to_json()) == half_plane
 
 
+def test_a_file_of_an_earlier_version_is_read_and_written_as_before():
+    text = (REFERENCE / "certificate.json").read_text(encoding="utf-8")
+    read = Certificate.from_json(text)
+    assert read.verify() == read.count == 2
+    assert read.to_json(indent=1) == text.strip()
+
+
 def test_what_is_no_certificate_is_refused():
     good = json.loads(certify("armah_K2").to_json())
     texts = ["", "[]", "{}", "3", json.dumps({**good, "format": "another"})]
@@ -319,6 +328,7 @@ def test_what_is_no_certificate_is_refused():
     texts.append(json.dumps({**good, "count": 12.0}))
     texts.append(json.dumps({**good, "delays": [0.0, 0.36]}))
     texts.append(json.dumps({**good, "real": [{"bend": "0x0p+0"}]}))
+    texts.append(json.dumps({**good, "more": 1}))
     for text in texts:
         with pytest.raises(ValueError, match="not the text of a certificate"):
             Certificate.from_json(text)
@@ -338,7 +348,8 @@ def test_certificates_do_not_change():
 
 def test_the_checker_uses_neither_the_prover_nor_floating_point_functions():
     room = Path(deadtime.__file__).parent / "roots" / "certificate"
-    for name in ("_certificate", "_check", "_enclosures", "_form", "_function", "_parts"):
+    names = ["_certificate", "_check", "_enclosures", "_form", "_function", "_parts", "_stored"]
+    for name in names:
         tree = ast.parse((room / f"{name}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):

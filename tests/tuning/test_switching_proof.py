@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import deadtime as dtm
 import mpmath
@@ -15,6 +16,8 @@ from deadtime.tuning.adaptive._check import _Checker, _plant
 from deadtime.tuning.adaptive._claims import Claims
 from deadtime.tuning.adaptive._search import proved
 from deadtime.tuning.adaptive._switched import switched_loop
+
+REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 
 TS, GAIN, LIMIT = 0.1, 0.9, 1.0
 SMOOTH = dtm.DerivativeFilter(30.0, discretisation="tustin")
@@ -229,6 +232,42 @@ def test_a_proof_is_stored_and_checked_again(schedules):
     for change in ({"Kp": 1.0}, {"more": "0x1p0"}, {"format": "other"}, {"Kp": "nan"}):
         with pytest.raises(ValueError, match="not the text of a proof"):
             SwitchingProof.from_json(json.dumps(data | change))
+
+
+def test_a_file_of_an_earlier_version_is_read_and_written_as_before():
+    text = (REFERENCE / "switching_proof.json").read_text(encoding="utf-8")
+    read = SwitchingProof.from_json(text)
+    assert read.verify() == read.step > 1.0
+    assert read.to_json(indent=1) == text.strip()
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("Kp", "0x1p+99999"),  # left as an OverflowError
+        ("Kp", "inf"),
+        ("Kp", 1),
+        ("Kp", True),
+        ("ages", [["0x0p+0", 1]]),
+        ("ages", [[0, True]]),
+        ("ages", [[0, 1, 2]]),
+        ("filter", ["0x1p+5", "0x1p+0", "zoh"]),
+        ("form", "0x1p+0"),
+        ("gain", None),
+    ],
+)
+def test_a_damaged_file_is_refused_with_the_reason(place, value):
+    data = json.loads((REFERENCE / "switching_proof.json").read_text(encoding="utf-8"))
+    with pytest.raises(ValueError, match="not the text of a proof"):
+        SwitchingProof.from_json(json.dumps(data | {place: value}))
+    del data[place]
+    with pytest.raises(ValueError, match=f"not the text of a proof: .*{place}"):
+        SwitchingProof.from_json(json.dumps(data))
+
+
+def test_nested_brackets_are_no_recursion_error():
+    with pytest.raises(ValueError, match="nested"):
+        SwitchingProof.from_json("[" * 200_000)
 
 
 def test_gains_are_lowered_until_there_is_a_proof_or_refused():

@@ -35,8 +35,7 @@ from deadtime.roots._root_set import RootSet
 from deadtime.roots._scalar_delay import dde_roots, rightmost_branches
 from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots._text import latex as latex
-from deadtime.roots.certificate._certificate import Certificate
-from deadtime.roots.certificate._enclosures import exponential as exponential
+from deadtime.roots.certificate import Certificate
 from deadtime.roots.certificate._plots import plot_certificate as plot_certificate
 
 __all__ = [

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import reprlib
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
+from typing import TYPE_CHECKING
 
 from deadtime._base.notebook import Pictured
 from deadtime.roots.certificate._check import check
 from deadtime.roots.certificate._form import check_form
-from deadtime.roots.certificate._parts import Contour, Monotone, Proof, Range, Segment
+from deadtime.roots.certificate._parts import Proof
+from deadtime.roots.certificate._stored import Stored
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_T = TypeVar("_T")
-
-_FORMAT: Final = "deadtime certificate"
-
-
 @dataclass(frozen=True)
-class Certificate(Proof, Pictured):
+class Certificate(Proof, Stored, Pictured):
     """The proved number of roots in a region, with everything needed to check the proof.
 
     Made by `QuasiPolynomial.certify`. It contains the function, the region, the number and the
@@ -75,6 +67,9 @@ class Certificate(Proof, Pictured):
     True
     """
 
+    _FORMAT = "deadtime certificate"
+    _NOUN = "certificate"
+
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region
         pieces = sum(len(contour.segments) for contour in self.contours) + len(self.real)
@@ -82,6 +77,9 @@ class Certificate(Proof, Pictured):
             f"<Certificate: {self.count} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g}), "
             f"proved on {pieces} segments>"
         )
+
+    def _check_form(self) -> None:
+        check_form(self)
 
     def verify(self) -> int:
         """Check every claim independently of the code that made it.
@@ -143,131 +141,3 @@ class Certificate(Proof, Pictured):
         axes = shown_axes(ax)
         plot_certificate(axes, self)
         return axes
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Write the certificate as JSON, with numbers in hexadecimal so that none is rounded.
-
-        Parameters
-        ----------
-        indent : int, optional
-            As in `json.dumps`.
-
-        Returns
-        -------
-        str
-        """
-        return json.dumps({"format": _FORMAT, **_plain(self)}, indent=indent)
-
-    @classmethod
-    def from_json(cls, text: str) -> Certificate:
-        """Read what `to_json` wrote; only the form is checked, `verify` checks the claims.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        Certificate
-
-        Raises
-        ------
-        ValueError
-            If the text is not a certificate, or contains numbers that no certificate has.
-        """
-        try:
-            data = json.loads(text)
-            if data.pop("format") != _FORMAT:
-                raise KeyError("format")
-            read = cls(
-                coefficients=_each(lambda row: _each(_number, row), data.pop("coefficients")),
-                delays=_each(_number, data.pop("delays")),
-                region=_box(data.pop("region")),
-                count=data.pop("count"),
-                scale=data.pop("scale"),
-                zeros=data.pop("zeros"),
-                beyond=_bound(data.pop("beyond")),
-                closed=_box(data.pop("closed")),
-                contours=_each(_contour, data.pop("contours")),
-                real=_each(_part, data.pop("real")),
-            )
-            check_form(read)
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise ValueError(f"this is not the text of a certificate: {error}") from error
-        except RecursionError:
-            raise ValueError(
-                "this is not the text of a certificate: brackets are nested deeper than in one"
-            ) from None
-        return read
-
-
-def _plain(value: Any) -> Any:
-    """Convert a value to types of JSON; floats and complex numbers become hexadecimal text."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = dataclasses.fields(value)
-        return {field.name: _plain(getattr(value, field.name)) for field in fields}
-    if isinstance(value, tuple):
-        return [_plain(part) for part in value]
-    if isinstance(value, complex):
-        return [value.real.hex(), value.imag.hex()]
-    return value.hex() if isinstance(value, float) else value
-
-
-def _number(text: Any) -> float:
-    if not isinstance(text, str):
-        raise TypeError(f"{reprlib.repr(text)}: a number is written in hexadecimal")
-    return float.fromhex(text)
-
-
-def _each(read: Callable[[Any], _T], values: Any) -> tuple[_T, ...]:
-    if not isinstance(values, list):
-        raise TypeError(f"{reprlib.repr(values)} is not a list")
-    return tuple(map(read, values))
-
-
-def _pair(read: Callable[[Any], _T], values: Any) -> tuple[_T, _T]:
-    first, second = _each(read, values)
-    return first, second
-
-
-def _complex(values: Any) -> complex:
-    return complex(*_pair(_number, values))
-
-
-def _range(values: Any) -> Range:
-    return _pair(_number, values)
-
-
-def _box(values: Any) -> tuple[Range, Range]:
-    return _pair(_range, values)
-
-
-def _bound(values: Any) -> tuple[int, float] | None:
-    if values is None:
-        return None
-    row, radius = _pair(lambda value: value, values)
-    return row, _number(radius)
-
-
-_READERS: Final[dict[Any, Callable[[Any], Any]]] = {
-    complex: _complex,
-    float: _number,
-    int: lambda value: value,
-}
-
-
-def _part(data: Any) -> Segment | Monotone:
-    kind = Monotone if "bend" in data else Segment
-    hints = get_type_hints(kind)
-    fields: dict[str, Any] = {name: _READERS[hints[name]](x) for name, x in data.items()}
-    return kind(**fields)
-
-
-def _contour(data: Any) -> Contour:
-    return Contour(
-        _range(data["re"]),
-        _range(data["im"]),
-        data["symmetric"],
-        data["count"],
-        _each(_part, data["segments"]),  # type: ignore[arg-type]
-    )

@@ -10,6 +10,8 @@ floating point: it is slow, and independent of all other computations in this pa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
 from functools import lru_cache
 from math import isqrt
 
@@ -21,10 +23,24 @@ _LARGEST_EXPONENT = 13
 _LARGEST_ANGLE = 58
 
 
-def dyadic(x: float) -> tuple[int, int]:
-    """Give (n, q) with x = n / 2**q exactly, q >= 0."""
+def dyadic(x: float | Fraction) -> tuple[int, int]:
+    """Give (n, q) with x = n / 2**q exactly, q >= 0, for a multiple of a power of two."""
     numerator, denominator = x.as_integer_ratio()
     return numerator, denominator.bit_length() - 1
+
+
+def whole(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
+    """Rows of multiples of powers of two as integers over one power 2**q, and the least such q."""
+    q = max(dyadic(x)[1] for row in rows for x in row)
+    return [[scaled(x, q) for x in row] for row in rows], q
+
+
+def scaled(x: Fraction, q: int) -> int:
+    """A multiple of 2**-q, times 2**q."""
+    n, remainder = divmod(x.numerator << q, x.denominator)
+    if remainder:
+        raise ValueError(f"{x} is no multiple of 2**-{q}")
+    return n
 
 
 def shifted(n: int, left: int) -> int:
@@ -83,6 +99,13 @@ def exponential(n: int, q: int, bits: int) -> tuple[int, int, int]:
         total += term
     error = 3 * count + 8
     return total - error, total + error, work - k
+
+
+def exponential_between(x: Fraction, bits: int) -> tuple[Fraction, Fraction]:
+    """Enclose e^x for a multiple x of a power of two, by numbers of about `bits` binary digits."""
+    low, high, shift = exponential(*dyadic(x), bits)
+    unit = Fraction(2) ** -shift
+    return low * unit, high * unit
 
 
 @lru_cache(maxsize=4096)

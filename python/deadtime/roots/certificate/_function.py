@@ -15,7 +15,14 @@ from itertools import pairwise
 from typing import NoReturn, TypeAlias
 
 from deadtime._base.errors import CertificateError
-from deadtime.roots.certificate._enclosures import cos_sin, dyadic, exponential, shifted
+from deadtime.roots.certificate._enclosures import (
+    cos_sin,
+    dyadic,
+    exponential,
+    exponential_between,
+    shifted,
+    whole,
+)
 
 # Binary digits of a value, in relation to its size: more take longer, fewer refuse true claims
 # close to a root. Doubles have 53.
@@ -60,15 +67,13 @@ class ExactFunction:
         factor = Fraction(2) ** scale
         exact = [[Fraction(c) * factor for c in row] for row in rows]
         self.rows_exact = exact
-        self.q = max(c.denominator.bit_length() - 1 for row in exact for c in row)
-        self.rows = [[int(c * (1 << self.q)) for c in row] for row in exact]
+        self.rows, self.q = whole(exact)
         self.delays_exact = [Fraction(tau) for tau in delays]
         if any(not a < b for a, b in pairwise(self.delays_exact)) or any(
             tau < 0 for tau in self.delays_exact
         ):
             fail("the delays do not increase from 0 up")
-        self.t = max(tau.denominator.bit_length() - 1 for tau in self.delays_exact)
-        self.delays = [int(tau * (1 << self.t)) for tau in self.delays_exact]
+        (self.delays,), self.t = whole([self.delays_exact])
 
     def enclose(self, s: complex, index: int, size: float) -> Enclosure:
         """Enclose g and g' at s, with enough digits for values of about `size`."""
@@ -279,11 +284,6 @@ def affordable(
         raise OverflowError(f"polynomials take {work} binary digits to check")
 
 
-def _binary(x: Fraction) -> tuple[int, int]:
-    """Numerator and binary exponent of a fraction whose denominator is a power of two."""
-    return x.numerator, x.denominator.bit_length() - 1
-
-
 def _ceil(x: Fraction, bits: int) -> int:
     return -((-x.numerator << bits) // x.denominator)
 
@@ -299,5 +299,4 @@ def above(x: Fraction, y: Fraction) -> Fraction:
 
 
 def exponential_above(x: Fraction) -> Fraction:
-    _, high, shift = exponential(*_binary(x), _FEW)
-    return high * Fraction(2) ** -shift
+    return exponential_between(x, _FEW)[1]

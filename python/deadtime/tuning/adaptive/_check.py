@@ -16,6 +16,7 @@ from itertools import combinations_with_replacement, product
 from typing import NoReturn
 
 from deadtime._base.errors import CertificateError
+from deadtime.roots.certificate import check_types, refusing, scaled, whole
 from deadtime.tuning.adaptive._claims import Claims, FilterNumbers
 from deadtime.tuning.adaptive._enclosed import DIGITS, Enclosed, exponential_of
 
@@ -34,25 +35,33 @@ def check(claims: Claims) -> float:
     CertificateError
         If a claim is false or not proved; the message names the first one.
     """
-    try:
+    with refusing("proof"):
+        check_form(claims)
         _check_numbers(claims)
         return _Checker(claims).step()
-    except (OverflowError, ZeroDivisionError, ValueError, IndexError, TypeError) as error:
-        raise CertificateError(
-            f"the proof has a number out of range, or a part of no use: {error}"
-        ) from error
+
+
+def check_form(claims: Claims) -> None:
+    """Check the types of all parts, and that all numbers are finite.
+
+    Raises
+    ------
+    ValueError
+        If a part is not valid.
+    """
+    check_types(claims)
+    numbers = [*claims.num, *claims.den, *claims.gain, claims.sample_time, claims.Kp, claims.Kv]
+    numbers += [*claims.factors, claims.least_factor, claims.decay, claims.step]
+    numbers += [entry for row in claims.form for entry in row]
+    numbers += [] if claims.limit is None else [claims.limit]
+    numbers += [] if claims.filter is None else claims.filter[:2]
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError("not all numbers are finite")
 
 
 def _check_numbers(claims: Claims) -> None:
     """Refuse numbers that no proof has."""
     low, high = claims.gain
-    numbers = [*claims.num, *claims.den, low, high, claims.sample_time, claims.Kp, claims.Kv]
-    numbers += [*claims.factors, claims.least_factor, claims.decay, claims.step]
-    numbers += [entry for row in claims.form for entry in row]
-    numbers += [] if claims.limit is None else [claims.limit]
-    numbers += [] if claims.filter is None else claims.filter[:2]
-    if not all(isinstance(one, float) and math.isfinite(one) for one in numbers):
-        _fail("not all numbers are finite")
     if not (low <= high and low * high > 0.0):
         _fail(f"the gain of the plant is from {low:g} to {high:g}")
     if not (claims.sample_time > 0.0 and claims.Kp != 0.0):
@@ -66,7 +75,7 @@ def _check_numbers(claims: Claims) -> None:
     if claims.limit is not None and claims.limit <= 0.0:
         _fail(f"the limit is {claims.limit:g}")
     for first, last in claims.ages:
-        if not (isinstance(first, int) and isinstance(last, int) and 0 <= first <= last):
+        if not 0 <= first <= last:
             _fail(f"ages run from {first} to {last}")
     if claims.decay < 0.0 or claims.step < 0.0:
         _fail(f"the decay is {claims.decay:g}/s and the step {claims.step:g}")
@@ -97,7 +106,7 @@ class _Checker:
         if self.size > MOST_STATES:
             raise OverflowError(f"{self.size} states take too long to check")
         self.form = [[Fraction(entry) for entry in row] for row in claims.form]
-        self.whole = _whole(self.form)
+        self.whole, _ = whole(self.form)
         if any(self.form[i][j] != self.form[j][i] for i in range(self.size) for j in range(i)):
             _fail("the form is not symmetric")
         self.signal = self._signal()
@@ -186,8 +195,8 @@ class _Checker:
         size, form = self.size, self.whole
         # A in units of 2^-unit and P as whole numbers, so A'PA is in units of 4^-unit.
         unit = DIGITS + 1
-        middle = [[_scaled(one.middle, unit) for one in row] for row in matrix]
-        radius = max(_scaled(one.radius, unit) for row in matrix for one in row)
+        middle = [[scaled(one.middle, unit) for one in row] for row in matrix]
+        radius = max(scaled(one.radius, unit) for row in matrix for one in row)
         largest = max(abs(one) for row in middle for one in row)
         heaviest = max(abs(one) for row in form for one in row)
         # Each entry of A'PA sums size^2 products; a row of the change sums `size` such entries.
@@ -198,7 +207,7 @@ class _Checker:
             for j, one in row:
                 for i in range(size):
                     weighted[i][j] += form[i][k] * one
-        share = _scaled(kept, 2 * unit)
+        share = scaled(kept, 2 * unit)
         result = [[share * one for one in row] for row in form]
         for k, row in enumerate(used):
             for i, one in row:
@@ -223,7 +232,7 @@ class _Checker:
             radius = max((a * b).radius for a in self.signal for b in self.signal)
             for i in range(self.size):
                 bound[i][i] -= most * most * radius * self.size
-            if not _is_positive(_whole(bound)):
+            if not _is_positive(whole(bound)[0]):
                 _fail("the form does not bound the command")
         start = list(self.plant.rest)
         start += [Enclosed(1), Enclosed(0)] if self.smooth is not None else []
@@ -312,20 +321,6 @@ def _is_positive(matrix: Integers) -> bool:
                 row[j] = (pivot * row[j] - factor * pivot_row[j]) // before
         before = pivot
     return True
-
-
-def _whole(matrix: Sequence[Sequence[Fraction]]) -> Integers:
-    """A matrix of multiples of powers of two, times one such power."""
-    digits = max(one.denominator.bit_length() - 1 for row in matrix for one in row)
-    return [[_scaled(one, digits) for one in row] for row in matrix]
-
-
-def _scaled(x: Fraction, digits: int) -> int:
-    """A fraction whose denominator is a power of two, times 2**digits."""
-    numerator, left = x.numerator << digits, x.denominator
-    if numerator % left:
-        raise ValueError(f"{x} is no multiple of 2**-{digits}")
-    return numerator // left
 
 
 def _fail(message: str) -> NoReturn:

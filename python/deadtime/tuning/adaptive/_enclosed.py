@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from deadtime.roots import exponential
+from deadtime.roots.certificate import exponential_between
 
 #: Binary digits after the point to which ends are rounded: more take longer, fewer leave errors
 #: that a form has to bear.
@@ -52,13 +52,9 @@ class Enclosed:
 
 def exponential_of(exponent: Enclosed) -> Enclosed:
     """Enclose e to the power of an enclosed number, which is a multiple of 2**-DIGITS."""
-    low, _, below = exponential(*_binary(exponent.low), DIGITS)
-    _, high, above = exponential(*_binary(exponent.high), DIGITS)
-    return Enclosed(Fraction(low, 1 << below), Fraction(high, 1 << above))
-
-
-def _binary(x: Fraction) -> tuple[int, int]:
-    return x.numerator, x.denominator.bit_length() - 1
+    low, _ = exponential_between(exponent.low, DIGITS)
+    _, high = exponential_between(exponent.high, DIGITS)
+    return Enclosed(low, high)
 
 
 def _down(x: Fraction) -> Fraction:

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import math
-import reprlib
 from dataclasses import dataclass
-from typing import Any, Final
 
-from deadtime.tuning.adaptive._check import check
+from deadtime.roots.certificate import Stored
+from deadtime.tuning.adaptive._check import check, check_form
 from deadtime.tuning.adaptive._claims import Claims
-
-_FORMAT: Final = "deadtime proof of a gain schedule"
 
 
 @dataclass(frozen=True)
-class SwitchingProof(Claims):
+class SwitchingProof(Claims, Stored):
     """A quadratic form that decreases for every delay, every set of gains and their changes.
 
     Made by `adaptive_gains`. It contains the loop, the sets and the form v'Pv of the state, the
@@ -72,6 +66,9 @@ class SwitchingProof(Claims):
     True
     """
 
+    _FORMAT = "deadtime proof of a gain schedule"
+    _NOUN = "proof"
+
     def __repr__(self) -> str:
         last = max(last for _, last in self.ages) * self.sample_time
         first = min(first for first, _ in self.ages) * self.sample_time
@@ -79,6 +76,9 @@ class SwitchingProof(Claims):
             f"<SwitchingProof: {len(self.factors)} sets of gains, delays of {first:g} to {last:g} "
             f"s, {len(self.form)} states>"
         )
+
+    def _check_form(self) -> None:
+        check_form(self)
 
     def verify(self) -> float:
         """Check every claim independently of the code that made it.
@@ -109,68 +109,3 @@ class SwitchingProof(Claims):
         deadtime._base.errors.CertificateError: the proof is false: the form is not proved to ...
         """
         return check(self)
-
-    def to_json(self, indent: int | None = None) -> str:
-        """Write the proof as JSON, with numbers in hexadecimal so that none is rounded.
-
-        Parameters
-        ----------
-        indent : int, optional
-            As in `json.dumps`.
-
-        Returns
-        -------
-        str
-        """
-        return json.dumps({"format": _FORMAT, **_plain(dataclasses.asdict(self))}, indent=indent)
-
-    @classmethod
-    def from_json(cls, text: str) -> SwitchingProof:
-        """Read what `to_json` wrote; only the form is checked, `verify` checks the claims.
-
-        Parameters
-        ----------
-        text : str
-
-        Returns
-        -------
-        SwitchingProof
-
-        Raises
-        ------
-        ValueError
-            If the text is not such a proof.
-        """
-        try:
-            data = json.loads(text)
-            if data.pop("format") != _FORMAT:
-                raise KeyError("format")
-            names = [field.name for field in dataclasses.fields(cls)]
-            values = {name: _read(data.pop(name)) for name in names}
-            if data:
-                raise KeyError(*data)
-            return cls(**values)
-        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise ValueError(f"this is not the text of a proof: {error}") from error
-
-
-def _plain(value: Any) -> Any:
-    """Convert a value to types of JSON; floats become hexadecimal text."""
-    if isinstance(value, dict):
-        return {name: _plain(part) for name, part in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [_plain(part) for part in value]
-    return value.hex() if isinstance(value, float) else value
-
-
-def _read(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(map(_read, value))
-    if value is None or value in ("tustin", "backward") or type(value) is int:
-        return value
-    if not isinstance(value, str):
-        raise TypeError(f"{reprlib.repr(value)}: a number is written in hexadecimal")
-    number = float.fromhex(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{value} is not finite")
-    return number
