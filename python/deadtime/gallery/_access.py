@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from types import MappingProxyType
 
-from deadtime.gallery._entries import ENTRIES
+from deadtime.gallery._entries import entries
 from deadtime.roots import ParametricQuasiPolynomial, QuasiPolynomial
 
 
@@ -73,7 +74,9 @@ class Problem:
         return problem, (self.key,)
 
 
-_PROBLEMS = {key: Problem(key=key, **entry) for key, entry in sorted(ENTRIES.items())}
+@cache
+def _problems() -> dict[str, Problem]:
+    return {key: Problem(key=key, **fields) for key, fields in entries().items()}
 
 
 def names() -> tuple[str, ...]:
@@ -83,7 +86,7 @@ def names() -> tuple[str, ...]:
     -------
     tuple of str
     """
-    return tuple(_PROBLEMS)
+    return tuple(_problems())
 
 
 def problem(key: str) -> Problem:
@@ -110,9 +113,9 @@ def problem(key: str) -> Problem:
     'Router queue with a PI controller'
     """
     try:
-        return _PROBLEMS[key]
+        return _problems()[key]
     except KeyError:
-        near = difflib.get_close_matches(str(key), _PROBLEMS, n=3, cutoff=0.3) or names()
+        near = difflib.get_close_matches(str(key), _problems(), n=3, cutoff=0.3) or names()
         raise KeyError(f"no problem {key!r} in the gallery: there is {', '.join(near)}") from None
 
 
@@ -129,4 +132,4 @@ def problems() -> Iterator[Problem]:
     >>> all(p.h.count(*p.region) >= p.count for p in gallery.problems() if p.key == "wright1955")
     True
     """
-    yield from _PROBLEMS.values()
+    yield from _problems().values()
