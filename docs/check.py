@@ -1,7 +1,7 @@
 """Check built pages: ``python docs/check.py docs/_build/html``.
 
 Every link inside of the pages leads somewhere, a page loads nothing from the network, and every
-public name of every room, methods and attributes of its classes included, has an entry in the
+public name of every package, methods and attributes of its classes included, has an entry in the
 reference.
 """
 
@@ -83,17 +83,17 @@ def broken_links(root: Path) -> Iterator[str]:
 
 
 def public_names() -> Iterator[str]:
-    """Every public name of the rooms, and of the members that their classes define."""
-    rooms = (name for name in dir(dtm) if inspect.ismodule(getattr(dtm, name)))
-    for room in rooms:
-        module = importlib.import_module(f"deadtime.{room}")
+    """Every public name of the packages, and of the members that their classes define."""
+    packages = (name for name in dir(dtm) if inspect.ismodule(getattr(dtm, name)))
+    for package in packages:
+        module = importlib.import_module(f"deadtime.{package}")
         for name in module.__all__:
             value = getattr(module, name)
-            if f"{room}.{name}" in VALUES or (name.isupper() and not inspect.isclass(value)):
+            if f"{package}.{name}" in VALUES or (name.isupper() and not inspect.isclass(value)):
                 continue
-            yield f"deadtime.{room}.{name}"
+            yield f"deadtime.{package}.{name}"
             if inspect.isclass(value):
-                yield from (f"deadtime.{room}.{name}.{one}" for one in members(value))
+                yield from (f"deadtime.{package}.{name}.{one}" for one in members(value))
 
 
 def members(kind: type) -> Iterator[str]:

@@ -10,10 +10,10 @@ from sphinx.application import Sphinx
 def _add_examples(
     app: Sphinx, kind: str, name: str, thing: object, options: object, lines: list[str]
 ) -> None:
-    room, _, rest = name.removeprefix("deadtime.").partition(".")
+    package, _, rest = name.removeprefix("deadtime.").partition(".")
     folder = Path(app.srcdir, app.config.sphinx_gallery_conf["backreferences_dir"])
     # Of a method there is a file for each of the classes that share it, each by its short name.
-    found = folder / f"deadtime.{rest or room}.examples"
+    found = folder / f"deadtime.{rest or package}.examples"
     if kind == "module" or not found.exists():
         return
     pages = dict.fromkeys(re.findall(r":doc:`(.+?)`", found.read_text(encoding="utf-8")))

@@ -3,8 +3,8 @@
 The delay of a recorded loop with its uncertainty, the characteristic roots of time-delay systems,
 maps of the gains that are stable, and exact simulation with hold and limit.
 
-This is the table of contents: what people call and construct. Each name belongs to a room, a
-package that is loaded when it is first used; results and further functions are in the rooms.
+This is the table of contents: what people call and construct. Each name belongs to a package
+inside of this one, which is loaded when it is first used and has results and further functions.
 """
 
 import importlib
@@ -69,8 +69,8 @@ if TYPE_CHECKING:
     from deadtime.systems import DelaySystem, TransferFunction, feedback
     from deadtime.tuning import design, design_filter
 
-#: The names of each room that are here too.
-_ROOMS = {
+#: The names of each package that are here too.
+_PACKAGES = {
     "_base.errors": (
         "CertificateError ContourError ConvergenceError CountMismatchError DeadtimeError "
         "FlightAbortedError LinkError MissingExtraError NotIdentifiableError NotProvedError "
@@ -100,7 +100,7 @@ _ROOMS = {
 #: Version of the installed package.
 __version__: str
 
-_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names.split()}
+_PACKAGE_OF = {name: package for package, names in _PACKAGES.items() for name in names.split()}
 
 __all__ = [
     "PD",
@@ -167,12 +167,12 @@ __all__ = [
 if not TYPE_CHECKING:  # A type checker reads the imports above.
 
     def __getattr__(name: str) -> Any:
-        """Load the room of a name when the name is first used."""
-        if name in _ROOM_OF:
-            value = getattr(importlib.import_module(f"deadtime.{_ROOM_OF[name]}"), name)
+        """Load the package of a name when the name is first used."""
+        if name in _PACKAGE_OF:
+            value = getattr(importlib.import_module(f"deadtime.{_PACKAGE_OF[name]}"), name)
         elif name == "__version__":
             value = importlib.import_module("importlib.metadata").version("deadtime")
-        elif name in _ROOMS and not name.startswith("_"):
+        elif name in _PACKAGES and not name.startswith("_"):
             value = importlib.import_module(f"deadtime.{name}")
         else:
             raise AttributeError(f"module 'deadtime' has no attribute {name!r}")
@@ -180,4 +180,4 @@ if not TYPE_CHECKING:  # A type checker reads the imports above.
         return value
 
     def __dir__() -> list[str]:
-        return [*__all__, *(room for room in _ROOMS if not room.startswith("_"))]
+        return [*__all__, *(package for package in _PACKAGES if not package.startswith("_"))]

@@ -3,7 +3,7 @@
     python tests/house/mutation_survey.py --mutants 200 --seed 1
 
 Each mutant is one change in one line of the numerics or of the safety rules, drawn at random. It is
-written into a copy of the package and of the tests, and the tests of its room are run until the
+written into a copy of the package and of the tests, and the tests of its package are run until the
 first failure; a mutant that none fails, or that only the clock ends, is listed. Each one listed
 either changes nothing (say why in the review) or asks for a test. Not a part of .ci/run: 200
 mutants take an hour or two. The native module has to be in the tree, where `maturin develop`
@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path("python/deadtime")
 
 #: What is mutated, and the folder of its tests.
-ROOMS = {
+MUTATED = {
     "special": "special",
     "dde": "dde",
     "roots": "roots",
@@ -56,7 +56,7 @@ BROKEN = 99
 #: Imported once for all runs.
 LIBRARIES = ("mpmath", "numpy", "scipy.linalg", "scipy.optimize", "scipy.signal")
 
-#: Files of these rooms that compute nothing.
+#: Files of these that compute nothing.
 LEFT_OUT = re.compile(r"__init__|plots|_repr|_low_level")
 
 COMPARISONS = {
@@ -187,16 +187,16 @@ class Mutants(ast.NodeVisitor):
 
 
 def files() -> Iterator[Path]:
-    for room in ROOMS:
-        place = ROOT / PACKAGE / room
+    for part in MUTATED:
+        place = ROOT / PACKAGE / part
         found = [place] if place.is_file() else sorted(place.rglob("*.py"))
         yield from (path.relative_to(ROOT) for path in found if not LEFT_OUT.search(str(path.name)))
 
 
 def tests_of(path: Path) -> list[str]:
-    """The files of tests for a module: those that import it, then its room's by size."""
+    """The files of tests for a module: those that import it, then its package's by size."""
     inside = str(path.relative_to(PACKAGE))
-    folder = next(tests for room, tests in ROOMS.items() if inside.startswith(room))
+    folder = next(tests for part, tests in MUTATED.items() if inside.startswith(part))
     module = ".".join(path.with_suffix("").parts[1:])
     naming, others = [], []
     for test in sorted(
@@ -254,7 +254,7 @@ def main() -> None:
     parser.add_argument("--mutants", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=int, default=200, help="processor time for one mutant")
-    parser.add_argument("--only", metavar="ROOM", help="only files that begin so, as links/safety")
+    parser.add_argument("--only", metavar="PART", help="only files that begin so, as links/safety")
     parser.add_argument("--at", metavar="FILE:LINE", help="all mutants of one line instead")
     given = parser.parse_args()
     for library in LIBRARIES:

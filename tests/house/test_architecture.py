@@ -1,4 +1,4 @@
-"""Data flows one way: an import from a later room fails."""
+"""Data flows one way: an import from a later package fails."""
 
 import ast
 from pathlib import Path
@@ -9,9 +9,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "deadtime"
 
-# Rooms of the Python package, in order: a file imports from its own room and from those above it in
-# this list. This includes late imports and imports for types.
-ROOMS = [
+# The packages inside of `deadtime`, in order: a file imports from its own package and from those
+# above it in this list. This includes late imports and imports for types.
+PACKAGES = [
     "_base",
     "special",
     "dde",
@@ -33,7 +33,7 @@ ROOMS = [
     "_cli",
 ]
 
-#: Imports for types from a later room, with the reason.
+#: Imports for types from a later package, with the reason.
 BACKWARDS = {
     # The annotation of a quotient of two quasi-polynomials is a transfer function.
     ("roots._quasipolynomial", "systems"),
@@ -41,7 +41,7 @@ BACKWARDS = {
 
 
 def modules():
-    """Dotted name within the package, and path, of every file of a room."""
+    """Dotted name within `deadtime`, and path, of every file of a package."""
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = path.relative_to(PACKAGE).with_suffix("").parts
         if len(parts) > 1:
@@ -55,7 +55,7 @@ def imports(path):
     """What a file imports from the package, wherever in the file: (module, name)."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path.name}: import by the full name of the room"
+            assert node.level == 0, f"{path.name}: import by the full name of the package"
             first, _, rest = (node.module or "").partition(".")
             if first == "deadtime":
                 yield from ((rest, alias.name) for alias in node.names)
@@ -66,35 +66,37 @@ def imports(path):
                     yield rest, ""
 
 
-def room(module):
+def package(module):
     return module.split(".")[0]
 
 
-def test_the_package_has_the_rooms_of_the_list():
-    assert {room(name) for name in NAMES} == set(ROOMS)
+def test_the_packages_are_those_of_the_list():
+    assert {package(name) for name in NAMES} == set(PACKAGES)
 
 
 def test_no_import_runs_back():
     for name, path in modules():
-        allowed = ROOMS[: ROOMS.index(room(name)) + 1]
+        allowed = PACKAGES[: PACKAGES.index(package(name)) + 1]
         for module, imported in imports(path):
             if module == "":
                 # The reproduction of the paper uses the package as its users do.
-                assert imported == "_deadtime" or room(name) == "paper", f"{name}: {imported}"
-            elif module != "_deadtime" and (name, room(module)) not in BACKWARDS:
-                assert room(module) in allowed, f"{name} imports {module}"
+                assert imported == "_deadtime" or package(name) == "paper", f"{name}: {imported}"
+            elif module != "_deadtime" and (name, package(module)) not in BACKWARDS:
+                assert package(module) in allowed, f"{name} imports {module}"
 
 
-def test_a_room_does_not_import_from_its_own_init():
+def test_a_package_does_not_import_from_its_own_init():
     for name, path in modules():
         for module, _ in imports(path):
-            assert module != room(name) or module in ("paper", "_cli"), f"{name} imports {module}"
+            assert module != package(name) or module in ("paper", "_cli"), (
+                f"{name} imports {module}"
+            )
 
 
 def files_used(name, path):
-    """The files of its own room that a file imports."""
+    """The files of its own package that a file imports."""
     for module, imported in imports(path):
-        if room(module) != room(name) or module.endswith("_plots"):
+        if package(module) != package(name) or module.endswith("_plots"):
             continue  # A result imports its drawing functions late, and these import the result.
         for target in (f"{module}.{imported}", module, f"{module}.__init__"):
             if target in NAMES and target != name:
@@ -102,9 +104,9 @@ def files_used(name, path):
                 break
 
 
-@pytest.mark.parametrize("which", ROOMS)
-def test_no_files_of_a_room_import_in_a_circle(which):
-    arrows = {n: set(files_used(n, p)) for n, p in modules() if room(n) == which}
+@pytest.mark.parametrize("which", PACKAGES)
+def test_no_files_of_a_package_import_in_a_circle(which):
+    arrows = {n: set(files_used(n, p)) for n, p in modules() if package(n) == which}
     while arrows:
         last = [name for name, used in arrows.items() if not used]
         assert last, f"in a circle, or below one: {sorted(arrows)}"
@@ -118,28 +120,28 @@ def is_native(module, imported):
     return module == "_deadtime" or (module == "" and imported == "_deadtime")
 
 
-def test_each_room_imports_the_native_module_in_one_file():
+def test_each_package_imports_the_native_module_in_one_file():
     for name, path in modules():
-        if name != f"{room(name)}._native":
+        if name != f"{package(name)}._native":
             for module, imported in imports(path):
                 assert not is_native(module, imported), f"{name} imports _deadtime"
 
 
-def test_no_import_reaches_into_a_private_file_of_another_room():
+def test_no_import_reaches_into_a_private_file_of_another_package():
     for name, path in modules():
         for module, imported in imports(path):
-            if module and room(module) not in (room(name), "_base", "_deadtime"):
+            if module and package(module) not in (package(name), "_base", "_deadtime"):
                 inside = [*module.split(".")[1:], imported]
                 assert not any(part.startswith("_") for part in inside), f"{name}: {module}"
 
 
-def test_public_names_are_those_of_the_rooms():
+def test_public_names_are_those_of_the_packages():
     tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
     shown = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("deadtime."):
             shown |= {alias.name: node.module.removeprefix("deadtime.") for alias in node.names}
-    assert shown == deadtime._ROOM_OF
+    assert shown == deadtime._PACKAGE_OF
     assert sorted(shown) == sorted(deadtime.__all__)
     for name in deadtime.__all__:
         assert getattr(deadtime, name) is not None

@@ -11,7 +11,7 @@ CORE = ROOT / "rust" / "core" / "src"
 WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 
-# What each room of the core may use besides itself; every room may use the foundation.
+# What each package of the core may use besides itself; every package may use the foundation.
 FOUNDATION = {"error", "memory", "simd", "status", "task"}
 CORE_ARROWS = {
     "lambertw": set(),
@@ -26,7 +26,7 @@ CORE_ARROWS = {
     "estimation": {"dde"},
 }
 
-# Files and folders of a room in order: each uses only those before it.
+# Files and folders of a package in order: each uses only those before it.
 ORDER = {
     "roots": ["region", "disc", "root_set", "chains", "counting", "locating", "matrix"],
     "stability": [
@@ -93,7 +93,7 @@ def rust_sources(folder):
     return sorted(folder.rglob("*.rs"))
 
 
-def room_of(path):
+def package_of(path):
     return path.relative_to(CORE).parts[0].removesuffix(".rs")
 
 
@@ -204,18 +204,18 @@ def test_paths_of_use_trees_are_read():
     assert circle({("a", "b"), ("b", "c"), ("a", "c")}) == []
 
 
-def test_the_core_has_the_rooms_the_table_names():
-    rooms = {room_of(path) for path in rust_sources(CORE)} - {"lib"}
-    assert rooms == set(CORE_ARROWS) | FOUNDATION
+def test_the_core_has_the_packages_the_table_names():
+    packages = {package_of(path) for path in rust_sources(CORE)} - {"lib"}
+    assert packages == set(CORE_ARROWS) | FOUNDATION
 
 
-@pytest.mark.parametrize("room", sorted(CORE_ARROWS))
-def test_a_room_of_the_core_uses_only_what_stands_before_it(room):
-    allowed = CORE_ARROWS[room] | FOUNDATION | {room}
+@pytest.mark.parametrize("package", sorted(CORE_ARROWS))
+def test_a_package_of_the_core_uses_only_what_stands_before_it(package):
+    allowed = CORE_ARROWS[package] | FOUNDATION | {package}
     for module, used in USES.items():
-        if module[0] == room:
-            rooms = {target[0] for target in used}
-            assert rooms <= allowed, f"{'::'.join(module)} uses {rooms - allowed}"
+        if module[0] == package:
+            packages = {target[0] for target in used}
+            assert packages <= allowed, f"{'::'.join(module)} uses {packages - allowed}"
 
 
 def test_the_foundation_of_the_core_stands_alone():
@@ -232,12 +232,12 @@ def test_no_circle_among_the_files_and_folders_of_a_folder(folder):
     assert not names, "\n".join(examples)
 
 
-@pytest.mark.parametrize("room", sorted(ORDER))
-def test_files_and_folders_of_a_room_use_only_those_before_them(room):
-    order = ORDER[room]
-    inside = {module[1] for module in MODULES if module[:1] == (room,) and len(module) > 1}
+@pytest.mark.parametrize("package", sorted(ORDER))
+def test_files_and_folders_of_a_package_use_only_those_before_them(package):
+    order = ORDER[package]
+    inside = {module[1] for module in MODULES if module[:1] == (package,) and len(module) > 1}
     assert inside - {"tests"} == set(order)
-    for (user, used), example in arrows((room,)).items():
+    for (user, used), example in arrows((package,)).items():
         assert order.index(used) < order.index(user), example
 
 

@@ -81,9 +81,9 @@ DRAWN = {
 
 
 def drawing_methods():
-    """Every drawing method of the public types of all rooms."""
-    rooms = (getattr(dtm, room) for room in dtm._ROOMS if room != "_base.errors")
-    for kind in (getattr(room, name) for room in rooms for name in room.__all__):
+    """Every drawing method of the public types of all packages."""
+    packages = (getattr(dtm, package) for package in dtm._PACKAGES if package != "_base.errors")
+    for kind in (getattr(package, name) for package in packages for name in package.__all__):
         if isinstance(kind, type):
             for name in ("plot", "bode", "nyquist"):
                 if callable(getattr(kind, name, None)):

@@ -157,18 +157,18 @@ def bound_fields():
     }
 
 
-#: The rooms whose results are checked; the later ones run loops and return what these define.
-ROOMS = (
+#: The packages whose results are checked; the later ones run loops and return what these define.
+PACKAGES = (
     "special", "dde", "roots", "systems", "loops", "stability", "recordings", "experiments",
     "estimation", "tuning",
 )  # fmt: skip
 
 
 def public_types():
-    """Every type of these rooms but errors, numbers and the options of estimation methods."""
+    """Every type of these packages but errors, numbers and the options of estimation methods."""
     others = (BaseException, int, dtm.estimation.Method)
-    for room in (getattr(dtm, name) for name in ROOMS):
-        for kind in (getattr(room, name) for name in room.__all__):
+    for package in (getattr(dtm, name) for name in PACKAGES):
+        for kind in (getattr(package, name) for name in package.__all__):
             if isinstance(kind, type) and not issubclass(kind, others):
                 yield kind
 

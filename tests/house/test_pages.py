@@ -39,24 +39,26 @@ def test_the_python_of_a_page_runs(page):
     assert not told, "".join(told)
 
 
-ROOMS = sorted(room for room in dtm._ROOMS if room != "_base.errors")
+PACKAGES = sorted(package for package in dtm._PACKAGES if package != "_base.errors")
 
 
-def test_the_reference_has_a_page_for_each_room():
+def test_the_reference_has_a_page_for_each_package():
     pages = {path.stem for path in (DOCS / "reference").glob("*.md")}
-    assert pages == {*ROOMS, "index", "errors", "json"}
+    assert pages == {*PACKAGES, "index", "errors", "json"}
     index = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
-    for room in ROOMS:
-        page = (DOCS / "reference" / f"{room}.md").read_text(encoding="utf-8")
-        assert f"automodule:: deadtime.{room}\n" in page
-        assert "`_" not in getattr(dtm, room).__doc__, f"{room} shows the name of a private file"
-        (row,) = re.findall(rf"^\| \[`{room}`\].*$", index, re.MULTILINE)
-        assert re.findall(r"`(\w+)`", row.split("|")[3]) == dtm._ROOMS[room].split()
+    for package in PACKAGES:
+        page = (DOCS / "reference" / f"{package}.md").read_text(encoding="utf-8")
+        assert f"automodule:: deadtime.{package}\n" in page
+        assert "`_" not in getattr(dtm, package).__doc__, (
+            f"{package} shows the name of a private file"
+        )
+        (row,) = re.findall(rf"^\| \[`{package}`\].*$", index, re.MULTILINE)
+        assert re.findall(r"`(\w+)`", row.split("|")[3]) == dtm._PACKAGES[package].split()
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_every_public_name_and_method_of_a_room_is_described(room):
-    module = getattr(dtm, room)
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_and_method_of_a_package_is_described(package):
+    module = getattr(dtm, package)
     for name in module.__all__:
         thing = getattr(module, name)
         if inspect.isclass(thing):

@@ -1,4 +1,4 @@
-"""Progress is True for a bar, or a function of the number of items done, in every room."""
+"""Progress is True for a bar, or a function of the number of items done, in every package."""
 
 import sys
 

@@ -33,7 +33,7 @@ def test_the_package_alone_loads_nothing_else():
 def test_nothing_slow_is_loaded_before_it_is_used(name):
     names = loaded(f"from deadtime import {name}")
     assert not [one for one in names if f"{one}.".startswith(SLOW)]
-    # Rooms and native module, a few of the standard library: numpy alone loads more.
+    # Packages and native module, a few of the standard library: numpy alone loads more.
     own = [one for one in names if one.startswith("deadtime")]
     assert len(own) < 120
     assert len(names) - len(own) < len(loaded("import numpy")) + 60

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from deadtime._base.errors import LinkError, PacketError
 from deadtime._deadtime import navdata_layouts
-from deadtime.links.ardrone2 import navdata as room
+from deadtime.links.ardrone2 import navdata as reader
 from deadtime.links.ardrone2.navdata import (
     DEMO_OPTIONS,
     FULL_OPTIONS,
@@ -45,12 +45,12 @@ def checked(packet):
 def test_the_classes_have_the_fields_of_the_native_tables():
     for layout in navdata_layouts():
         tag, names = layout.tag, layout.fields
-        name, kind = room._FIELDS[tag]
+        name, kind = reader._FIELDS[tag]
         if name == "clock":
             assert names == ["time"]
         else:
             assert [field.name for field in fields(kind)] == names, name
-    assert len(room._FIELDS) == len(navdata_layouts())
+    assert len(reader._FIELDS) == len(navdata_layouts())
 
 
 def test_real_packets_are_decoded_and_encoded_unchanged():

@@ -347,10 +347,10 @@ def test_certificates_do_not_change():
 
 
 def test_the_checker_uses_neither_the_prover_nor_floating_point_functions():
-    room = Path(deadtime.__file__).parent / "roots" / "certificate"
+    folder = Path(deadtime.__file__).parent / "roots" / "certificate"
     names = ["_certificate", "_check", "_enclosures", "_form", "_function", "_parts", "_stored"]
     for name in names:
-        tree = ast.parse((room / f"{name}.py").read_text(encoding="utf-8"))
+        tree = ast.parse((folder / f"{name}.py").read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):
                 module = node.module or ""

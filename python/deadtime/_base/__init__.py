@@ -1,1 +1,1 @@
-"""What every room uses: errors, arguments, frozen results, processes, progress, drawing, pages."""
+"""What all packages use: errors, arguments, frozen results, processes, progress, drawing, pages."""

@@ -52,7 +52,7 @@ class Reproduction:
     Attributes
     ----------
     parts : mapping of str to object
-        Results of the functions of this room, by their names.
+        Results of the functions of this package, by their names.
     """
 
     parts: Mapping[str, Part]

@@ -1,4 +1,4 @@
-//! What the tests of this room compare with: dense matrices, closed forms, deterministic noise.
+//! What the tests of this module compare with: dense matrices, closed forms, deterministic noise.
 
 use super::path::{Held, respond};
 use super::plant::Plant;
