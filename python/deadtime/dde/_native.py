@@ -1,13 +1,7 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
-    DelayPieces,
-    DelayRun,
-    solve_dde,
+    DelayPieces as DelayPieces,
+    DelayRun as DelayRun,
+    solve_dde as solve_dde,
 )
-
-__all__ = [
-    "DelayPieces",
-    "DelayRun",
-    "solve_dde",
-]

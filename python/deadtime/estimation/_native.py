@@ -1,19 +1,10 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
-    FlightLikelihood,
-    OnlineBank,
-    PlantNumbers,
-    RowLikelihood,
-    RowNoise,
-    whitened_columns,
+    FlightLikelihood as FlightLikelihood,
+    OnlineBank as OnlineBank,
+    PlantNumbers as PlantNumbers,
+    RowLikelihood as RowLikelihood,
+    RowNoise as RowNoise,
+    whitened_columns as whitened_columns,
 )
-
-__all__ = [
-    "FlightLikelihood",
-    "OnlineBank",
-    "PlantNumbers",
-    "RowLikelihood",
-    "RowNoise",
-    "whitened_columns",
-]

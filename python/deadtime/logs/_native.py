@@ -1,11 +1,6 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
-    BlackboxFrames,
-    blackbox_frames,
+    BlackboxFrames as BlackboxFrames,
+    blackbox_frames as blackbox_frames,
 )
-
-__all__ = [
-    "BlackboxFrames",
-    "blackbox_frames",
-]

@@ -1,9 +1,5 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
-    csv_columns,
+    csv_columns as csv_columns,
 )
-
-__all__ = [
-    "csv_columns",
-]

@@ -1,29 +1,15 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
-    Certificate,
-    CharacteristicMatrix,
-    Family,
-    Monotone,
-    QuasiPolynomial,
-    RootSet,
-    Segment,
-    crossings,
-    dde_root_number,
-    dde_roots,
-    delay_margin,
+    Certificate as Certificate,
+    CharacteristicMatrix as CharacteristicMatrix,
+    Family as Family,
+    Monotone as Monotone,
+    QuasiPolynomial as QuasiPolynomial,
+    RootSet as RootSet,
+    Segment as Segment,
+    crossings as crossings,
+    dde_root_number as dde_root_number,
+    dde_roots as dde_roots,
+    delay_margin as delay_margin,
 )
-
-__all__ = [
-    "Certificate",
-    "CharacteristicMatrix",
-    "Family",
-    "Monotone",
-    "QuasiPolynomial",
-    "RootSet",
-    "Segment",
-    "crossings",
-    "dde_root_number",
-    "dde_roots",
-    "delay_margin",
-]

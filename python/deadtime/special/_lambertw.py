@@ -268,7 +268,7 @@ def low_level_callable(
     """
     import scipy
 
-    if name not in native.module.__pyx_capi__:
-        names = ", ".join(sorted(native.module.__pyx_capi__))
+    if name not in native._deadtime.__pyx_capi__:
+        names = ", ".join(sorted(native._deadtime.__pyx_capi__))
         raise ValueError(f"name={name!r}: give one of {names}")
-    return scipy.LowLevelCallable.from_cython(native.module, name)
+    return scipy.LowLevelCallable.from_cython(native._deadtime, name)

@@ -1,17 +1,9 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
-    MapBoundary,
-    largest_stable_box,
-    proved_boxes,
-    robust_map,
-    stability_radius,
+    MapBoundary as MapBoundary,
+    largest_stable_box as largest_stable_box,
+    proved_boxes as proved_boxes,
+    robust_map as robust_map,
+    stability_radius as stability_radius,
 )
-
-__all__ = [
-    "MapBoundary",
-    "largest_stable_box",
-    "proved_boxes",
-    "robust_map",
-    "stability_radius",
-]
