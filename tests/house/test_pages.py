@@ -8,6 +8,7 @@ from pathlib import Path
 
 import deadtime as dtm
 import pytest
+from printed_results import failures
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -23,6 +24,7 @@ PAGES = [
     "guide/internet-loop.md",
     "guide/large-maps.md",
     "guide/planning-an-experiment.md",
+    "guide/sweeps-and-sensitivities.md",
     "guide/what-a-ground-log-cannot-tell.md",
 ]
 
@@ -30,13 +32,10 @@ PAGES = [
 @pytest.mark.parametrize("page", PAGES)
 def test_the_python_of_a_page_runs(page):
     text = (DOCS / page).read_text(encoding="utf-8")
-    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, page, page, 0)
-    told = []
-    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
-    runner.run(examples, out=told.append)
-    assert runner.summarize(verbose=False).attempted > 3
-    assert not told, "".join(told)
+    blocks = re.findall(r"```(?:python|pycon)\n(.*?)```", text, re.DOTALL)
+    shown = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, page, page, 0)
+    assert len(shown.examples) > 3
+    assert not (found := failures(shown)), found
 
 
 PACKAGES = sorted(package for package in dtm._PACKAGES if package != "_base.errors")

@@ -1,11 +1,8 @@
 """Sweeps against one simulation per set, and the status, shapes and bits of their results."""
 
-import doctest
 import os
-import re
 import subprocess
 import sys
-from pathlib import Path
 
 import deadtime as dtm
 import numpy as np
@@ -422,17 +419,6 @@ def test_a_sweep_without_a_delay_is_refused():
         dtm.sweep(DRONE, [1.0], 5.0)
     with pytest.raises(ValueError, match="output times"):
         dtm.sweep(DRONE, {"Kp": [1.0]}, 5.0, responses=True)
-
-
-def test_the_page_of_the_manual_runs():
-    page = Path(__file__).resolve().parents[2] / "docs" / "guide/sweeps-and-sensitivities.md"
-    blocks = re.findall(r"```pycon\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 5
-    examples = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "page", None, 0)
-    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
-    told = []
-    runner.run(examples, out=told.append)
-    assert runner.failures == 0, "".join(told)
 
 
 def test_without_a_time_sets_are_measured_until_they_settle():
