@@ -2,18 +2,18 @@
 
     python tests/house/mutation_survey.py --mutants 200 --seed 1
 
-Each mutant is one change in one line of the numerics or of the safety rules, drawn at random. It is
-written into a copy of the package and of the tests, and the tests of its package are run until the
-first failure; a mutant that none fails, or that only the clock ends, is listed. Each one listed
-either changes nothing (say why in the review) or asks for a test. Not a part of .ci/run: 200
-mutants take an hour or two. The native module has to be in the tree, where `maturin develop`
-puts it.
+Each mutant is one change in one line, drawn at random. It is written into a copy of the package and
+of the tests, and the tests of its package are run until the first failure; a mutant that none
+fails, or that only a limit on time ends, is listed. Each one listed either changes nothing (say why
+in the review) or asks for a test. Not a part of .ci/run: 200 mutants take an hour or two. The
+native module has to be in the tree, where `maturin develop` puts it.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import importlib
 import os
 import random
@@ -34,30 +34,26 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path("python/deadtime")
 
-#: What is mutated, and the folder of its tests.
-MUTATED = {
-    "special": "special",
-    "dde": "dde",
-    "roots": "roots",
-    "systems": "systems",
-    "loops": "loops",
-    "stability": "stability",
-    "experiments": "experiments",
-    "estimation": "estimation",
-    "tuning": "tuning",
-    "links/safety.py": "links",
-    "links/ardrone2/reader.py": "links",
-    "links/ardrone2/sender.py": "links",
-    "links/ardrone2/limit_settings.py": "links",
-    "links/udp/judgement.py": "links",
-}
+#: What is mutated. The tests of each are in the folder of `tests` named after the first word.
+PLACES = (
+    "special", "dde", "roots", "systems", "loops", "stability", "recordings", "experiments",
+    "estimation", "tuning", "logs", "flights",
+    "links/safety.py", "links/mavlink", "links/ardrone2/reader.py", "links/ardrone2/sender.py",
+    "links/ardrone2/limit_settings.py", "links/udp/judgement.py",
+)  # fmt: skip
 #: Exit code of a run that did not come to its tests.
 BROKEN = 99
+#: The test that runs the examples of a module.
+EXAMPLES = "tests/house/test_doctests.py::test_examples_of_the_docstrings_of_a_module"
 #: Imported once for all runs.
 LIBRARIES = ("mpmath", "numpy", "scipy.linalg", "scipy.optimize", "scipy.signal")
 
-#: Files of these that compute nothing.
-LEFT_OUT = re.compile(r"__init__|plots|_repr|_low_level")
+#: Files that compute nothing.
+LEFT_OUT = re.compile(r"__init__|plots|_page|_repr|_low_level")
+#: Signals that end a run for its time; any other ends it for what the mutant did.
+LIMITS = (signal.SIGXCPU, signal.SIGKILL, signal.SIGALRM)
+#: Largest memory of a run, bytes.
+MEMORY = 4 * 2**30
 
 COMPARISONS = {
     ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
@@ -175,9 +171,12 @@ class Mutants(ast.NodeVisitor):
         if node.value is not None:
             self.visit(node.value)
 
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+    def visit_FunctionDef(self, node: ast.FunctionDef | ast.AsyncFunctionDef) -> None:
         for part in (*node.args.defaults, *filter(None, node.args.kw_defaults), *node.body):
             self.visit(part)
+
+    def visit_AsyncFunctionDef(self, node: ast.AsyncFunctionDef) -> None:
+        self.visit_FunctionDef(node)
 
     def visit_Raise(self, node: ast.Raise) -> None:
         """Words of an error are not looked at."""
@@ -187,25 +186,26 @@ class Mutants(ast.NodeVisitor):
 
 
 def files() -> Iterator[Path]:
-    for part in MUTATED:
-        place = ROOT / PACKAGE / part
+    for name in PLACES:
+        place = ROOT / PACKAGE / name
         found = [place] if place.is_file() else sorted(place.rglob("*.py"))
-        yield from (path.relative_to(ROOT) for path in found if not LEFT_OUT.search(str(path.name)))
+        yield from (path.relative_to(ROOT) for path in found if not LEFT_OUT.search(path.name))
 
 
 def tests_of(path: Path) -> list[str]:
-    """The files of tests for a module: those that import it, then its package's by size."""
-    inside = str(path.relative_to(PACKAGE))
-    folder = next(tests for part, tests in MUTATED.items() if inside.startswith(part))
-    module = ".".join(path.with_suffix("").parts[1:])
-    naming, others = [], []
-    for test in sorted(
-        (ROOT / "tests" / folder).glob("test_*.py"), key=lambda test: test.stat().st_size
-    ):
-        names_it = re.search(rf"\b{re.escape(module)}\b", test.read_text(encoding="utf-8"))
-        (naming if names_it else others).append(test)
-    # Doctests last: they import the module a second time, and its classes are then other ones.
-    return [*(str(test.relative_to(ROOT)) for test in (*naming, *others)), str(path)]
+    """The tests for a module: those that name it or its folder first, the small ones first."""
+    module = path.with_suffix("").parts[1:]
+    words = set(re.findall("[a-z0-9]+", " ".join(module[2:])))
+
+    def rank(test: Path) -> tuple[int, int, int]:
+        text = test.read_text(encoding="utf-8")
+        depths = range(len(module), 2, -1)
+        named = (n for n in depths if re.search(rf"\b{re.escape('.'.join(module[:n]))}\b", text))
+        return -next(named, 0), -len(words & set(test.stem.split("_"))), len(text)
+
+    tests = sorted((ROOT / "tests" / module[1]).rglob("test_*.py"), key=rank)
+    examples = [f"{EXAMPLES}[{'.'.join(module)}]"] if ">>> " in (ROOT / path).read_text() else []
+    return [*(str(test.relative_to(ROOT)) for test in tests), *examples]
 
 
 def copied(to: Path) -> None:
@@ -219,19 +219,23 @@ def verdict(tree: Path, tests: list[str], seconds: int) -> tuple[str, str]:
 
     They run in a fork of this process, which has imported the libraries and not the package.
     """
-    told = tree.parent / "told.txt"
+    output = tree.parent / "output.txt"
     sys.stdout.flush()
     child = os.fork()
     if child == 0:
         code = BROKEN
         try:
+            os.setsid()  # so that the processes of its tests can be ended with it
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-            signal.alarm(10 * seconds)  # ends a test that waits for ever
+            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+            signal.alarm(5 * seconds)  # ends a test that waits for ever
             os.chdir(tree)
-            # The package of the copy, not the one that is installed.
+            # The package of the copy, not the one that is installed, compiled once.
             os.environ["PYTHONPATH"] = str(tree / "python")
+            os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+            sys.dont_write_bytecode = False
             sys.path.insert(0, str(tree / "python"))
-            stream = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            stream = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
             os.dup2(stream, 1)
             os.dup2(stream, 2)
             code = int(pytest.main(["-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]))
@@ -241,11 +245,14 @@ def verdict(tree: Path, tests: list[str], seconds: int) -> tuple[str, str]:
         finally:
             os._exit(code)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if code < 0:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    if -code in LIMITS:
         return "out of time", ""
-    if code == BROKEN:
-        sys.exit(told.read_text(encoding="utf-8"))
-    by = re.search(r"^(?:FAILED|ERROR) ([^\s[]+)", told.read_text(encoding="utf-8"), re.MULTILINE)
+    text = output.read_text(encoding="utf-8", errors="replace")
+    if code == BROKEN or code == pytest.ExitCode.USAGE_ERROR:
+        sys.exit(text)
+    by = re.search(r"^(?:FAILED|ERROR) ([^\s[]+)", text, re.MULTILINE)
     return ("survived", "") if code == 0 else ("killed", by[1] if by else "")
 
 
@@ -254,7 +261,7 @@ def main() -> None:
     parser.add_argument("--mutants", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=int, default=200, help="processor time for one mutant")
-    parser.add_argument("--only", metavar="PART", help="only files that begin so, as links/safety")
+    parser.add_argument("--only", metavar="PLACE", help="only files that begin so, as links/safety")
     parser.add_argument("--at", metavar="FILE:LINE", help="all mutants of one line instead")
     given = parser.parse_args()
     for library in LIBRARIES:
@@ -267,7 +274,7 @@ def main() -> None:
         every = [one for one in every if str(one.path).startswith(f"{PACKAGE}/{given.only or ''}")]
         chosen = random.Random(given.seed).sample(every, min(given.mutants, len(every)))
     print(f"{len(chosen)} of {len(every)} mutants", flush=True)
-    told: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     sound: set[str] = set()
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
@@ -276,20 +283,22 @@ def main() -> None:
             file = tree / mutant.path
             source = file.read_bytes()
             file.write_bytes(mutant.apply(source))
+            # Compiled code is found by the size of its source and the second it was written in.
+            os.utime(file, (number, number))
             found, by = verdict(tree, tests_of(mutant.path), given.seconds)
             file.write_bytes(source)
-            if found == "killed" and by not in sound:
+            if by and by not in sound:
                 # A test that fails anyway would kill every mutant.
                 if verdict(tree, [by], given.seconds)[0] == "killed":
                     sys.exit(f"{by} fails without any change: mend it first")
                 sound.add(by)
-            told[found] += 1
+            counts[found] += 1
             print(f"{number:4} {found:<11} {mutant.path}:{mutant.line}  {mutant.kind}  {by}")
             if found != "killed":
                 print(f"      {mutant.shown(source)}")
             sys.stdout.flush()
-    decided = told["killed"] + told["survived"]
-    print(f"{told['killed']} of {decided} killed, {told['out of time']} out of time")
+    decided = counts["killed"] + counts["survived"]
+    print(f"{counts['killed']} of {decided} killed, {counts['out of time']} out of time")
 
 
 if __name__ == "__main__":
