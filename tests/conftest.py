@@ -1,6 +1,5 @@
 """Settings of the property-based tests, and what several test files share."""
 
-import os
 import signal
 
 import pytest
@@ -11,11 +10,6 @@ from hypothesis import settings
 settings.register_profile("default", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("default")
-
-
-def pytest_xdist_auto_num_workers() -> int:
-    """One process more than processors: some tests wait for a flight or a network."""
-    return (os.cpu_count() or 1) + 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
