@@ -264,6 +264,7 @@ def main() -> None:
     parser.add_argument("--only", metavar="PLACE", help="only files that begin so, as links/safety")
     parser.add_argument("--at", metavar="FILE:LINE", help="all mutants of one line instead")
     given = parser.parse_args()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as tests/conftest.py, which comes later
     for library in LIBRARIES:
         importlib.import_module(library)
     every = [one for path in files() for one in Mutants(path, (ROOT / path).read_bytes()).found]
