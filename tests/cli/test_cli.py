@@ -84,10 +84,11 @@ def test_the_report_in_a_browser(demo):
     check_page(demo[0] / "demo" / "report.html")
 
 
-def test_a_narrow_terminal_leaves_out_no_digits(demo):
+def test_a_narrow_terminal_leaves_out_no_digits(demo, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
     folder, _ = demo
     file = folder / "demo" / "flight.csv"
-    narrow = process("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN, COLUMNS="40").stdout
+    narrow = run("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN).stdout
     assert "…" not in narrow
     assert "waveform with lag" in narrow
 
@@ -99,20 +100,12 @@ def test_the_three_commands_that_the_demo_ends_with_run(demo):
     for line in lines:
         result = run(*line[1:], cwd=folder)
         assert result.returncode == 0, result.stderr
-    assert (folder / "demo" / "again.html").exists()
-
-
-def test_the_demo_recovers_the_truth(tmp_path):
-    out = found("demo", "--seed", 3, cwd=tmp_path)
-    truth, fit = out["truth"], out["estimates"]["waveform with lag"]
-    assert fit["delay_plus_lag"] == pytest.approx(truth["delay+lag"], abs=0.02)
-    assert fit["gain"] == pytest.approx(truth["gain"], abs=0.05)
+    assert "<svg" in (folder / "demo" / "again.html").read_text(encoding="utf-8")
 
 
 def test_a_real_flight_by_both_methods():
     file = flight_path("ardrone2_height_step_2_4_0_25.csv")
-    arguments = ["estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN]
-    out = found(*arguments)
+    out = found("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN)
     assert out["estimates"]["dominant"]["delay"] == pytest.approx(0.339, abs=0.01)
     fit = out["estimates"]["waveform"]
     assert 0.42 <= fit["delay"] <= 0.44
@@ -120,10 +113,10 @@ def test_a_real_flight_by_both_methods():
     assert fit["adequate"] is False
     low, high = fit["interval_95"]["delay"]
     assert high - low > 0.04  # the robust one; the naive one is 0.014 wide
-    printed = run(*arguments).stdout
-    assert "differ" in printed
-    assert "gain is not 1" in printed
-    assert "the residuals of the fit without lag are coloured" in " ".join(printed.lower().split())
+    said = " ".join(out["explanation"])
+    assert "differ" in said
+    assert "gain is not 1" in said
+    assert "the residuals of the fit without lag are coloured" in said.lower()
 
 
 def test_a_real_flight_without_overshoot():
@@ -185,16 +178,6 @@ def test_a_simulation_and_its_file(tmp_path):
     lines = file.read_text().splitlines()
     assert lines[0] == "time_s,reference,output,command"
     assert len(lines) == 502
-
-
-def test_a_report_of_a_flight(demo, tmp_path):
-    folder, _ = demo
-    out = tmp_path / "pages" / "mine.html"
-    result = run(
-        "report", folder / "demo" / "flight.csv", *COLUMNS, "--kp", 2.4, *FLOWN, "--out", out
-    )
-    assert result.returncode == 0, result.stderr
-    assert "<svg" in out.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("command", ["estimate", "report"])
@@ -288,18 +271,6 @@ def test_without_its_extras_it_says_how_to_get_them():
     assert result.returncode == 1
     assert "pip install 'deadtime[cli]'" in result.stderr
     assert "Traceback" not in result.stderr
-
-
-def test_importing_the_package_needs_no_extra():
-    code = (
-        "import sys; import deadtime; "
-        "extras = {'matplotlib', 'typer', 'rich', 'jinja2'} & set(sys.modules); "
-        "print(extras or 'none')"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
-    )
-    assert result.stdout.strip() == "none"
 
 
 @pytest.mark.parametrize(

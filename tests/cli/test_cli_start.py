@@ -3,33 +3,28 @@
 import importlib
 import importlib.metadata
 import inspect
-import os
 import subprocess
 import sys
 
 import pytest
 import typer
+from command_line import run
 from deadtime._cli.app import COMMANDS
 
-DEADTIME = "import sys\nsys.argv[0] = 'deadtime'\nfrom deadtime._cli import main\nmain()"
-
-
-def run(*arguments, before="", **environment):
-    return subprocess.run(
-        [sys.executable, "-c", before + DEADTIME, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env={**os.environ, "COLUMNS": "160", "NO_COLOR": "1", **environment},
-    )
+LOADED = """
+import atexit, sys
+atexit.register(lambda: print(*sys.modules, file=sys.stderr))
+from deadtime._cli import main
+main()
+"""
 
 
 def loaded(*arguments):
     """Top-level packages, and modules of this one, that a command imports."""
-    ending = "import atexit, sys\natexit.register(lambda: print(*sys.modules, file=sys.stderr))\n"
-    result = run(*arguments, before=ending)
-    assert result.returncode == 0, result.stderr
+    result = subprocess.run(
+        [sys.executable, "-c", LOADED, *arguments],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
     names = result.stderr.split()
     return {name.split(".")[0] for name in names}, {n for n in names if n.startswith("deadtime")}
 
@@ -69,17 +64,23 @@ def test_the_help_shown_without_loading_is_that_of_the_command(name):
     assert text.splitlines()[0] == COMMANDS[name]
 
 
-def test_the_shell_completes_commands_and_options():
+def test_the_shell_completes_commands_and_options(monkeypatch):
+    # The name of the command is not that of the module that runs the tests.
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", None)
+
     def completed(words, place):
-        result = run(_DEADTIME_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=str(place))
-        return result.stdout.split()
+        monkeypatch.setenv("_DEADTIME_COMPLETE", "complete_bash")
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(place))
+        return run().stdout.split()
 
     assert completed("deadtime ro", 1) == ["roots"]
     assert completed("deadtime re", 1) == ["reproduce", "report"]
     assert "--rightmost" in completed("deadtime roots --r", 2)
     # The shell is named here: typer would look for it among the processes above this one.
-    named = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
-    assert "_DEADTIME_COMPLETE" in run("--show-completion", "bash", **named).stdout
+    monkeypatch.delenv("_DEADTIME_COMPLETE")
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    assert "_DEADTIME_COMPLETE" in run("--show-completion", "bash").stdout
 
 
 def test_a_mistyped_command_is_answered_with_the_nearest():

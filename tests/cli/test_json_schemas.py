@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import deadtime as dtm
 import numpy as np
@@ -29,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("json")
     time = 0.065 * np.arange(120)
     reference = np.where(time >= 0.65, 1.0, 0.0)
-    loop = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(2.4), delay=0.3)
+    loop = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(2.4), delay=0.3, sample_time=0.065)
     noise = np.random.default_rng(1).normal(0.0, 0.005, time.size)
     output = loop.simulate(time, reference).outputs + noise
     table = np.column_stack([time, reference, output])
@@ -44,7 +45,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-STEP = ("estimate", "step.csv", "--kp", 2.4)
+LOOP = ("step.csv", "--kp", 2.4, "--sample-time", 0.065)
+STEP = ("estimate", *LOOP)
 
 
 @pytest.mark.parametrize(
@@ -56,9 +58,8 @@ STEP = ("estimate", "step.csv", "--kp", 2.4)
         ("simulate", ("simulate", "--kp", 1, "--delay", 0.3)),
         ("explore", ("explore", "--out", "page.html")),
         ("watch", ("watch", "moved.csv", "--noise", 0.005)),
-        ("report", ("report", "step.csv", "--kp", 2.4, "--out", "report.html")),
-        ("demo", ("demo", "--folder", "demo")),
-        ("estimate", (*STEP, "--method", "auto")),
+        ("report", ("report", *LOOP, "--out", "pages/report.html")),
+        ("estimate", ("estimate", "step.csv", "--kp", 2.4, "--method", "auto")),
         ("comparison", (*STEP, "--method", "all")),
         ("plant-choice", (*STEP, "--plant", "auto/s")),
         ("check", (*STEP, "--check")),
@@ -72,7 +73,18 @@ STEP = ("estimate", "step.csv", "--kp", 2.4)
 def test_the_page_names_what_is_printed(
     folder: Path, schema: str, command: tuple[object, ...]
 ) -> None:
-    printed = found(*command, cwd=folder)
+    check_keys(found(*command, cwd=folder), schema)
+
+
+def test_the_demo_recovers_the_truth(tmp_path: Path) -> None:
+    printed = found("demo", "--folder", "demo", "--seed", 3, cwd=tmp_path)
+    check_keys(printed, "demo")
+    truth, fit = printed["truth"], printed["estimates"]["waveform with lag"]
+    assert fit["delay_plus_lag"] == pytest.approx(truth["delay+lag"], abs=0.02)
+    assert fit["gain"] == pytest.approx(truth["gain"], abs=0.05)
+
+
+def check_keys(printed: dict[str, Any], schema: str) -> None:
     name = printed.pop("schema")
     assert name == f"deadtime.{schema}/1"
     assert set(printed) <= documented()[name]

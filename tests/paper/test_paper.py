@@ -3,10 +3,7 @@
 import ast
 import json
 import math
-import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +11,8 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from browser import check_page
+from command_line import found as run_json
+from command_line import one_clear_line, run
 from deadtime import paper
 from deadtime.estimation import Overshoot
 from deadtime.paper import Comparison, Verdict, agreeing_digits, printed_digits
@@ -422,22 +421,10 @@ def test_only_public_names_are_used():
 # The command
 
 
-def run(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "deadtime", "reproduce", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        cwd=cwd,
-        env={**os.environ, "COLUMNS": "160", "NO_COLOR": "1"},
-    )
-
-
-def test_the_command_prints_and_writes(tmp_path):
-    result = run(
-        "--only", "table2,gap,figure9", "--out", "figures", "--page", "p.html", cwd=tmp_path
-    )
+def test_the_command_prints_and_writes(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    only = ("--only", "table2,gap,figure9")
+    result = run("reproduce", *only, "--out", "figures", "--page", "p.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "2.300" in result.stdout
     assert "+9.91 ms" in result.stdout
@@ -448,16 +435,13 @@ def test_the_command_prints_and_writes(tmp_path):
 
 
 def test_the_command_as_json(tmp_path):
-    result = run("--only", "figure9", "--pictures", "svg", "--json", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)
+    told = run_json("reproduce", "--only", "figure9", "--pictures", "svg", cwd=tmp_path)
     assert [one["verdict"] for one in told["parts"]["figure9"]["comparisons"]] == ["confirmed"] * 2
     assert (tmp_path / told["figures"]["figure9"]).suffix == ".svg"
     assert (tmp_path / told["page"]).exists()
 
 
 def test_the_command_refuses_an_unknown_part(tmp_path):
-    result = run("--only", "figure5", cwd=tmp_path)
-    assert result.returncode == 1
-    assert "figure5: not one of" in result.stderr
-    assert result.stderr.count("\n") == 1
+    said = one_clear_line(run("reproduce", "--only", "figure5", cwd=tmp_path))
+    assert "figure5: not one of" in said
+    assert "\n" not in said
