@@ -18,6 +18,9 @@ from hypothesis import given, strategies as st
 from made_logs import DELAY, GAIN, LAG, flown_copter
 from scipy import signal
 
+#: Length of a log that is only compared, s.
+SECONDS = 6.0
+
 
 def log_of(folder, **options):
     path = folder / "flight.bin"
@@ -27,7 +30,20 @@ def log_of(folder, **options):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    return dtm.latency(log_of(tmp_path_factory.mktemp("log")))
+    return dtm.latency(log_of(tmp_path_factory.mktemp("log"), seconds=12.0))
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory):
+    """Another log of the same vehicle."""
+    return dtm.latency(log_of(tmp_path_factory.mktemp("log"), seconds=SECONDS, seed=6))
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory):
+    """The time from actuator to response of a vehicle with eight times the delay."""
+    log = log_of(tmp_path_factory.mktemp("log"), seconds=SECONDS, delay=8 * DELAY)
+    return dtm.latency(log).loop("roll rate", "actuator")
 
 
 def test_the_vehicle_is_told_from_its_own_log(found):
@@ -42,9 +58,8 @@ def test_the_vehicle_is_told_from_its_own_log(found):
     assert found.headline() == one.headline()
 
 
-def test_axes_share_a_delay(found, tmp_path):
+def test_axes_share_a_delay(found, other):
     # Two axes of one vehicle: two logs of the same loop, with noise of their own.
-    other = dtm.latency(log_of(tmp_path, seed=6))
     both = replace(found, loops=(*found.loops, *other.loops)).shared("rate")
     assert both.adequate
     low, high = both.interval
@@ -58,7 +73,7 @@ def test_axes_share_a_delay(found, tmp_path):
 def test_a_closed_loop_of_second_order_has_a_pair_of_complex_poles(tmp_path):
     # Kp GAIN/(LAG s² + s + Kp GAIN), sampled: damping 0.59. The rate follows a ramp late by
     # 1/(Kp GAIN), and a setpoint that is held by half a period less.
-    log = log_of(tmp_path, delay=0.0, Kp=3.0, seed=5)
+    log = log_of(tmp_path, seconds=SECONDS, delay=0.0, Kp=3.0, seed=5)
     one = dtm.latency(log).loop("roll rate", "setpoint")
     assert one.estimate.adequate
     assert one.estimate.loop.plant.has_pair
@@ -145,9 +160,8 @@ def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_adequate(found):
     assert around_the_vehicle([doubted, found.loop("roll rate")]) is None
 
 
-def test_north_and_east_that_contradict_each_other_are_not_adequate(found, tmp_path):
+def test_north_and_east_that_contradict_each_other_are_not_adequate(found, slow):
     one = found.loop("roll rate", "actuator")
-    slow = dtm.latency(log_of(tmp_path, delay=8 * DELAY)).loop("roll rate", "actuator")
     alike = [replace(one, axis=axis) for axis in ("north", "east")]
     assert all(one.estimate.adequate for one in doubted_by_others(alike))
     apart = [replace(one, axis="north"), replace(slow, axis="east")]
@@ -158,9 +172,8 @@ def test_north_and_east_that_contradict_each_other_are_not_adequate(found, tmp_p
     assert all(one.estimate.adequate for one in doubted_by_others([one, slow]))
 
 
-def test_a_setpoint_that_waits_longer_than_the_actuator_takes_is_not_adequate(found, tmp_path):
+def test_a_setpoint_that_waits_longer_than_the_actuator_takes_is_not_adequate(found, slow):
     one = found.loop("roll rate", "actuator")
-    slow = dtm.latency(log_of(tmp_path, delay=8 * DELAY)).loop("roll rate", "actuator")
     waits = replace(slow, command="setpoint")
     doubtful, actuator = doubted_by_others([waits, one])
     assert "it would wait" in doubtful.estimate.message
@@ -191,14 +204,13 @@ def test_without_excitation_every_loop_is_refused_by_name(tmp_path):
         still.plot()
 
 
-def test_a_longer_delay_is_seen_as_a_real_change(found, tmp_path):
-    later = dtm.latency(log_of(tmp_path, delay=DELAY + 0.010, seed=6))
+def test_a_longer_delay_is_seen_as_a_real_change(found, other, tmp_path):
+    later = dtm.latency(log_of(tmp_path, seconds=SECONDS, delay=DELAY + 0.010, seed=6))
     changes = dtm.logs.compare_latencies(found, later)
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.010 < one.ci[1]
     assert one.verdict.startswith("really longer")
-    again = dtm.latency(log_of(tmp_path, seed=8))
-    changes = dtm.logs.compare_latencies(found, again)
+    changes = dtm.logs.compare_latencies(found, other)
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.0 < one.ci[1]
     assert one.to_dict()["verdict"].startswith("no difference is seen")

@@ -11,8 +11,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from browser import check_page
-from command_line import found as run_json
-from command_line import one_clear_line, run
+from command_line import found as run_json, one_clear_line, run
 from deadtime import paper
 from deadtime.estimation import Overshoot
 from deadtime.paper import Comparison, Verdict, agreeing_digits, printed_digits

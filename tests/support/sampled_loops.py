@@ -381,9 +381,9 @@ LOGGERS: dict[str, tuple[Kind, dict[str, Logger]]] = {
 }
 
 
-def made(kind: str, logger: str, seed: int) -> tuple[Flight, Log]:
-    """A flight and its log, drawn from this seed."""
+def made(kind: str, logger: str, seed: int, part: float = 1.0) -> tuple[Flight, Log]:
+    """A flight and its log, drawn from this seed; or a shorter one, of a part of the time."""
     random = np.random.default_rng([seed, 7])
     sizes, loggers = LOGGERS[kind]
-    flight = fly(sizes, random)
+    flight = fly(replace(sizes, seconds=part * sizes.seconds), random)
     return flight, log_with(flight, *loggers[logger](flight, random))
