@@ -69,6 +69,7 @@ def test_a_delay_that_grows_by_half_of_itself_is_found():
     assert sum(named) >= 9
 
 
+@pytest.mark.survey
 def test_a_delay_that_wanders_is_found_beside_air_that_could_stand_for_it():
     # Of 40 recordings 29 are expected, and of a test that finds one in two 26 or more in 4 %.
     found = p_values(NAMED["delay wanders 30 ms"], 40)
@@ -94,16 +95,16 @@ def test_the_spread_of_a_delay_that_wanders_is_about_that_of_its_commands():
 def test_the_best_test_finds_nothing_where_there_is_no_fault():
     # Its power is then the share of good recordings that it calls faulty.
     ramp = replace(NAMED["delay ramps 100 ms"], delay_ramp=1e-9)
-    assert detection.power(ramp, 4) == pytest.approx(detection.LEVEL, abs=0.001)
+    assert detection.power(ramp, 2) == pytest.approx(detection.LEVEL, abs=0.001)
     wander = replace(NAMED["delay wanders 30 ms"], delay_wander=1e-6)
-    assert detection.power(wander, 6) == pytest.approx(detection.LEVEL, abs=0.04)
+    assert detection.power(wander, 4) == pytest.approx(detection.LEVEL, abs=0.04)
     lost = replace(NAMED["commands lost 5 %"], commands_lost=1e-9)
-    assert detection.power(lost, 3) == pytest.approx(detection.LEVEL, abs=0.05)
+    assert detection.power(lost, 2) == pytest.approx(detection.LEVEL, abs=0.05)
 
 
 def test_the_best_test_finds_more_of_what_is_larger():
     powers = [
-        detection.power(replace(NAMED["delay ramps 100 ms"], delay_ramp=size), 10)
+        detection.power(replace(NAMED["delay ramps 100 ms"], delay_ramp=size), 4)
         for size in (0.02, 0.05, 0.1)
     ]
     assert powers == sorted(powers)

@@ -109,7 +109,7 @@ def test_what_cannot_be_fitted_is_refused_by_name():
 def test_the_evidence_tells_complex_from_real_poles(how, expected):
     loop = loop_with(dtm.FirstOrder())
     most = 3 if "lag" in how else 2
-    choice = dtm.estimation.choose_plant(recorded(4, **how), loop, most_lags=most)
+    choice = dtm.estimation.choose_plant(recorded(4, rows=250, **how), loop, most_lags=most)
     assert choice.chosen == expected
     assert choice.best.adequate
 
@@ -145,7 +145,7 @@ def test_a_plan_knows_the_numbers_of_any_plant():
     experiment = dtm.Experiment.prbs(8.0, 0.2, hold=0.2, sample_time=SAMPLE)
     plan = dtm.identifiability(loop, experiment, noise=0.005)
     assert plan.free == ("delay", "gain", "pole_frequency", "pole_damping")
-    flown = plan.monte_carlo(12)
+    flown = plan.monte_carlo(8)
     for name in (*plan.free, "delay+lag"):
         assert 0.4 < flown.rmse[name] / plan.stderr[name] < 1.9, name
 

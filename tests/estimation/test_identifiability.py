@@ -269,8 +269,8 @@ def test_estimates_scatter_as_the_bound_says_for_any_number_of_processes():
     # The error of the root mean square of 120 runs is 6.5 % of it.
     assert stated(here.rmse["delay"], 0.0645 * here.rmse["delay"], "s") in here.summary()
     assert "rmse" in repr(here)
-    shared = plan.monte_carlo(120, processes=2, seed=3)
-    np.testing.assert_array_equal(here.estimates["delay"], shared.estimates["delay"])
+    shared = plan.monte_carlo(16, processes=2, seed=3)
+    np.testing.assert_array_equal(here.estimates["delay"][:16], shared.estimates["delay"])
     assert (
         plan.monte_carlo(5, processes=1, seed=4).estimates["delay"][0] != here.estimates["delay"][0]
     )

@@ -65,10 +65,10 @@ def test_values_between_two_minima_are_not_forgotten():
 
 
 def test_the_interval_holds_the_truth():
-    """Of 40 sets, 38 are expected; fewer than 34 have a probability below 2 %."""
-    found = [shared_number(three(100 + seed)) for seed in range(40)]
-    assert sum(one.interval[0] <= DELAY <= one.interval[1] for one in found) >= 34
-    assert sum(one.agree for one in found) >= 37
+    """Of 12 sets, 11 are expected; fewer than 9 have a probability below 1 %."""
+    found = [shared_number(three(100 + seed)) for seed in range(12)]
+    assert sum(one.interval[0] <= DELAY <= one.interval[1] for one in found) >= 9
+    assert sum(one.agree for one in found) >= 10
 
 
 def test_a_number_that_is_not_shared_is_told():

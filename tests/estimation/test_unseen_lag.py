@@ -24,13 +24,13 @@ def record_height(seed, lags=(), delay=0.3, noise=0.005, rows=120):
 
 def test_a_lag_of_that_size_is_found_nine_times_in_ten():
     lag = np.median(
-        [dtm.estimate_delay(record_height(n), KNOWN).details["unseen_lag"] for n in range(9)]
+        [dtm.estimate_delay(record_height(n), KNOWN).details["unseen_lag"] for n in range(5)]
     )
     found = 0
-    for seed in range(60):
+    for seed in range(30):
         fit = dtm.estimate_delay(record_height(1000 + seed, (lag,), 0.3 - lag), KNOWN)
         found += "makes the recording likelier: the plant lacks it" in fit.message
-    assert 48 <= found <= 58
+    assert 23 <= found <= 29
 
 
 def test_less_noise_shows_shorter_lags():

@@ -48,12 +48,12 @@ def test_innovations_are_white_where_simulation_residuals_are_not():
 @pytest.mark.parametrize("noise_in_loop", [True, False])
 def test_the_entry_of_the_noise_is_detected(noise_in_loop):
     right = 0
-    for seed in range(20):
+    for seed in range(12):
         recording, known = record_step(0.01, seed, Kp=3.0, noise_in_loop=noise_in_loop)
         fit = dtm.estimate_delay(recording, known, method="waveform")
         right += fit.details["noise"] == ("loop" if noise_in_loop else "recording")
     # Likelihoods of single records are sometimes close: in 7 % of the records here.
-    assert right >= 16
+    assert right >= 9
 
 
 def test_the_entry_of_the_noise_does_not_depend_on_the_unit_of_the_output():
@@ -112,13 +112,13 @@ def test_a_delay_of_the_measurement_is_estimated_like_one_of_the_command():
 
 def test_intervals_cover_with_noise_in_the_loop():
     held = 0
-    for seed in range(200):
+    for seed in range(60):
         recording, known = record_step(0.01, seed, Kp=3.0)
         fit = dtm.estimate_delay(recording, known, method=Waveform(noise="loop"), free=("delay",))
         low, high = fit.ci()
         held += low <= 0.36 <= high
-    # 190 of 200 expected, with a deviation of 3.1.
-    assert 180 <= held <= 199
+    # 57 of 60 expected, with a deviation of 1.7.
+    assert held >= 52
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def estimate(
 
 
 @pytest.mark.parametrize(("lag", "air"), [(0.0, 0.0), (0.0, 0.05), (0.15, 0.0)])
-@pytest.mark.parametrize("seed", [0, 2, 5, 6])
+@pytest.mark.parametrize("seed", [0, 5])
 def test_it_is_that_of_python(web: WebKernels, seed: int, lag: float, air: float) -> None:
     recording, loop, delay = recorded_step(seed, lag, air)
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")
@@ -50,7 +50,7 @@ def test_it_is_that_of_python(web: WebKernels, seed: int, lag: float, air: float
     assert np.std(residuals) < 0.5 if air else np.std(residuals) < 0.007
 
 
-@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("seed", [0, 4])
 def test_a_lag_left_out_is_not_adequate(web: WebKernels, seed: int) -> None:
     recording, _, _ = recorded_step(seed, 0.15, 0.0)
     assert estimate(web, recording, lag=False)["rest"][5] == 0.0

@@ -224,7 +224,14 @@ def test_without_signal_handlers_of_the_event_loop_those_of_the_interpreter_are_
     assert signal.getsignal(signal.SIGINT) is before
 
 
-@pytest.mark.parametrize("number", ENDING)
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGINT, marks=pytest.mark.survey),
+        pytest.param(signal.SIGHUP, marks=pytest.mark.survey),
+        signal.SIGTERM,
+    ],
+)
 def test_a_signal_lands_the_drone_and_keeps_the_rows(number, tmp_path):
     async def fly():
         async with emulator(host="127.0.0.1") as emulated:
@@ -279,7 +286,9 @@ def own_emulators(parent):
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGTERM, marks=pytest.mark.survey), signal.SIGKILL]
+)
 def test_the_emulator_that_the_command_starts_ends_with_it(number, tmp_path):
     process = subprocess.Popen([*FLY, "--folder", str(tmp_path)], stderr=subprocess.DEVNULL)
     children = []

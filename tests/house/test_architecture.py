@@ -1,6 +1,7 @@
 """Data flows one way: an import from a later package fails."""
 
 import ast
+import functools
 from pathlib import Path
 
 import deadtime
@@ -51,8 +52,13 @@ def modules():
 NAMES = {name for name, _ in modules()}
 
 
+@functools.cache
 def imports(path):
     """What a file imports from the package, wherever in the file: (module, name)."""
+    return list(_imports(path))
+
+
+def _imports(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path.name}: import by the full name of the package"

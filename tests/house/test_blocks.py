@@ -85,8 +85,8 @@ def without_results():
     for page in PAGES[1:]:
         text = page.read_text(encoding="utf-8")
         if "```python\n" in text and ">>> " not in text:
-            # A design for an interval and the reproduction take as long as all others together.
-            slow = page.stem in ("designing", "reproduction")
+            # These take longer than all others together.
+            slow = page.stem in ("designing", "gains-that-follow-the-delay", "reproduction")
             yield pytest.param(page, id=page.stem, marks=[pytest.mark.survey] if slow else [])
 
 

@@ -264,7 +264,7 @@ def test_a_low_battery_is_reported_prevents_take_off_and_ends_a_flight():
     assert low.last.battery_low
     assert low.truth.phase is Phase.LANDED
     pilot = Pilot(battery=20.5).connect(demo=False)
-    pilot.wait(130.0, UP, every=0.04)
+    pilot.wait(130.0, UP, every=0.5)
     assert pilot.truth.phase in (Phase.LANDING, Phase.LANDED)
     assert pilot.last.battery_low
     assert pilot.truth.battery < 4.0

@@ -180,7 +180,7 @@ TOKENS = st.sampled_from(
 DATAGRAMS = st.one_of(st.binary(max_size=200), st.lists(TOKENS, max_size=40).map(b"".join))
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.booleans(), DATAGRAMS, st.floats(0.0, 0.3)), max_size=30))
 def test_arbitrary_datagrams_neither_break_the_drone_nor_make_it_send(datagrams):
     drone, now, received, sent = Drone(EmulatorOptions()), 0.0, 0, []

@@ -35,7 +35,7 @@ def test_motors_are_cut_once_however_late_the_confirmation(late):
     assert cut(late) == {"cut": [True], "cleared": [True, False]}
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(total=st.floats(0.0, 0.95), share=st.floats(0.0, 1.0))
 def test_motors_that_are_cut_never_start_again(total, share):
     found = cut(late=total * share, uplink=total * (1.0 - share))

@@ -369,7 +369,7 @@ def rows_within(log, widths, small, random, count):
 
 
 @given(logs())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_every_encoding_with_every_predictor(drawn):
     fields, widths, small, seed = drawn
     log = Log(fields=fields, constants=CONSTANTS, interval=8)

@@ -158,7 +158,7 @@ def test_what_is_no_log_is_refused(data, message):
 def test_memory_stays_in_proportion_to_the_file(variables):
     events = {1: ("event", [(f"v{k}", letter) for k, (_, letter) in enumerate(variables)])}
     one = record(events, 1, 7, [1] * len(variables))
-    log = definitions(events) + one * (4_000_000 // len(one))
+    log = definitions(events) + one * (1_000_000 // len(one))
     tracemalloc.start()
     contents = read_crazyflie(log, "log00")
     held = [contents.topics["event"].columns[name] for name in contents.topics["event"].columns]

@@ -1,12 +1,9 @@
 """The telemetry link of a tlog, on packets with known transport, drift and loss."""
 
-import json
-import subprocess
-import sys
-
 import deadtime as dtm
 import numpy as np
 import pytest
+from command_line import found, run
 from deadtime.logs._link import half_round_trip, lost_packets, transport_of
 from hypothesis import given, strategies as st
 from made_logs import Tlog
@@ -116,11 +113,8 @@ def test_inspect_tells_it(opened, tmp_path):
     data, _, lost = made()
     path = tmp_path / "a.tlog"
     path.write_bytes(data)
-    run = [sys.executable, "-m", "deadtime", "inspect", str(path)]
-    told = subprocess.run([*run, "--json"], capture_output=True, text=True, check=True)
-    assert json.loads(told.stdout)["link"]["lost"] == lost
-    told = subprocess.run(run, capture_output=True, text=True, check=True)
-    assert "half the least round trip" in " ".join(told.stdout.split())
+    assert found("inspect", path)["link"]["lost"] == lost
+    assert "half the least round trip" in " ".join(run("inspect", path).stdout.split())
 
 
 def test_a_short_log_and_other_formats_have_none(opened):

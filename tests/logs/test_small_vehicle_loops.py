@@ -168,7 +168,7 @@ def test_the_estimator_of_a_crazyflie_counts_pitch_as_its_controller(tmp_path):
 
 @pytest.mark.parametrize("axis", ["roll", "yaw"])
 def test_the_time_from_the_motors_of_a_crazyflie_to_its_rate(tmp_path, axis):
-    flight = fly(replace(RATE, period=0.002), np.random.default_rng(4))
+    flight = fly(replace(RATE, period=0.002, seconds=2.5), np.random.default_rng(4))
     sent = dict.fromkeys(("roll", "pitch", "yaw"), np.zeros(flight.time.size))
     sent[axis] = 2000.0 * flight.sent / np.max(np.abs(flight.sent))
     if axis == "yaw":

@@ -42,7 +42,7 @@ def survey(kind, count):
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_few_damaged_files_are_read_or_refused(kind):
-    survey(kind, 300)
+    survey(kind, 150)
 
 
 @pytest.mark.survey

@@ -105,7 +105,7 @@ def flight(seed, integrates):
 @pytest.mark.parametrize("integrates", [True, False])
 def test_the_times_of_commands_are_those_of_the_estimate(integrates):
     errors, covered = [], 0
-    for seed in range(2):
+    for seed in range(1 if integrates else 2):
         sent, time, output, delay, lag = flight(seed, integrates)
         told = dtm.Recording(time, np.zeros(time.size), output, sent=sent)
         loop = dtm.ControlLoop(dtm.FactoredPlant([0.04], integrator=integrates), dtm.P(1.0))
@@ -183,8 +183,8 @@ def test_commands_that_the_log_has_lost_at_a_step_are_unknown():
         rows[np.flatnonzero(np.diff(reference)) + 1] = False
         return rows | (np.arange(command.size) == 0)
 
-    error, adequate, held, known = estimated(20, kept)
-    assert known == 20
+    error, adequate, held, known = estimated(12, kept)
+    assert known == 12
     assert error < 0.005  # 3.5 ms, and 8 where each is the mean of those around it
-    assert adequate >= 15
-    assert held >= adequate - 4
+    assert adequate >= 9
+    assert held >= adequate - 3

@@ -10,7 +10,7 @@ from deadtime.roots import Certificate
 from deadtime.roots.certificate._parts import Segment
 
 # Both kinds of parts of the real axis, a root at 0, an open side, two rows.
-PROOF = (s**2 * (s + 2.0) + s * (1.0 + 0.3 * s) * delay(0.36)).certify(re=(-3.0, None), im=(0, 40))
+PROOF = (s**2 * (s + 2.0) + s * (1.0 + 0.3 * s) * delay(0.36)).certify(re=(-3.0, None), im=(0, 12))
 HALF_PLANE = (s + 5.0 * delay(0.36)).certify(re=(0, None))
 
 HUGE, DEEP = 10**4000, 900

@@ -59,7 +59,7 @@ def assert_rightmost(system, found, degree=24):
 @pytest.mark.parametrize("delays", [1, 2, 3])
 @pytest.mark.parametrize("n", [2, 3, 5, 8, 13, 20])
 def test_guesses_lead_to_the_rightmost_root(n, delays):
-    for seed in range(3):
+    for seed in range(3 if n < 10 else 1):
         system = random_system(100 * n + seed, n, delays)
         found = matrix_of(system).rightmost_from_guesses(1)
         answer = system.rightmost()

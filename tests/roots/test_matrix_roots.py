@@ -75,7 +75,7 @@ def test_small_systems_have_the_roots_of_their_expansion(n, neutral):
 # Many states, with roots known otherwise
 
 
-@pytest.mark.parametrize("n", [12, 25, pytest.param(40, marks=pytest.mark.survey)])
+@pytest.mark.parametrize("n", [12, pytest.param(40, marks=pytest.mark.survey)])
 def test_without_delay_roots_are_eigenvalues(n):
     rng = np.random.default_rng(n)
     A = np.rint(8 * rng.normal(size=(n, n)))
@@ -109,7 +109,7 @@ def test_similar_scalar_equations(n):
     assert system.spectral_abscissa() == pytest.approx(max(z.real for z in wanted), abs=1e-10)
 
 
-@pytest.mark.parametrize("n", [20, 30])
+@pytest.mark.parametrize("n", [20, pytest.param(30, marks=pytest.mark.survey)])
 def test_a_ring_of_cars_has_the_roots_of_its_modes(n):
     # Each driver reacts to the gap ahead 0.6 s late: the Fourier transform parts the ring into
     # s^2 + c s + k (1 - z) e^(-0.6 s), z an n-th root of one.
@@ -171,7 +171,7 @@ def ball_winding(system, re, im, steps=600):
     return round(float(number.mid()))
 
 
-@pytest.mark.parametrize("n", [12, 15])
+@pytest.mark.parametrize("n", [12, pytest.param(15, marks=pytest.mark.survey)])
 def test_ball_arithmetic_counts_the_same(n):
     system = random_system(100 + n, n)
     re, im = (-1.0, 3.0), (0.5, 6.0)

@@ -6,7 +6,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime import delay, s
-from hypothesis import given, settings, strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 (T, K) = dtm.parameters("T K")
 
@@ -33,13 +33,14 @@ def test_halves_and_a_constant_delay():
 
 @settings(max_examples=20, deadline=None)
 @given(
-    st.lists(st.floats(-1.5, 1.5), min_size=8, max_size=8),
+    st.lists(st.floats(-1.5, 1.5).map(lambda x: round(x, 3)), min_size=8, max_size=8),
     st.floats(0.0, 1.5),
 )
 def test_counts_of_the_matrix_change_as_the_crossings_say(entries, damping):
     """A delayed matrix of rank two gives terms in T and 2T; such crossings were refused once."""
     now, late = np.reshape(entries, (2, 2, 2))
     now = now - damping * np.eye(2)
+    assume(np.linalg.det(now + late) != 0.0)  # a root at 0 for every delay is refused by name
     found = dtm.crossings(dtm.DelaySystem({0.0: now, 1.0: late}), {"delay": (0.02, 4.0)})
     for (low, high), expected in zip(found.intervals, found.counts.tolist(), strict=True):
         if expected < 0 or high - low < 1e-6:

@@ -46,7 +46,7 @@ everywhere = st.one_of(inside, st.floats(-323, 308.2).map(lambda p: 10.0**p))
 
 
 @given(everywhere)
-@settings(max_examples=400)
+@settings(max_examples=150)
 def test_the_principal_branch_is_within_an_ulp(x):
     w = dtm.lambertw0(x)
     if x == BRANCH_POINT:
@@ -62,7 +62,7 @@ def test_the_principal_branch_is_within_an_ulp(x):
 
 
 @given(inside)
-@settings(max_examples=400)
+@settings(max_examples=150)
 def test_the_lower_branch_is_within_an_ulp(x):
     w = dtm.lambertwm1(x)
     if x == BRANCH_POINT:
@@ -183,13 +183,13 @@ def check_log_form(w, log_z, k):
 
 
 @given(logs, st.integers(-3, 3))
-@settings(max_examples=400)
+@settings(max_examples=150)
 def test_the_log_form_solves_its_equation(log_z, k):
     check_log_form(complex(dtm.special.lambertw_log(log_z, k)), log_z, k)
 
 
 @given(logs)
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_omega_is_the_log_form_of_branch_zero(z):
     w = dtm.wrightomega(z)
     alone = dtm.special.lambertw_log(z)
@@ -216,7 +216,7 @@ cancelling = st.builds(
 
 
 @given(cancelling)
-@settings(max_examples=200)
+@settings(max_examples=100)
 @example((37169030j, -5261527))
 def test_multiples_of_two_pi_that_cancel_in_the_log_form(case):
     log_z, k = case
@@ -224,7 +224,7 @@ def test_multiples_of_two_pi_that_cancel_in_the_log_form(case):
 
 
 @given(logs, st.integers(-(2**40), 2**40))
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_far_branches_of_the_log_form(log_z, k):
     check_log_form(complex(dtm.special.lambertw_log(log_z, k)), log_z, k)
 
@@ -268,7 +268,7 @@ offsets = st.one_of(
 
 
 @given(offsets, st.sampled_from([-2, -1, 0, 1, 2]))
-@settings(max_examples=500)
+@settings(max_examples=200)
 def test_the_offset_form_gives_both_w_and_one_plus_w(delta, k):
     w, one_plus_w = (complex(part) for part in dtm.special.lambertw_offset(delta, k))
     digits = 60 + 2 * max(0, -int(math.log10(abs(delta))))
@@ -302,7 +302,7 @@ def test_at_zero_offset_the_branches_meet():
     ),
     st.sampled_from([-2, -1, 0, 1, 2, 1000]),
 )
-@settings(max_examples=400)
+@settings(max_examples=150)
 def test_the_derivative_is_exact_next_to_the_branch_point_too(z, k):
     if z == 0:
         return

@@ -156,7 +156,7 @@ def test_boundaries_are_roots_on_the_axis(name):
 @pytest.mark.parametrize("options", [{}, {"decay": 0.2}, {"damping": (0.2, 0.5)}])
 def test_counts_along_a_row_differ_by_what_crosses(options):
     family, ranges = FAMILIES["sum of delays"]
-    chart = assert_same(family, ranges, (60, 61), **options)
+    chart = assert_same(family, ranges, (30, 31), **options)
     (across,) = (name for name in chart.names if name != chart.boundaries[0].along)
     counts = chart.unstable if across == chart.names[0] else chart.unstable.T
     points = chart.axes[chart.boundaries[0].along]

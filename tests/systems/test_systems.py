@@ -133,8 +133,9 @@ def test_python_control_agrees_without_delay():
     )
 
 
-def test_ten_states_are_expanded():
-    system = random_system(10, p=1, q=1, neutral=False)
+@pytest.mark.parametrize("states", [8, pytest.param(10, marks=pytest.mark.survey)])
+def test_many_states_are_expanded(states):
+    system = random_system(states, p=1, q=1, neutral=False)
     G = system.transfer_function()
     omega = np.array([0.1, 1.0, 5.0])
     np.testing.assert_allclose(

@@ -116,7 +116,7 @@ def test_flights_are_better_than_with_the_robust_gains(monkeypatch):
     # Without a lag there are fewer cases to search a form for.
     monkeypatch.setattr(adaptation, "LAG", 0.0)
     schedule = adaptation.made_schedule(dtm.P(1.0))
-    draws = adaptation.drawn(50, parts=(20.0, 25.0, 15.0, 25.0, 15.0))
+    draws = adaptation.drawn(30, parts=(20.0, 25.0, 15.0, 25.0, 15.0))
     fixed = adaptation.flown(draws, schedule, None)
     adaptive = adaptation.flown(draws, schedule, adaptation.oracle(draws, late=1.5))
     assert not fixed.outside.any()

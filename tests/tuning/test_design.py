@@ -250,7 +250,7 @@ def test_proofs_for_an_interval_of_the_delay_and_the_gain():
         gain=(0.9, 1.1),
         gain_margin=2.0,
         delay_margin=0.5,
-        shape=(21, 21),
+        shape=(11, 11),
     )
     assert best.proved == ("stable", "gain_margin", "delay_margin")
     boxes = dtm.proved_boxes(best.loop, {"delay": (0.3, 0.9), "gain": (0.9, 1.1)}, tol=0.0)

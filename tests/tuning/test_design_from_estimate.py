@@ -156,12 +156,12 @@ def test_gains_for_the_worst_of_a_wide_region_are_found_far_from_those_for_its_e
     assert 6.0 <= least < 6.0 * 1.01
 
 
-@pytest.mark.parametrize("name", ["gust 0.05 1 s"])
-def test_flights_in_gusts(name):
+@pytest.mark.parametrize("flights", [2, pytest.param(8, marks=pytest.mark.survey)])
+def test_flights_in_gusts(flights):
     """Demanded is a gain margin of 2.5. A second number is what the design promised."""
-    condition = next(one for one in CONDITIONS if one.name == name)
+    condition = next(one for one in CONDITIONS if one.name == "gust 0.05 1 s")
     found, promised = [], []
-    for number in range(8):
+    for number in range(flights):
         run = record(condition, number)
         loop = table.given_loop(condition, run, condition.free)
         with warnings.catch_warnings():
@@ -181,7 +181,7 @@ def test_flights_in_gusts(name):
         assert truth.is_stable()
         found.append(truth.margin().gain_margin)
         promised.append(best.margins.gain_margin)
-    assert len(found) >= 6
+    assert len(found) >= 0.75 * flights
     # Each holds in 95 of 100 flights.
     assert np.mean(np.array(found) >= 2.5) >= 0.75
     assert np.mean(np.array(found) >= np.array(promised)) >= 0.75

@@ -153,7 +153,7 @@ def near(gain, intervals):
 @pytest.mark.parametrize("seed", range(4))
 def test_random_plants_gain_by_gain(seed):
     rng = np.random.default_rng(seed)
-    gains = np.concatenate([sign * np.geomspace(1e-2, 1e2, 25) for sign in (-1.0, 1.0)])
+    gains = np.concatenate([sign * np.geomspace(1e-2, 1e2, 12) for sign in (-1.0, 1.0)])
     for _ in range(8):
         num, den = random_plant(rng)
         late = float(rng.choice([0.1, 0.37, 0.9]))

@@ -110,7 +110,7 @@ def flown(schedule, lag, position, seed, samples=220):
 def test_energy_falls_on_every_drawn_flight(schedules, name):
     schedule, lag = schedules[name], 0.15 if name == "lag" else 0.0
     assert schedule.proof.verify() == schedule.proof.step >= 1.0
-    for seed, step in enumerate((0.05, 0.5, 1.0) * 4):
+    for seed, step in enumerate((0.05, 0.5, 1.0) * 2):
         energies = flown(schedule, lag, step, seed)
         assert energies[0] <= 1.0
         assert (np.diff(energies) <= 1e-12 * energies[0]).all()

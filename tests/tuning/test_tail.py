@@ -15,7 +15,7 @@ FINE = 20
 LAGGING = dtm.ControlLoop(dtm.Integrator(0.85, 0.1), dtm.P(1.0), delay=0.3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(loop=loops(st.sampled_from([None, 2.0])), times=st.floats(1.0, 8.0))
 def test_the_tail_is_bounded(loop, times):
     try:
