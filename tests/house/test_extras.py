@@ -2,15 +2,12 @@
 
 import json
 import re
-import subprocess
 import sys
-from pathlib import Path
 
-import command_line
 import deadtime as dtm
 import numpy as np
 import pytest
-from command_line import one_clear_line
+from command_line import one_clear_line, run_elsewhere
 from deadtime import Experiment
 from deadtime.tuning import adaptive_gains
 from step_recordings import record_step
@@ -106,28 +103,6 @@ def test_drawing_without_matplotlib_says_which_line_installs_it(name, monkeypatc
     assert isinstance(raised.value, ImportError)
 
 
-WITHOUT = """
-import json, sys
-
-missing, commands = json.loads(sys.argv[1])
-sys.modules[missing] = None
-sys.path[:0] = {support!r}
-from command_line import run
-
-print(json.dumps([vars(run(*one)) for one in commands]))
-"""
-
-
-def without(missing, *commands, cwd):
-    """What commands print where a package is not installed, in one process of their own."""
-    support = [str(Path(command_line.__file__).parent)]
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT.format(support=support), json.dumps([missing, commands])],
-        capture_output=True, text=True, timeout=120, check=True, cwd=cwd,
-    )  # fmt: skip
-    return [subprocess.CompletedProcess(**one) for one in json.loads(done.stdout)]
-
-
 def test_commands_that_draw_nothing_need_no_matplotlib(tmp_path):
     # The command once required matplotlib before it examined its options.
     commands = (
@@ -135,21 +110,22 @@ def test_commands_that_draw_nothing_need_no_matplotlib(tmp_path):
         "simulate --kp 2 --delay 0.36 --points 11 --json",
         "map --delay 0.36 --shape 3 3 --json",
     )
-    for done in without("matplotlib", *map(str.split, commands), cwd=tmp_path):
+    for done in run_elsewhere(*map(str.split, commands), missing="matplotlib", cwd=tmp_path):
         assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout)
 
 
 def test_commands_that_draw_ask_for_it_before_they_work(tmp_path):
     commands = ("roots --kp 2 --delay 0.36 --plot a.png", "demo")
-    for done in without("matplotlib", *map(str.split, commands), cwd=tmp_path):
+    for done in run_elsewhere(*map(str.split, commands), missing="matplotlib", cwd=tmp_path):
         assert "pip install 'deadtime[plot]'" in (said := one_clear_line(done))
         assert "\n" not in said
     assert not list(tmp_path.iterdir())
 
 
 def test_pages_without_their_engine_say_which_line_installs_it(tmp_path):
-    demo, explore = without("jinja2", ["demo"], ["explore", "--out", "page.html"], cwd=tmp_path)
+    commands = (["demo"], ["explore", "--out", "page.html"])
+    demo, explore = run_elsewhere(*commands, missing="jinja2", cwd=tmp_path)
     assert "pip install 'deadtime[cli]'" in (said := one_clear_line(demo))
     assert "\n" not in said
     assert explore.returncode == 0

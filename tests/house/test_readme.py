@@ -5,15 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+from command_line import run
+
 README = Path(__file__).resolve().parents[2] / "README.md"
 
 
 def test_the_python_of_the_readme_runs(tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 2
-    subprocess.run(
-        [sys.executable, "-m", "deadtime", "demo"], cwd=tmp_path, check=True, capture_output=True
-    )
+    assert run("demo", cwd=tmp_path).returncode == 0
     result = subprocess.run(
         [sys.executable, "-c", "\n".join(blocks)],
         cwd=tmp_path,

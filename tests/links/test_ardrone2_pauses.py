@@ -124,7 +124,7 @@ LENGTHS = st.one_of(st.floats(0.01, 0.3), st.floats(0.25, 2.1), st.floats(1.9, 9
 PAUSES = st.lists(st.tuples(st.floats(0.0, 3.0), LENGTHS), min_size=1, max_size=3)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     pauses=PAUSES, own=st.lists(LENGTHS, max_size=2), every=st.integers(3, 9), late=st.booleans()
 )

@@ -292,7 +292,7 @@ def test_a_controller_announces_its_end_and_a_new_one_takes_over():
 @pytest.mark.parametrize("policy", POLICIES, ids=lambda one: type(one).__name__)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_no_fault_of_the_relay_makes_the_plant_unsafe(fault, policy):
-    for seed in range(8):
+    for seed in range(3):
         network = FAULTS[fault]
         trial = Trial(
             gain=8.0,
@@ -306,7 +306,7 @@ def test_no_fault_of_the_relay_makes_the_plant_unsafe(fault, policy):
         check_safety(trial, run(trial))
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     delay=st.floats(0.0, 0.3),
     deviation=st.floats(0.001, 0.5),
@@ -362,9 +362,9 @@ def check_safety(trial, report):
         assert (recording.command[silent] == trial.safe).all()
 
 
-def test_twenty_seeds_of_a_bad_network_leave_the_output_bounded():
+def test_any_seed_of_a_bad_network_leaves_the_output_bounded():
     network = Network(delay=Normal(0.05, 0.01), loss=Bursts.of(0.05, 4.0))
-    for seed in range(20):
+    for seed in range(8):
         report = run(Trial(gain=6.0, forward_path=network, return_path=network, seed=seed))
         assert report.plant.largest_output < 2.0
         assert abs(report.plant.recording.output[-1] - 1.0) < 0.5

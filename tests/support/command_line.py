@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import subprocess
 import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
@@ -26,6 +27,33 @@ def run(*arguments, cwd="."):
         except SystemExit as ended:
             code = ended.code or 0
     return subprocess.CompletedProcess(command, code, out.getvalue(), err.getvalue())
+
+
+#: Runs commands one after the other and prints what became of each.
+PROGRAM = """
+import json, sys
+
+missing, commands = json.loads(sys.argv[1])
+if missing:
+    sys.modules[missing] = None
+from command_line import run
+
+print(json.dumps([vars(run(*one)) for one in commands]))
+"""
+
+
+def run_elsewhere(*commands, missing=None, cwd, timeout=120.0):
+    """What became of commands in one process of their own, where a package may be missing."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps([missing, commands])],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=True,
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    return [subprocess.CompletedProcess(**one) for one in json.loads(done.stdout)]
 
 
 def found(*arguments, cwd="."):
