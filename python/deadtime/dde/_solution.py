@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import SupportsFloat
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays, equal
 from deadtime._base.validation import real_array
 from deadtime.dde._native import DelayPieces
-
-Array = NDArray[np.float64]
 
 
 class DelaySolution:

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, SupportsFloat
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import deadtime.dde._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, positive, real_array, whole_number
 from deadtime.dde._compiled import addresses
 from deadtime.dde._solution import DelayResult, DelaySolution
-
-Array = NDArray[np.float64]
 
 _METHODS = ("auto", "spectral")
 #: What `DelayResult.status` is where the run did not fail.

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import between, stated
 from deadtime._base.drawing import empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
@@ -34,8 +35,6 @@ from deadtime.recordings import Recording
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

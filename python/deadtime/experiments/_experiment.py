@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.validation import (
     finite,
@@ -31,8 +32,6 @@ from deadtime.experiments._waves import (
 )
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import MINIMUM_SAMPLES, Recording
-
-Array = NDArray[np.float64]
 
 #: A relay is simulated as a P controller with this gain (1/s, times the amplitude) and the
 #: amplitude as its limit. The reference is higher by this share (s, times the amplitude), so that

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, non_negative
 from deadtime.experiments._random_process import RandomProcess
 from deadtime.loops import Plant
 
-Array = NDArray[np.float64]
 Seed: TypeAlias = int | np.random.SeedSequence
 
 #: The parts of a noise have random numbers of their own, from the seed with these keys.

@@ -14,12 +14,10 @@ controllers that act on the output there: continuous ones, and those whose integ
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.experiments._noise import DisturbanceModel, NoiseModel, Seed
 from deadtime.loops import PV, ControlLoop, DerivativeFilter, discretised
-
-Array = NDArray[np.float64]
 
 
 def disturbance_of(model: NoiseModel, time: Array, seed: Seed, loop: ControlLoop) -> Array:

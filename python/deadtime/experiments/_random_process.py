@@ -16,11 +16,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.loops import Plant, realise
-
-Array = NDArray[np.float64]
 
 #: Steps that differ by less than this share of the median are the same.
 SAME_STEP = 1e-9

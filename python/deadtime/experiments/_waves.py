@@ -13,10 +13,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import positive, whole_number
 from deadtime.recordings import MINIMUM_SAMPLES
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 #: Largest deviation of a time from a multiple of the sample time, as a share of the sample time.

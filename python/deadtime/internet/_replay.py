@@ -15,13 +15,11 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation import dominant_x, exact_x
 from deadtime.links.udp import HeldIntegrator, Trial
-
-Array = NDArray[np.float64]
 
 #: Functions from the overshoot to K·Td, by the names of the replayed methods.
 MAPS: dict[str, Callable[[float], float]] = {"dominant": dominant_x, "exact": exact_x}

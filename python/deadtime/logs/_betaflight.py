@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.logs._blackbox_modes import INAV
 from deadtime.logs._conditions import state
-from deadtime.logs._contents import Array, LogContents
+from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
 
 
-def _has_bit(*bits: int) -> Callable[[Array], NDArray[np.bool_]]:
+def _has_bit(*bits: int) -> Callable[[Array], Mask]:
     """Whether one of these bits of ``flightModeFlags`` is set."""
     mask = sum(1 << bit for bit in bits)
     return lambda flags: (flags.astype(np.int64) & mask) != 0

@@ -10,12 +10,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime.logs._blackbox_frames import Frames, layout, read_frames, seconds
 from deadtime.logs._blackbox_head import MARK, Head, read_head
 from deadtime.logs._blackbox_modes import flight_modes
 from deadtime.logs._columns import Columns
-from deadtime.logs._contents import Array, LogContents, Topic
+from deadtime.logs._contents import LogContents, Topic
 
 Integers = NDArray[np.int32]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import deadtime.logs._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime.logs._blackbox_head import Head
-from deadtime.logs._contents import Array
 
 Codes = tuple[bytes, bytes]
 Frames = native.BlackboxFrames

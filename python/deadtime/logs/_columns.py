@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from deadtime._base.arrays import Array
 
 
 class Columns(Mapping[str, Array]):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
-from deadtime.logs._contents import Array, LogContents
+from deadtime._base.arrays import Array, Mask
+from deadtime.logs._contents import LogContents
 from deadtime.logs._names import Windows
 from deadtime.logs._series import increasing
 from deadtime.logs._windows import outside, windows_of
@@ -18,7 +18,7 @@ NOTICED = 2.5
 
 
 def state(
-    topic: str, column: str, holds: Callable[[Array], NDArray[np.bool_]]
+    topic: str, column: str, holds: Callable[[Array], Mask]
 ) -> Callable[[LogContents], Windows | None]:
     """Where a logged column passes a test; None if it is not in the log."""
 
@@ -35,7 +35,7 @@ def state(
 
 
 def in_the_air(
-    topic: str, column: str, holds: Callable[[Array], NDArray[np.bool_]]
+    topic: str, column: str, holds: Callable[[Array], Mask]
 ) -> Callable[[LogContents], Windows | None]:
     """Where a vehicle says that it flies, without the time in which its landing goes unnoticed."""
     told = state(topic, column, holds)

@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from deadtime._base.arrays import Array
 from deadtime.logs._link import Link
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

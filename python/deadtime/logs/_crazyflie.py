@@ -12,9 +12,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime.logs._columns import Columns
-from deadtime.logs._contents import Array, LogContents, Topic
+from deadtime.logs._contents import LogContents, Topic
 
 #: The first byte of a log.
 MARK = 0xBC

@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime.logs._conditions import first_told, state
-from deadtime.logs._contents import Array, LogContents
+from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
 from deadtime.logs._rotations import unwrapped
 

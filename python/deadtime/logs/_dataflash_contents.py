@@ -6,10 +6,10 @@ import re
 from collections import ChainMap
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
-from deadtime.logs._contents import Array, LogContents, Topic
+from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._dataflash_messages import Messages
 
 #: Numbers of events.
@@ -78,7 +78,7 @@ def _events(messages: Messages) -> dict[str, Topic]:
     return {name: topic for name, topic in found.items() if topic.time.size}
 
 
-def _changes(time: Array, state: NDArray[np.bool_]) -> Topic:
+def _changes(time: Array, state: Mask) -> Topic:
     """A state that is logged when it changes: before the first row it was the other one."""
     rows = np.isfinite(time)
     time, state = time[rows], state[rows]

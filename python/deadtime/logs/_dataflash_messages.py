@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.logs._contents import Array, Topic
+from deadtime._base.arrays import Array
+from deadtime.logs._contents import Topic
 
 #: Letters of a format: the type of numpy.
 TYPES = {

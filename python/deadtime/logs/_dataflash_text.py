@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
-from deadtime.logs._contents import Array, LogContents
+from deadtime.logs._contents import LogContents
 from deadtime.logs._dataflash_contents import contents_of
 from deadtime.logs._dataflash_messages import Layout, Messages
 

@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
 from deadtime._base.plain import plain
-
-Array = NDArray[np.float64]
 
 #: Fewest messages with both stamps, and the least time that they span, s.
 FEWEST, SHORTEST = 50, 2.0

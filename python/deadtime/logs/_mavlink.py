@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.logs._ardupilot_modes import (
     HORIZONTAL as ARDUPILOT_HORIZONTAL,
     UNCONTROLLED,
     VERTICAL as ARDUPILOT_VERTICAL,
 )
 from deadtime.logs._conditions import in_modes, in_the_air, not_in_modes, state
-from deadtime.logs._contents import Array
 from deadtime.logs._names import Condition, LoopNames, Signal
 from deadtime.logs._px4_modes import HORIZONTAL as PX4_HORIZONTAL, VERTICAL as PX4_VERTICAL
 from deadtime.logs._rotations import pitch_of, roll_of, unwrapped, yaw_of
@@ -48,7 +47,7 @@ DOWN = "downwards to upwards"
 
 def _used(bit: int, values: Array, mask: Array) -> Array:
     """The values, NaN where the mask says that they are ignored."""
-    ignored: NDArray[np.bool_] = np.nan_to_num(mask).astype(np.int64) >> bit & 1 != 0
+    ignored: Mask = np.nan_to_num(mask).astype(np.int64) >> bit & 1 != 0
     return np.where(ignored, np.nan, values)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.logs._contents import Array
+from deadtime._base.arrays import Array, Mask
 
 #: Bytes of the time before a packet.
 STAMP = 8
@@ -112,7 +112,7 @@ class Batch:
             (int(one) >> 8, int(one) & 0xFF): np.flatnonzero(both == one) for one in np.unique(both)
         }
 
-    def taken(self, rows: NDArray[np.bool_]) -> Batch:
+    def taken(self, rows: Mask) -> Batch:
         """The messages of these rows."""
         parts = ("records", "places", "ground", "system", "component", "number")
         return replace(self, **{name: getattr(self, name)[rows] for name in parts})

@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from deadtime.logs._contents import Array, LogContents
+from deadtime._base.arrays import Array
+from deadtime.logs._contents import LogContents
 
 Kind = Literal["rate", "attitude", "velocity", "position"]
 

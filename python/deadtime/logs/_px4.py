@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from deadtime._base.arrays import Array, Mask
 from deadtime.logs._conditions import (
     first_told,
     in_modes,
@@ -12,7 +10,7 @@ from deadtime.logs._conditions import (
     not_in_modes,
     state,
 )
-from deadtime.logs._contents import Array, LogContents
+from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
 from deadtime.logs._px4_modes import HORIZONTAL, VERTICAL
 from deadtime.logs._rotations import pitch_of, roll_of, unwrapped, yaw_of
@@ -29,7 +27,7 @@ ARMED = 2
 RAMP_UP = 4
 
 
-def _is_set(values: Array) -> NDArray[np.bool_]:
+def _is_set(values: Array) -> Mask:
     return values > 0
 
 

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
-from deadtime.logs._contents import Array
 from deadtime.logs._series import Series
 from deadtime.recordings import Columns, Recording, repeated_rows
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from deadtime.logs._contents import Array
+from deadtime._base.arrays import Array
 
 
 def roll_of(w: Array, x: Array, y: Array, z: Array) -> Array:

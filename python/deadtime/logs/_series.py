@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime.logs._contents import Array, LogContents, Topic
+from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._names import UNITS, Signal
 
 #: A pause of this many usual periods is a gap.
@@ -104,7 +104,7 @@ def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
     return series, int(kept.size - np.count_nonzero(kept))
 
 
-def increasing(time: Array) -> NDArray[np.bool_]:
+def increasing(time: Array) -> Mask:
     """The most rows whose times increase strictly, with no pause of a day.
 
     One wrong time far ahead then takes no later rows with it, and one far behind no earlier ones.

@@ -11,9 +11,10 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import MissingExtraError, RecordingError
 from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
-from deadtime.logs._contents import Array, LogContents, Topic
+from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._link import Link, half_round_trip, lost_packets, transport_of
 from deadtime.logs._mavlink_packets import (
     Batch,

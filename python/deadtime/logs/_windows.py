@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from deadtime.logs._contents import Array
+from deadtime._base.arrays import Array, Mask
 from deadtime.logs._names import Windows
 
 ALWAYS: Windows = [(-np.inf, np.inf)]
 
 
-def windows_of(time: Array, holds: NDArray[np.bool_]) -> Windows:
+def windows_of(time: Array, holds: Mask) -> Windows:
     """Where a logged state holds: from its row until the next row that denies it.
 
     The last state holds to infinity. Before the first row the state of that row is assumed.
@@ -29,7 +28,7 @@ def windows_of(time: Array, holds: NDArray[np.bool_]) -> Windows:
     ]
 
 
-def held_rows(time: Array, holds: NDArray[np.bool_]) -> Windows:
+def held_rows(time: Array, holds: Mask) -> Windows:
     """First and last time of each run of rows in which a state holds."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
     return [(float(time[a]), float(time[b - 1])) for a, b in edges.reshape(-1, 2)]

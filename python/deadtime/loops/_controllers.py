@@ -18,15 +18,13 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
 from deadtime.loops._entries import matrix, vector
 from deadtime.loops._given_plants import transfer_function_of
 from deadtime.systems import TransferFunction
-
-Vector = NDArray[np.float64]
 
 #: Descending coefficients: numbers, arrays of numbers or symbols.
 Polynomial: TypeAlias = list[Any]
@@ -38,10 +36,10 @@ class ControllerEquations(NamedTuple):
     With `update` a discretised filter has the last two states.
     """
 
-    A: Vector
-    B: Vector
-    E: Vector
-    C: Vector
+    A: Array
+    B: Array
+    E: Array
+    C: Array
     p: Any
     q: Any
     M: Any
@@ -55,10 +53,10 @@ class FilterUpdate(NamedTuple):
     They give the row C to u, and y itself `direct`.
     """
 
-    F: Vector
-    G: Vector
-    H: Vector
-    row: Vector
+    F: Array
+    G: Array
+    H: Array
+    row: Array
     direct: float
 
 
@@ -241,7 +239,7 @@ class Controller(ABC):
 
     def _rest(
         self, values: Mapping[str, Any], output: float, reference: float, command: Any
-    ) -> Vector:
+    ) -> Array:
         """States after a long time at constant `output` and `reference`, giving `command`.
 
         The integral takes the value at which the controller takes over without a bump.

@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import positive
-
-Vector = NDArray[np.float64]
 
 Discretisation: TypeAlias = Literal["hold", "tustin", "backward"]
 
@@ -90,14 +88,14 @@ PAPER_FILTER = DerivativeFilter(omega=38.0, damping=1.0)
 class SampledFilter(NamedTuple):
     """Fd, Gd, Cd, Dd."""
 
-    F: Vector
-    G: Vector
-    C: Vector
+    F: Array
+    G: Array
+    C: Array
     D: float
 
 
 def discretised(
-    F: Vector, G: Vector, C: Vector, sample_time: float, method: Discretisation
+    F: Array, G: Array, C: Array, sample_time: float, method: Discretisation
 ) -> SampledFilter:
     """Return the filter of a sample time in s by one of the methods."""
     from scipy.linalg import expm, solve

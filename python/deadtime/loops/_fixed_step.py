@@ -6,16 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, positive
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import LoopRun, reference_jumps, refuse_discretised
 from deadtime.loops._native import fixed_step_run
 from deadtime.loops._plants import realise
 from deadtime.systems import Response
-
-Vector = NDArray[np.float64]
 
 #: A time counts as a whole number of steps if it differs by less than this, in steps: rounding of
 #: decimal step sizes must pass, a wrong step size must not.
@@ -40,10 +39,10 @@ class FixedStepSettings:
 class _Lines:
     """Linear interpolation between the steps, as such a tool plots it."""
 
-    times: Vector
-    values: Vector
+    times: Array
+    values: Array
 
-    def __call__(self, times: Vector) -> Vector:
+    def __call__(self, times: Array) -> Array:
         return np.interp(times, self.times, self.values)
 
 

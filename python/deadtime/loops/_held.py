@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.progress import Report
 from deadtime.loops._controllers import Controller
 from deadtime.loops._model import LoopModel, refuse_discretised
@@ -27,8 +27,6 @@ from deadtime.loops._native import (
 )
 from deadtime.loops._plants import Plant
 
-Floats = NDArray[np.float64]
-
 
 class HeldRows(NamedTuple):
     """Rows of loops u = (K + k K_slope) x + ...: arrays with one entry for all, or one a row."""
@@ -36,31 +34,31 @@ class HeldRows(NamedTuple):
     rows: int
     #: Of the arrays; a row may use fewer of them, from the first on.
     states: int
-    used: Floats
-    A: Floats
-    B: Floats
-    K: Floats
-    L: Floats
-    K_slope: Floats
-    L_slope: Floats
-    delay: Floats
-    sample_time: Floats
-    points: Floats
+    used: Array
+    A: Array
+    B: Array
+    K: Array
+    L: Array
+    K_slope: Array
+    L_slope: Array
+    delay: Array
+    sample_time: Array
+    points: Array
 
 
 class Feedback(NamedTuple):
     """u = K x + L w."""
 
-    K: Floats
-    L: Floats
+    K: Array
+    L: Array
 
 
 class _Equations(NamedTuple):
     """Equations, one entry for all rows or one a row, and each gain's share of the feedback."""
 
-    used: Floats
-    A: Floats
-    B: Floats
+    used: Array
+    A: Array
+    B: Array
     shares: dict[str, Feedback]
 
 
@@ -81,7 +79,7 @@ class HeldFamily:
     controller: Controller
     #: Values of all numbers; those of the axes play no part.
     values: dict[str, float]
-    axes: dict[str, Floats]
+    axes: dict[str, Array]
 
     def __post_init__(self) -> None:
         refuse_discretised(self.controller, 1.0, "a map")
@@ -112,7 +110,7 @@ class HeldFamily:
             )
         return held_boundaries(self._rows, along=self.along, decay=decay, damping=damping)
 
-    def crossings(self, low: float, high: float) -> Floats:
+    def crossings(self, low: float, high: float) -> Array:
         """Values of the only axis, a gain, between two at which a pole is on the unit circle."""
         ((name, points),) = self.axes.items()
         found = held_crossings(self._held({}, name, points), low, high)
@@ -160,7 +158,7 @@ class HeldFamily:
         middle = {self.along: points[len(points) // 2 : len(points) // 2 + 1]}
         return self._held(middle, across[0], self.axes[across[0]])
 
-    def _held(self, moving: Mapping[str, Floats], along: str | None, points: Floats) -> HeldRows:
+    def _held(self, moving: Mapping[str, Array], along: str | None, points: Array) -> HeldRows:
         """Rows with these values of what changes from row to row."""
         rows = max((len(points) for points in moving.values()), default=1)
         gains = self.controller._gains()
@@ -193,7 +191,7 @@ class HeldFamily:
             points=points,
         )
 
-    def _equations(self, moving: Mapping[str, Floats]) -> _Equations:
+    def _equations(self, moving: Mapping[str, Array]) -> _Equations:
         """Equations where numbers other than gains have these values, each combination once."""
         moving = {n: v for n, v in moving.items() if n not in ("delay", "sample_time")}
         if not moving:
@@ -207,7 +205,7 @@ class HeldFamily:
         size = max(one.B.shape[-1] for one in found)
         spread = place.ravel()
 
-        def joined(arrays: list[Floats]) -> Floats:
+        def joined(arrays: list[Array]) -> Array:
             return np.concatenate([_padded(array, size) for array in arrays])[spread]
 
         shares = {
@@ -234,6 +232,6 @@ class HeldFamily:
         return _Equations(np.array([float(len(model.B))]), model.A[None], model.B[None], shares)
 
 
-def _padded(array: Floats, size: int) -> Floats:
+def _padded(array: Array, size: int) -> Array:
     """The array with zeros after the last entry of all axes but the first."""
     return np.pad(array, [(0, 0)] + [(0, size - array.shape[-1])] * (array.ndim - 1))

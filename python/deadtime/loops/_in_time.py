@@ -11,8 +11,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, one_dimensional
 from deadtime.loops._characteristic import closed_loop
 from deadtime.loops._model import LoopRun, reference_jumps
@@ -21,8 +22,6 @@ from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_w
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, response_of, until_settled
-
-Vector = NDArray[np.float64]
 
 #: No commands before the start.
 _NONE: tuple[float, ...] = ()
@@ -231,7 +230,7 @@ class LoopInTime:
 
 def _run_of(
     loop: LoopSpecification,
-    times: Vector,
+    times: Array,
     reference: ArrayLike,
     initial_output: float,
     reference_before: float | None,
@@ -243,7 +242,7 @@ def _run_of(
     initial = before = finite("initial_output", initial_output)
     if reference_before is not None:
         before = finite("reference_before", reference_before)
-    held: float | Vector
+    held: float | Array
     past, held_from = before, None
     if type(reference) is float and reference_time is None:
         held = finite("reference", reference)
@@ -275,7 +274,7 @@ def _since_start(loop: LoopSpecification, start: float, run: LoopRun) -> LoopRun
     return run._replace(reference=np.atleast_1d(run.reference), reference_time=since)
 
 
-def _moved(loop: LoopSpecification, since: Vector, start: float, phase: float) -> Vector:
+def _moved(loop: LoopSpecification, since: Array, start: float, phase: float) -> Array:
     """Times since the start, moved onto the samples they miss by rounding only."""
     if loop.sample_time is None:
         return since
@@ -305,7 +304,7 @@ class _Again:
         """Output at rest under the last reference, None without such a rest."""
         return self.loop.steady_state(float(np.ravel(_whole(self.loop, self.run).reference)[-1]))
 
-    def __call__(self, times: Vector) -> Vector:
+    def __call__(self, times: Array) -> Array:
         start = cast(float, self.found.start)
         run = _since_start(self.loop, start, _whole(self.loop, self.run))
         return self.loop.native.outputs(times - start + self.loop.output_lead, run)

@@ -14,46 +14,45 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import increasing, real_array
 from deadtime.loops._controllers import Controller, FilterUpdate
 from deadtime.loops._entries import Each, number, vector, zeros
 from deadtime.loops._native import LinearLoop
 from deadtime.loops._plants import Plant, StateSpace, realise, rest
 
-Vector = NDArray[np.float64]
-
 
 class SampleUpdate(NamedTuple):
     """What a sample does to the states: x becomes J x + G w + H r."""
 
-    states: Vector
-    command: Vector
-    reference: Vector
+    states: Array
+    command: Array
+    reference: Array
 
 
 class LoopRun(NamedTuple):
     """Where a run starts, and its reference, as the stepper takes them."""
 
-    state: Vector
+    state: Array
     #: Before the start.
     command: float
     reference_before: float = 0.0
     #: A number, to which the reference steps at the start, or values that hold from their times on.
-    reference: float | Vector = 0.0
-    reference_time: Vector | None = None
+    reference: float | Array = 0.0
+    reference_time: Array | None = None
     #: Commands at the samples before the start, the latest one last.
-    command_history: Vector | None = None
+    command_history: Array | None = None
     sample_phase: float = 0.0
 
 
 class ReferenceJumps(NamedTuple):
     """A reference that holds `values` from `times` on, and `before` until the first of them."""
 
-    times: Vector
-    values: Vector
+    times: Array
+    values: Array
     before: float
 
-    def at(self, times: Vector) -> Vector:
+    def at(self, times: Array) -> Array:
         place = np.searchsorted(self.times, times, side="right")
         return np.concatenate([[self.before], self.values])[place]
 
@@ -70,13 +69,13 @@ class LoopModel:
     that would take three times as long to make.
     """
 
-    A: Vector
-    B: Vector
-    E: Vector
-    K: Vector
+    A: Array
+    B: Array
+    E: Array
+    K: Array
     L: Any
     M: Any
-    C: Vector
+    C: Array
     D: Any
     impulse: Any
     #: What a sample does to the states, where a discretised filter has some.
@@ -137,7 +136,7 @@ class LoopModel:
 
     def entries(
         self, delay: Any, sample_time: Any = None, limit: Any = None
-    ) -> list[float | Vector]:
+    ) -> list[float | Array]:
         """`row` for many loops: each entry one number for all, or an array of one for each."""
         row = self.row(delay, sample_time, limit).tolist()
         return [entry.numbers if isinstance(entry, Each) else entry for entry in row]
@@ -220,7 +219,7 @@ def state_at_rest(
     output: float,
     reference: float,
     space: StateSpace | None = None,
-) -> tuple[Vector, Any]:
+) -> tuple[Array, Any]:
     """State of a loop whose plant rests at `output`, and the command that holds it there.
 
     `space` is the plant's state space, where that is known.
@@ -230,7 +229,7 @@ def state_at_rest(
 
 
 def reference_jumps(
-    times: Vector, reference: ArrayLike, reference_time: ArrayLike | None, before: float
+    times: Array, reference: ArrayLike, reference_time: ArrayLike | None, before: float
 ) -> ReferenceJumps:
     """The reference as jumps: one number steps at the first of `times`."""
     values = real_array("reference", reference)

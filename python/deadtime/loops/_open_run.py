@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from deadtime._base.arrays import Array
 from deadtime.loops._native import held_response
 from deadtime.loops._plants import Plant
 
-Vector = NDArray[np.float64]
-
 
 def open_response(
-    plant: Plant, values: Mapping[str, Any], times: Vector, command_time: Vector, command: Vector
-) -> Vector:
+    plant: Plant, values: Mapping[str, Any], times: Array, command_time: Array, command: Array
+) -> Array:
     """Output of a plant under a held command, exact to rounding.
 
     Parameters

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import positive
 from deadtime.loops._native import rate_limited
 from deadtime.loops._plants import Plant, RationalPlant
 from deadtime.systems import TransferFunction
-
-Vector = NDArray[np.float64]
 
 #: Pieces into which a command that holds is cut. The output of an integrator is exact at their
 #: ends, and between them within rate * (length of a piece)^2 / 8.
@@ -135,7 +133,7 @@ class RateLimited(Plant):
             den = lag * np.append(den, 0.0) + np.append(0.0, den)
         return RationalPlant(num.tolist(), den.tolist())
 
-    def limited(self, time: Vector, command: Vector) -> tuple[Vector, Vector]:
+    def limited(self, time: Array, command: Array) -> tuple[Array, Array]:
         """The command that the plant gets, as commands that hold.
 
         Parameters

@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from deadtime._base.validation import finite, one_dimensional
 from deadtime.loops._characteristic import closed_loop, reference_to_command
 from deadtime.loops._model import reference_jumps
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, TransferFunction, respond, step_response
-
-Vector = NDArray[np.float64]
 
 #: Relative error to which an initial output must be the one at rest.
 _AT_REST = 1e-9

@@ -21,12 +21,11 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array, Complex, Mask
 from deadtime._base.validation import real_array
 from deadtime.loops._model import LoopModel
-
-Vector = NDArray[np.float64]
 
 #: A pole this close to z = 1 counts as an integrator: the error of a computed double pole is about
 #: the square root of the rounding error.
@@ -72,9 +71,9 @@ _MOST = 4_000_000
 class SampledLoopGain:
     """L(z) of a loop: T, b and c, the whole samples of delay, and `sample_time` in s."""
 
-    T: Vector
-    b: Vector
-    c: Vector
+    T: Array
+    b: Array
+    c: Array
     whole: int
     sample_time: float
 
@@ -88,7 +87,7 @@ class SampledLoopGain:
         n = len(model.B)
         none = np.zeros_like(model.K)
 
-        def matrix(row: Vector, direct: float) -> Vector:
+        def matrix(row: Array, direct: float) -> Array:
             cut = replace(model, K=row, L=direct)
             return cut.native(part, sample_time).transition_matrix()
 
@@ -104,7 +103,7 @@ class SampledLoopGain:
         T, b, c = T * unit / unit[:, None], b * command / unit, c * unit / command
         return cls(T, b, c, whole, sample_time)
 
-    def at(self, angle: Vector) -> NDArray[np.complex128]:
+    def at(self, angle: Array) -> Complex:
         """L(e^(j angle)); infinite at a pole."""
         z = np.exp(1j * angle)
         size = len(self.b)
@@ -119,21 +118,21 @@ class SampledLoopGain:
                 return np.concatenate([self._one(m, w) for m, w in zip(matrices, z, strict=True)])
             return np.asarray(-(states[..., 0] @ self.c) * z ** (-self.whole))
 
-    def _one(self, matrix: NDArray[np.complex128], z: complex) -> NDArray[np.complex128]:
+    def _one(self, matrix: Complex, z: complex) -> Complex:
         try:
             return np.array([-(self.c @ np.linalg.solve(matrix, self.b)) * z ** (-self.whole)])
         except np.linalg.LinAlgError:
             return np.array([complex(math.inf)])
 
     @cached_property
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Poles of L, except for those at z = 0 that the whole samples of delay add."""
         from scipy.linalg import eigvals
 
         return np.asarray(eigvals(self.T), dtype=np.complex128)
 
     @cached_property
-    def zeros(self) -> NDArray[np.complex128]:
+    def zeros(self) -> Complex:
         """Finite zeros of L."""
         from scipy.linalg import eigvals
 
@@ -151,7 +150,7 @@ class SampledLoopGain:
         return int(np.count_nonzero(np.abs(self.poles - 1.0) < _ON_ONE))
 
     @cached_property
-    def corners(self) -> Vector:
+    def corners(self) -> Array:
         """Angles in (0, pi], dense enough to resolve every pole and zero for any delay."""
         places = np.concatenate([self.poles, self.zeros])
         away = np.abs(places - 1.0)
@@ -167,7 +166,7 @@ class SampledLoopGain:
         found = found[(found >= low) & (found <= np.pi)]
         return np.unique(np.append(found, self._peaks(found)))
 
-    def _peaks(self, angle: Vector) -> Vector:
+    def _peaks(self, angle: Array) -> Array:
         """Local maxima of abs(L), each between the neighbours of a largest one of `angle`."""
         sizes = np.abs(self.at(angle))
         highest = 1 + np.flatnonzero((sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:]))
@@ -183,12 +182,12 @@ class SampledLoopGain:
         return 0.5 * (low + high)
 
     @cached_property
-    def angles(self) -> Vector:
+    def angles(self) -> Array:
         """`corners`, and enough angles between them to resolve every turn due to the delay."""
         return self._with_turns(np.full(len(self.corners) - 1, True))
 
     @cached_property
-    def resolved(self) -> Vector:
+    def resolved(self) -> Array:
         """As `angles`, but turns are resolved only where abs(L) may reach one."""
         sizes = np.abs(self.at(self.corners))
         with np.errstate(invalid="ignore"):
@@ -201,7 +200,7 @@ class SampledLoopGain:
             )
             return self._with_turns(~(bound < 1.0))
 
-    def _with_turns(self, chosen: NDArray[np.bool_]) -> Vector:
+    def _with_turns(self, chosen: Mask) -> Array:
         """Divide the `chosen` gaps between corners so that the turns of the delay are resolved."""
         gaps = np.diff(self.corners)
         parts = np.ceil(gaps * (_PER_TURN * (self.whole + 1.0) / np.pi))
@@ -217,12 +216,12 @@ class SampledLoopGain:
         inner = np.repeat(self.corners[:-1], parts) + share * np.repeat(gaps, parts)
         return np.append(inner, self.corners[-1])
 
-    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+    def frequency_response(self, omega: ArrayLike) -> Complex:
         """L at frequencies in rad/s from 0 to pi/sample_time."""
         angle = self._angle(omega)
         return self.at(angle.ravel()).reshape(angle.shape)
 
-    def phase(self, omega: ArrayLike) -> Vector:
+    def phase(self, omega: ArrayLike) -> Array:
         """Argument of L in rad, continuous; with n integrators it starts close to -n pi/2."""
         angle = self._angle(omega)
         every = np.unique(np.append(self.angles, angle[angle > 0.0].ravel()))
@@ -233,7 +232,7 @@ class SampledLoopGain:
             start = expected + math.remainder(turned[0] - expected, 2.0 * np.pi)
         return np.asarray(np.interp(angle, every, turned - turned[0] + start))
 
-    def _angle(self, omega: ArrayLike) -> Vector:
+    def _angle(self, omega: ArrayLike) -> Array:
         given = real_array("omega", omega) * self.sample_time
         # pi/sample_time times sample_time may exceed pi by rounding.
         if given.size and not (given.min() >= 0.0 and given.max() <= np.pi * (1.0 + 1e-12)):

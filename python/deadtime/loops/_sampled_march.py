@@ -22,11 +22,10 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Complex
 from deadtime.loops._sampled_gain import SampledLoopGain
 
-Vector = NDArray[np.float64]
 Gains = Callable[[float], SampledLoopGain]
 
 #: Fraction of the distance to -1 that a step must keep: a larger one makes shorter, safer steps.
@@ -87,12 +86,12 @@ class _Curve:
     """L for one value of the number, at frequencies that resolve it."""
 
     value: float
-    warped: Vector
-    points: NDArray[np.complex128]
+    warped: Array
+    points: Complex
     at_one: float
 
     @property
-    def distance(self) -> Vector:
+    def distance(self) -> Array:
         return np.abs(1.0 + self.points)
 
 
@@ -162,7 +161,7 @@ def first_loss(
     )
 
 
-def _warped(angle: Vector) -> Vector:
+def _warped(angle: Array) -> Array:
     with np.errstate(divide="ignore"):
         return np.asarray(np.tan(0.5 * angle))
 
@@ -176,7 +175,7 @@ def _curve(gains: Gains, value: float) -> _Curve:
     return _Curve(value, _warped(angle) / gain.sample_time, gain.at(angle), at_one)
 
 
-def _refined(gain: SampledLoopGain, angle: Vector, points: NDArray[np.complex128]) -> Vector:
+def _refined(gain: SampledLoopGain, angle: Array, points: Complex) -> Array:
     """Add angles where a pole of the closed loop is close to the circle."""
     distance = np.append(np.inf, np.append(np.abs(1.0 + points), np.inf))
     lowest = (distance[1:-1] <= distance[:-2]) & (distance[1:-1] <= distance[2:])
@@ -249,12 +248,12 @@ def _keeps_count(
     return True
 
 
-def _at(gains: Gains, value: float, warped: Vector) -> NDArray[np.complex128]:
+def _at(gains: Gains, value: float, warped: Array) -> Complex:
     gain = gains(value)
     return gain.at(2.0 * np.arctan(warped * gain.sample_time))
 
 
-def _passes(start: NDArray[np.complex128], end: NDArray[np.complex128], clear: Vector) -> bool:
+def _passes(start: Complex, end: Complex, clear: Array) -> bool:
     """Whether the straight lines from `start` to `end` keep the distance `_CLEAR` to -1."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         way = end - start

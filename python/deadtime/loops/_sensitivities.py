@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
 from deadtime.loops._native import loop_sensitivities
 from deadtime.loops._specification import LoopSpecification
 
-Vector = NDArray[np.float64]
-Slopes = dict[str, Vector]
+Slopes = dict[str, Array]
 
 _STEP = 1e-30
 
@@ -31,11 +31,11 @@ class LoopSlopes(NamedTuple):
     earlier than its measurement the output is.
     """
 
-    row: Vector
-    row_slopes: Vector
-    state_slopes: Vector
-    command_slopes: Vector
-    output_lead_slopes: Vector
+    row: Array
+    row_slopes: Array
+    state_slopes: Array
+    command_slopes: Array
+    output_lead_slopes: Array
 
 
 def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ def output_and_input_slopes(
     loop: LoopSpecification,
     names: Sequence[str],
     initial: tuple[float, float],
-    since: Vector,
+    since: Array,
     run: LoopRun,
 ) -> tuple[Slopes, Slopes]:
     """Slopes of outputs and inputs at times `since` the start, as are those of the run.

@@ -16,11 +16,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.loops._control_loop import ControlLoop
-
-Vector = NDArray[np.float64]
 
 #: Time for which a response must have been in its band to count as settled, in slowest time
 #: constants of the closed loop: more misjudge fewer responses, and take longer simulations.
@@ -32,7 +30,7 @@ def _any(values: Any) -> bool:
     return bool(values.any() if isinstance(values, np.ndarray) else values)
 
 
-def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Vector:
+def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Array:
     """Upper bound in s on 1/abs(root) of plant and controller, except for roots at zero.
 
     1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... (Fujiwara 1916).

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.arrays import Array, Indices, Mask
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import (
@@ -36,9 +37,7 @@ from deadtime.loops._settled import TIME_CONSTANTS, slowest_times
 from deadtime.loops._stability import sampled_grid
 from deadtime.systems import first_duration
 
-Vector = NDArray[np.float64]
-
-_Places: TypeAlias = slice | NDArray[np.intp]
+_Places: TypeAlias = slice | Indices
 
 #: Number of sets that are built and simulated together: more leave the caches, fewer take more
 #: calls.
@@ -125,12 +124,12 @@ class Sweep(ReadOnlyArrays):
     array([ 0.03, 28.74])
     """
 
-    values: dict[str, Vector]
+    values: dict[str, Array]
     shape: tuple[int, ...]
-    time: Vector
+    time: Array
     status: NDArray[np.uint8]
-    metrics: dict[str, Vector]
-    outputs: Vector | None = None
+    metrics: dict[str, Array]
+    outputs: Array | None = None
 
     def __repr__(self) -> str:
         sets = "x".join(map(str, self.shape)) or "1"
@@ -142,7 +141,7 @@ class Sweep(ReadOnlyArrays):
         names = ", ".join(self.values)
         return f"<Sweep: {', '.join([f'{sets} sets over {names}', *counts])}>"
 
-    def __getitem__(self, name: str) -> Vector:
+    def __getitem__(self, name: str) -> Array:
         try:
             return self.metrics[name]
         except KeyError:
@@ -293,7 +292,7 @@ class LoopSets(NamedTuple):
     states: int
     size: int
     #: `LoopModel.entries`.
-    entries: list[float | Vector]
+    entries: list[float | Array]
     amplitude: float
     #: Whether the output is ahead of the time of the native simulation by the delay.
     is_ahead: bool
@@ -304,14 +303,14 @@ class _Sets:
     """The arguments of `sweep`, checked."""
 
     loop: ControlLoop
-    arrays: Mapping[str, Vector]
+    arrays: Mapping[str, Array]
     shape: tuple[int, ...]
     amplitude: float
     settling: float
     rise: tuple[float, float]
     threads: int | None
 
-    def only(self, places: NDArray[np.intp]) -> _Sets:
+    def only(self, places: Indices) -> _Sets:
         """The sets at `places`, as a one-dimensional array of sets."""
         arrays = {
             name: np.broadcast_to(array, self.shape).reshape(-1)[places]
@@ -337,7 +336,7 @@ class _Sets:
             yield place, numbers, sets, report
             done += size
 
-    def outputs(self, times: Vector, progress: Report | None) -> Sweep:
+    def outputs(self, times: Array, progress: Report | None) -> Sweep:
         """Outputs at given times."""
         count = math.prod(self.shape)
         found, status = np.full((count, len(times)), np.nan), np.empty(count, dtype=np.uint8)
@@ -347,7 +346,7 @@ class _Sets:
         outputs = found.reshape(*self.shape, len(times))
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
-    def measured(self, times: Vector, progress: Report | None = None) -> Sweep:
+    def measured(self, times: Array, progress: Report | None = None) -> Sweep:
         """Metrics; sets of which the poles have to tell whether they have settled are _DOUBTFUL."""
         count, span = math.prod(self.shape), float(times[-1] - times[0])
         # One piece of memory, which the next sweep uses again; many would be given back to the
@@ -377,7 +376,7 @@ class _Sets:
         shaped = {name: values.reshape(self.shape) for name, values in metrics.items()}
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), shaped)
 
-    def decided(self, times: Vector, progress: Report | None) -> Sweep:
+    def decided(self, times: Array, progress: Report | None) -> Sweep:
         """Metrics; a doubtful set counts as settled if it was in the band for long enough."""
         found = self.measured(times, progress)
         status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
@@ -398,7 +397,7 @@ class _Sets:
         metrics = {name: array.flatten() for name, array in found.metrics.items()}
         settled, status = metrics["settling_time"], found.status.flatten()
 
-        def run_on(places: NDArray[np.intp], step: float) -> None:
+        def run_on(places: Indices, step: float) -> None:
             longer = self.only(places).measured(np.array([0.0, span * _longer(step)]))
             done = longer.status != SweepStatus.REFUSED
             for name, array in longer.metrics.items():
@@ -431,7 +430,7 @@ class _Sets:
         return self._final(found, np.array([0.0, span * _longer(longest)]), metrics, status)
 
     def _final(
-        self, found: Sweep, times: Vector, metrics: dict[str, Vector], status: NDArray[np.uint8]
+        self, found: Sweep, times: Array, metrics: dict[str, Array], status: NDArray[np.uint8]
     ) -> Sweep:
         """The result: doubtful sets count as unsettled, and these have no settling time."""
         status = status.reshape(self.shape)
@@ -442,7 +441,7 @@ class _Sets:
             shaped["settling_time"] = np.where(unsettled, np.nan, shaped["settling_time"])
         return replace(found, time=times, metrics=shaped, status=status)
 
-    def stay(self, inside: Vector) -> NDArray[np.bool_]:
+    def stay(self, inside: Array) -> Mask:
         """Whether sets that were in their bands for the last seconds `inside` count as settled."""
         if self.loop.is_sampled:
             return np.asarray(inside * self.rates() >= TIME_CONSTANTS)
@@ -454,7 +453,7 @@ class _Sets:
             found[place] = sweep_decay(sets, least[place], threads=self.threads)
         return found
 
-    def rates(self) -> Vector:
+    def rates(self) -> Array:
         """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""
         loop = self.loop
         if loop.is_sampled:
@@ -468,7 +467,7 @@ class _Sets:
         return -found
 
 
-def _is_open(status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def _is_open(status: NDArray[np.uint8]) -> Mask:
     return np.asarray(np.isin(status, (SweepStatus.UNSETTLED, _DOUBTFUL)))
 
 
@@ -486,7 +485,7 @@ def require_loop(loop: object) -> None:
         )
 
 
-def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int, ...]]:
+def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], tuple[int, ...]]:
     if not isinstance(values, Mapping) or not values:
         raise TypeError(f"values={values!r}: give a dict such as {{'Kp': (0.5, 2.5, 5)}}")
     arrays = {name: given_points(name, given) for name, given in values.items()}
@@ -508,7 +507,7 @@ def _sets(values: Mapping[str, ArrayLike]) -> tuple[dict[str, Vector], tuple[int
     return arrays, shape
 
 
-def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
+def _checked(loop: ControlLoop, arrays: Mapping[str, Array]) -> ControlLoop:
     """Set extreme values of each array in the loop, which refuses invalid ones; return the loop."""
     gains = loop.controller.gains
     for name, array in arrays.items():
@@ -527,7 +526,7 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Vector]) -> ControlLoop:
     return loop
 
 
-def _times(time: ArrayLike | None, responses: bool) -> Vector:
+def _times(time: ArrayLike | None, responses: bool) -> Array:
     if time is None:
         raise ValueError("responses need output times: give an array of them as time")
     times = real_array("time", time)
@@ -544,8 +543,8 @@ def _times(time: ArrayLike | None, responses: bool) -> Vector:
 
 
 def _blocks(
-    loop: ControlLoop, flat: Mapping[str, Vector], count: int
-) -> Iterator[tuple[_Places, dict[str, Vector]]]:
+    loop: ControlLoop, flat: Mapping[str, Array], count: int
+) -> Iterator[tuple[_Places, dict[str, Array]]]:
     """Yield places and numbers of at most `_BLOCK` sets that have the same number of states."""
     for first in range(0, count, _BLOCK):
         places = slice(first, min(first + _BLOCK, count))
@@ -570,7 +569,7 @@ def _blocks(
                 yield first + chosen, {name: array[chosen] for name, array in part.items()}
 
 
-def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> float | Vector:
+def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> float | Array:
     """Steady output of every set; NaN if the command it needs exceeds the limit."""
     output, command = rest_of(loop.plant, loop.controller, numbers)
     limit = numbers.get("limit", np.inf)

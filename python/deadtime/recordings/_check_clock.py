@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop, Integrator, P
 from deadtime.recordings._check_command import Command
 from deadtime.recordings._check_rows import Rows
-from deadtime.recordings._findings import Array, Columns, Finding, Severity, seconds
+from deadtime.recordings._findings import Columns, Finding, Severity, seconds
 
 #: Units of time that are mistaken for seconds, by their number in a second.
 UNITS = {1e3: "milliseconds", 1e6: "microseconds"}

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings._check_rows import Rows
-from deadtime.recordings._findings import Array, Columns, Finding, decimal_step, seconds
+from deadtime.recordings._findings import Columns, Finding, decimal_step, seconds
 
 Law: TypeAlias = Literal["exact", "late", "early", "approximate", "differs", "unknown"]
 
@@ -118,7 +118,7 @@ def _noise(output: Array) -> float:
 
 
 def _law_to_rounding(
-    u: Array, clipped: Array, adjacent: NDArray[np.bool_], tolerance: float
+    u: Array, clipped: Array, adjacent: Mask, tolerance: float
 ) -> tuple[Law | None, int]:
     """The law that the command follows to rounding, if any, and by how many rows it is late."""
     inner = 1 + np.flatnonzero(adjacent[:-1] & adjacent[1:])
@@ -137,7 +137,7 @@ def _law_to_rounding(
 
 
 def _law_but_for_noise(
-    u: Array, wanted: Array, adjacent: NDArray[np.bool_], noise: float
+    u: Array, wanted: Array, adjacent: Mask, noise: float
 ) -> tuple[Law, int, Line | None, float]:
     """The law that the command follows but for `noise`, its line, and the rms of the rest."""
     low, high = float(u.min()), float(u.max())

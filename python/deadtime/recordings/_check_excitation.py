@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop, Integrator
 from deadtime.recordings._check_command import Command
-from deadtime.recordings._findings import Array, Columns, Finding
+from deadtime.recordings._findings import Columns, Finding
 
 #: Fewest rows with motion in which a reference can be said to copy the output.
 FEWEST_MOVES = 8

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop, P
-
-Array = NDArray[np.float64]
 
 #: Whether a fit can proceed: as if nothing were, with care, or not at all.
 Severity: TypeAlias = Literal["note", "warning", "refused"]

@@ -25,10 +25,9 @@ from typing import Any, Literal, Protocol, TypeAlias, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.arrays import Array, Complex
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import real_array, unmasked
-
-_Floats: TypeAlias = NDArray[np.float64]
 
 #: Distance from an edge, in degrees of a polynomial, below which a point counts as on it.
 _ON_EDGE = 1e-9
@@ -42,10 +41,10 @@ class Function(Protocol):
     """What the laws of chains take from a quasi-polynomial, and from their difference part."""
 
     @property
-    def coefficients(self) -> _Floats: ...
+    def coefficients(self) -> Array: ...
 
     @property
-    def delays(self) -> _Floats: ...
+    def delays(self) -> Array: ...
 
     def roots(self, *, im: tuple[float, float] | None = None) -> Any: ...
 
@@ -91,7 +90,7 @@ class Chain(ReadOnlyArrays):
     _phase: float = field(repr=False)
     _difference: Function | None = field(default=None, repr=False)
 
-    def real_part(self, im: ArrayLike) -> _Floats:
+    def real_part(self, im: ArrayLike) -> Array:
         """Real part of the law at given heights.
 
         Parameters
@@ -116,7 +115,7 @@ class Chain(ReadOnlyArrays):
     @overload
     def starts(self, n: int) -> complex: ...
     @overload
-    def starts(self, n: ArrayLike) -> NDArray[np.complex128]: ...
+    def starts(self, n: ArrayLike) -> Complex: ...
     def starts(self, n: Any) -> Any:
         """Approximate roots: where Newton's iteration may start.
 
@@ -158,7 +157,7 @@ class Chain(ReadOnlyArrays):
                 s = s - (s + self.bend * np.log(s) - v) / (1.0 + self.bend / s)
         return s if index.ndim else complex(s)
 
-    def _located(self, index: NDArray[np.int64]) -> NDArray[np.complex128]:
+    def _located(self, index: NDArray[np.int64]) -> Complex:
         """Roots of the difference part, by height, above the foot of the chain."""
         assert self._difference is not None
         foot = 0.5 * math.pi * max(self.bend, 0.0)

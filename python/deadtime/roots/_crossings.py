@@ -6,20 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol, SupportsFloat, TypeAlias
+from typing import Any, Protocol, SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
 
 import deadtime.roots._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.validation import Range, interval, numbers_at
 from deadtime.roots._family import HasFamily, family_of
 from deadtime.roots._parametric import ParametricQuasiPolynomial
 from deadtime.roots._quasipolynomial import QuasiPolynomial
-
-_Floats: TypeAlias = NDArray[np.float64]
 
 
 class HasDelayMargin(Protocol):
@@ -60,8 +59,8 @@ class Crossings(ReadOnlyArrays):
 
     parameter: str
     range: tuple[float, float]
-    values: _Floats
-    omega: _Floats
+    values: Array
+    omega: Array
     direction: NDArray[np.int32]
     family: ParametricQuasiPolynomial
     unlisted: tuple[tuple[float, float], ...] = ()

@@ -12,9 +12,9 @@ import operator
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 import deadtime.roots._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.validation import OpenRange, open_interval
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots.certificate._certificate import Certificate
@@ -24,8 +24,6 @@ _NOT_EXACT = (
     "this one does not have"
 )
 
-_Matrix = NDArray[np.float64]
-
 
 class MatrixDeterminant:
     """The determinant of a characteristic matrix that is not expanded."""
@@ -34,8 +32,8 @@ class MatrixDeterminant:
 
     _native: native.CharacteristicMatrix
 
-    def __init__(self, E: _Matrix, N: Mapping[float, _Matrix], A: Mapping[float, _Matrix]) -> None:
-        def listed(group: Mapping[float, _Matrix]) -> list[tuple[float, _Matrix]]:
+    def __init__(self, E: Array, N: Mapping[float, Array], A: Mapping[float, Array]) -> None:
+        def listed(group: Mapping[float, Array]) -> list[tuple[float, Array]]:
             return [(tau, np.ascontiguousarray(matrix)) for tau, matrix in group.items()]
 
         self._native = native.CharacteristicMatrix(np.ascontiguousarray(E), listed(N), listed(A))

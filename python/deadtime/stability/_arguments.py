@@ -7,12 +7,9 @@ import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, SupportsFloat, TypeAlias, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
+from deadtime._base.arrays import Array
 from deadtime._base.validation import Range, finite, interval, points_of
 
-Floats: TypeAlias = NDArray[np.float64]
 Given: TypeAlias = Mapping[str, Sequence[SupportsFloat]]
 
 #: Largest number of parameters with a range: the number of boxes grows exponentially with it.
@@ -27,7 +24,7 @@ def side(name: str, low: float, high: float) -> str:
     return f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}"
 
 
-def sides(axes: Mapping[str, Floats]) -> str:
+def sides(axes: Mapping[str, Array]) -> str:
     """Give the text of the axes of a map."""
     return ", ".join(
         f"{name} {axis[0]:.6g} to {axis[-1]:.6g} ({len(axis)})" for name, axis in axes.items()
@@ -49,7 +46,7 @@ def ranges_of(given: Given) -> dict[str, Range]:
     return ends
 
 
-def map_axes(ranges: Mapping[str, Any], shape: tuple[int, int]) -> dict[str, Floats]:
+def map_axes(ranges: Mapping[str, Any], shape: tuple[int, int]) -> dict[str, Array]:
     """Points of the two axes by their names."""
     if not isinstance(ranges, Mapping):
         raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")

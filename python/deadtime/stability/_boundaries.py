@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.roots import ParametricQuasiPolynomial
-from deadtime.stability._arguments import Floats
 from deadtime.stability._native import MapBoundary
 
 
@@ -36,8 +36,8 @@ class Boundary(ReadOnlyArrays):
     All arrays are read-only.
     """
 
-    values: dict[str, Floats]
-    omega: Floats
+    values: dict[str, Array]
+    omega: Array
     crossing: NDArray[np.int32]
     along: str
 
@@ -56,7 +56,7 @@ class Boundary(ReadOnlyArrays):
 
 def boundaries_of(
     family: ParametricQuasiPolynomial,
-    axes: dict[str, Floats],
+    axes: dict[str, Array],
     decay: float,
     damping: tuple[float, float] | None,
 ) -> tuple[Boundary, ...]:
@@ -71,7 +71,7 @@ def boundaries_of(
 
 
 def boundaries_along(
-    found: Sequence[MapBoundary], axes: Mapping[str, Floats]
+    found: Sequence[MapBoundary], axes: Mapping[str, Array]
 ) -> tuple[Boundary, ...]:
     """Curves with the values of both parameters, longest first."""
     return tuple(

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import deadtime.stability._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
@@ -29,7 +30,7 @@ from deadtime._base.validation import (
     whole_number,
 )
 from deadtime.roots import HasFamily, family_of
-from deadtime.stability._arguments import Floats, Given, ranges_of, side
+from deadtime.stability._arguments import Given, ranges_of, side
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,8 +61,8 @@ class ProvedBoxes(ReadOnlyArrays, Pictured):
 
     names: tuple[str, ...]
     ranges: dict[str, Range]
-    low: Floats
-    high: Floats
+    low: Array
+    high: Array
     unstable: NDArray[np.int32]
     undecided: float
     _tree: dict[str, NDArray[Any]]

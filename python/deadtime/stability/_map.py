@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime._base.extras import library
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.notebook import Pictured
@@ -20,7 +21,7 @@ from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
 from deadtime.loops import ControlLoop, Explorer, HeldFamily, Question, numbers_of
 from deadtime.roots import HasFamily, ParametricQuasiPolynomial, family_of
-from deadtime.stability._arguments import Floats, damping_demand, map_axes, sides
+from deadtime.stability._arguments import damping_demand, map_axes, sides
 from deadtime.stability._boundaries import Boundary, boundaries_along, boundaries_of
 
 if TYPE_CHECKING:
@@ -73,9 +74,9 @@ class StabilityMap(ReadOnlyArrays, Pictured):
     """
 
     names: tuple[str, str]
-    axes: dict[str, Floats]
+    axes: dict[str, Array]
     unstable: NDArray[np.int32]
-    abscissa: Floats
+    abscissa: Array
     status: NDArray[np.uint8]
     decay: float = 0.0
     damping: tuple[float, float] | None = None
@@ -114,7 +115,7 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         return boundaries_of(self.family, self.axes, self.decay, self.damping)
 
     @cached_property
-    def chain_abscissa(self) -> Floats:
+    def chain_abscissa(self) -> Array:
         """Abscissa of the chains of roots in 1/s, shape (n0, n1): -inf without chains.
 
         Chains are judged robustly, as in `QuasiPolynomial.chain_abscissa`.
@@ -126,11 +127,11 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         """
         if self.family is None:
             raise ValueError("the map of a sampled loop has no chains: its poles are finitely many")
-        found: Floats = read_only(self.family._family.chains(self.axes))
+        found: Array = read_only(self.family._family.chains(self.axes))
         return found
 
     @cached_property
-    def strongly_stable(self) -> NDArray[np.bool_]:
+    def strongly_stable(self) -> Mask:
         """Where the chains lie left of ``-decay``, also after small changes of the delays.
 
         Outside this region no gain helps: infinitely many roots are unstable, or arbitrarily small
@@ -146,14 +147,14 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         >>> chart.strongly_stable.tolist()
         [[False, True, True, False]]
         """
-        strong: NDArray[np.bool_] = read_only(self.chain_abscissa < -self.decay)
+        strong: Mask = read_only(self.chain_abscissa < -self.decay)
         return strong
 
     @cached_property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Where no root and no chain of roots is unstable or on the boundary, shape (n0, n1)."""
         known = (self.status == MapStatus.OK) | (self.status == MapStatus.CHAIN)
-        stable: NDArray[np.bool_] = known & (self.unstable == 0)
+        stable: Mask = known & (self.unstable == 0)
         stable &= (self.status != MapStatus.CHAIN) | (self.abscissa < -self.decay)
         stable.flags.writeable = False
         return stable

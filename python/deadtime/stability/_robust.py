@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import deadtime.stability._native as native
+from deadtime._base.arrays import Array, Mask
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, Range, thread_number
 from deadtime.roots import HasFamily, family_of
-from deadtime.stability._arguments import Floats, Given, map_axes, ranges_of, side, sides
+from deadtime.stability._arguments import Given, map_axes, ranges_of, side, sides
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,14 +52,14 @@ class RobustMap(ReadOnlyArrays, Pictured):
     """
 
     names: tuple[str, str]
-    axes: dict[str, Floats]
+    axes: dict[str, Array]
     over: dict[str, Range]
     unstable: NDArray[np.int32]
 
     @cached_property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Where all members are proved stable, shape (n0, n1)."""
-        stable: NDArray[np.bool_] = self.unstable == 0
+        stable: Mask = self.unstable == 0
         stable.flags.writeable = False
         return stable
 

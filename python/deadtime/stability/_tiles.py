@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, SupportsFloat
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import Points, numbers_at, points_of
 from deadtime.roots import HasFamily
-from deadtime.stability._arguments import Floats
 from deadtime.stability._map import StabilityMap, stability_map
 
 
@@ -33,7 +33,7 @@ class Tile(ReadOnlyArrays):
     """
 
     family: HasFamily
-    axes: dict[str, Floats]
+    axes: dict[str, Array]
     at: dict[str, float]
     place: tuple[slice, slice]
 
@@ -70,7 +70,7 @@ class Tiles(ReadOnlyArrays):
     """
 
     family: HasFamily
-    axes: dict[str, Floats]
+    axes: dict[str, Array]
     at: dict[str, float]
     chunks: tuple[tuple[int, ...], tuple[int, ...]]
 

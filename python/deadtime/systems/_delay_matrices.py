@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array, Complex
 from deadtime._base.frozen import equal
 from deadtime._base.validation import non_negative, real_array, unmasked
 
-Matrix = NDArray[np.float64]
 #: One matrix, without delay, or matrices by their delays in s.
 Matrices: TypeAlias = ArrayLike | Mapping[float, ArrayLike]
 
@@ -25,12 +25,12 @@ class DelayMatrices:
 
     __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N")
 
-    _A: dict[float, Matrix]
-    _B: dict[float, Matrix]
-    _C: dict[float, Matrix]
-    _D: dict[float, Matrix]
-    _E: Matrix
-    _N: dict[float, Matrix]
+    _A: dict[float, Array]
+    _B: dict[float, Array]
+    _C: dict[float, Array]
+    _D: dict[float, Array]
+    _E: Array
+    _N: dict[float, Array]
 
     def __init__(
         self,
@@ -85,32 +85,32 @@ class DelayMatrices:
         raise AttributeError(f"a {type(self).__name__} does not change: cannot delete {name!r}")
 
     @property
-    def A(self) -> dict[float, Matrix]:
+    def A(self) -> dict[float, Array]:
         """Matrices on the state by their delays in s; read-only arrays."""
         return dict(self._A)
 
     @property
-    def B(self) -> dict[float, Matrix]:
+    def B(self) -> dict[float, Array]:
         """Matrices on the input by their delays in s."""
         return dict(self._B)
 
     @property
-    def C(self) -> dict[float, Matrix]:
+    def C(self) -> dict[float, Array]:
         """Matrices from state to output by their delays in s."""
         return dict(self._C)
 
     @property
-    def D(self) -> dict[float, Matrix]:
+    def D(self) -> dict[float, Array]:
         """Matrices from input to output by their delays in s."""
         return dict(self._D)
 
     @property
-    def E(self) -> Matrix:
+    def E(self) -> Array:
         """Factor on the derivative of the state, shape (n, n)."""
         return self._E
 
     @property
-    def N(self) -> dict[float, Matrix]:
+    def N(self) -> dict[float, Array]:
         """Factors on earlier derivatives by their delays in s."""
         return dict(self._N)
 
@@ -131,7 +131,7 @@ class DelayMatrices:
         return len(next(iter(self._C.values()))) if self._C else 0
 
     @property
-    def delays(self) -> NDArray[np.float64]:
+    def delays(self) -> Array:
         """Every delay above zero, in s, ascending."""
         groups = (self._A, self._B, self._C, self._D, self._N)
         return np.array(sorted({tau for group in groups for tau in group} - {0.0}))
@@ -155,7 +155,7 @@ class DelayMatrices:
             f"{self.n_outputs} outputs{delays}>"
         )
 
-    def characteristic_matrix(self, s: ArrayLike) -> NDArray[np.complex128]:
+    def characteristic_matrix(self, s: ArrayLike) -> Complex:
         """Value of M(s) = s E + sum (s N_j - A_j) exp(-s tau_j).
 
         Parameters
@@ -179,7 +179,7 @@ class DelayMatrices:
         late = _sum_at(self._N, points, shape) + self._E
         return points[..., None, None] * late - _sum_at(self._A, points, shape)
 
-    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+    def frequency_response(self, omega: ArrayLike) -> Complex:
         """Response to sinusoidal inputs, C M^{-1} B + D at s = j omega.
 
         Solved with the matrices as they are, for any number of states.
@@ -225,17 +225,17 @@ class DelayMatrices:
         return range(self.n_states)
 
 
-def _by_delay(name: str, given: Matrices) -> dict[float, Matrix]:
+def _by_delay(name: str, given: Matrices) -> dict[float, Array]:
     """Matrices sorted by delay, frozen."""
     pairs = given.items() if isinstance(given, Mapping) else [(0.0, given)]
-    found: dict[float, Matrix] = {}
+    found: dict[float, Array] = {}
     for tau, matrix in pairs:
         time = non_negative(f"delay of {name}", tau) + 0.0
         found[time] = _matrix(name, matrix)
     return dict(sorted(found.items()))
 
 
-def _matrix(name: str, given: ArrayLike) -> Matrix:
+def _matrix(name: str, given: ArrayLike) -> Array:
     matrix = real_array(name, given)
     if matrix.ndim == 0:
         matrix = matrix.reshape(1, 1)
@@ -248,9 +248,7 @@ def _matrix(name: str, given: ArrayLike) -> Matrix:
     return matrix
 
 
-def _sum_at(
-    group: Mapping[float, Matrix], points: NDArray[np.complex128], shape: tuple[int, ...]
-) -> NDArray[np.complex128]:
+def _sum_at(group: Mapping[float, Array], points: Complex, shape: tuple[int, ...]) -> Complex:
     total = np.zeros(shape, dtype=np.complex128)
     for tau, matrix in group.items():
         total += np.exp(-points * tau)[..., None, None] * matrix

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import OpenRange
 from deadtime.roots import (
     LARGEST,
@@ -31,7 +32,7 @@ from deadtime.roots import (
     family_of,
     margin_of_family,
 )
-from deadtime.systems._delay_matrices import DelayMatrices, Matrices, Matrix
+from deadtime.systems._delay_matrices import DelayMatrices, Matrices
 from deadtime.systems._margins import Margins
 from deadtime.systems._poles import HasPoles
 from deadtime.systems._realisation import Realisable, Realisation, of_matrices
@@ -279,7 +280,7 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         i, j = self._pair(output, input)
         n = self.n_states
 
-        def bordered(corner: Matrix | None, groups: Any, tau: float) -> Matrix:
+        def bordered(corner: Array | None, groups: Any, tau: float) -> Array:
             matrix = np.zeros((n + 1, n + 1))
             if corner is not None:
                 matrix[:n, :n] = corner
@@ -363,7 +364,7 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
             )
         return _Differentiated(self)
 
-    def _gains_at_rest(self) -> Matrix | None:
+    def _gains_at_rest(self) -> Array | None:
         try:
             return self.frequency_response(0.0).real
         except np.linalg.LinAlgError:
@@ -421,7 +422,7 @@ class _Differentiated:
     def _realised(self) -> Realisation:
         return self.system._realise(differentiated=True)
 
-    def _gains_at_rest(self) -> Matrix | None:
+    def _gains_at_rest(self) -> Array | None:
         """Zero where the system comes to rest."""
         gains = self.system._gains_at_rest()
         return None if gains is None else 0.0 * gains
@@ -433,6 +434,6 @@ def _restored(*parts: Any) -> DelaySystem:
 
 
 def _part(
-    group: Mapping[float, Matrix], i: int, j: int, sign: float = 1.0
+    group: Mapping[float, Array], i: int, j: int, sign: float = 1.0
 ) -> dict[tuple[int, float], float]:
     return {(0, t): sign * float(m[i, j]) for t, m in group.items() if m[i, j] != 0.0}

@@ -17,11 +17,9 @@ from math import factorial
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.roots import QuasiPolynomial, expanded
-
-Vector = NDArray[np.float64]
 
 # Upper limit on the order of a Padé approximant: the coefficients of higher ones differ so much in
 # size that polynomials in double precision lose their digits.
@@ -36,7 +34,7 @@ def control_package() -> Any:
         raise ImportError("this needs python-control: pip install control") from error
 
 
-def polynomials_of_control(system: Any) -> tuple[Vector, Vector]:
+def polynomials_of_control(system: Any) -> tuple[Array, Array]:
     """Numerator and denominator, descending, of a continuous system with one input and output."""
     control = control_package()
     if not isinstance(system, (control.TransferFunction, control.StateSpace)):
@@ -58,7 +56,7 @@ def polynomials_of_control(system: Any) -> tuple[Vector, Vector]:
     return _numbers(system.num[0][0]), _numbers(system.den[0][0])
 
 
-def polynomials_of_scipy(system: Any) -> tuple[Vector, Vector]:
+def polynomials_of_scipy(system: Any) -> tuple[Array, Array]:
     """Numerator and denominator, descending, of an `lti` or a tuple that makes one."""
     from scipy import signal
 
@@ -86,7 +84,7 @@ def polynomials_of_scipy(system: Any) -> tuple[Vector, Vector]:
     return _numbers(np.ravel(transfer.num)), _numbers(transfer.den)
 
 
-def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Vector, Vector]:
+def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Array, Array]:
     """Expand both determinants exactly, because rounding could leave a wrong degree."""
     a, b, c, d = (_numbers(matrix) for matrix in (A, B, C, D))
     n = len(a)
@@ -100,16 +98,14 @@ def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Vector, Vector]:
     return num.coefficients[0, ::-1].copy(), den.coefficients[0, ::-1].copy()
 
 
-def _numbers(coefficients: Any) -> Vector:
+def _numbers(coefficients: Any) -> Array:
     array = np.asarray(coefficients)
     if np.iscomplexobj(array):
         raise TypeError("the coefficients are complex: real ones are needed")
     return array.astype(np.float64)
 
 
-def rational(
-    num: QuasiPolynomial, den: QuasiPolynomial, order: int | None
-) -> tuple[Vector, Vector]:
+def rational(num: QuasiPolynomial, den: QuasiPolynomial, order: int | None) -> tuple[Array, Array]:
     """Descending coefficients of num/den, its delays replaced by Padé approximants of `order`."""
     delays = sorted({float(t) for h in (num, den) for t in h.delays} - {0.0})
     if not delays:
@@ -138,7 +134,7 @@ def rational(
     below = {t: size * t**powers for t in delays}
     above = {t: size * (-t) ** powers for t in delays}
 
-    def without_delays(h: QuasiPolynomial) -> Vector:
+    def without_delays(h: QuasiPolynomial) -> Array:
         """Multiply h by the denominators of all approximants."""
         total = np.zeros(1)
         for row, tau in zip(h.coefficients, h.delays, strict=True):

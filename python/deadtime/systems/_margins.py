@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-import numpy as np
-from numpy.typing import NDArray
-
 import deadtime.systems._native as native
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems._native import loop_margins
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,11 +67,11 @@ class Margins(ReadOnlyArrays):
     gain_reduction_omega: float
     phase_margin_omega: float
     delay_margin_omega: float
-    gain_crossovers: Vector
-    phase_margins: Vector
-    delay_margins: Vector
-    phase_crossovers: Vector
-    gain_margins: Vector
+    gain_crossovers: Array
+    phase_margins: Array
+    delay_margins: Array
+    phase_crossovers: Array
+    gain_margins: Array
     searched: tuple[float, float]
 
     def _delay_margin(self) -> float:

@@ -9,8 +9,8 @@ from operator import attrgetter, methodcaller
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import finite, positive, real_array
@@ -19,8 +19,6 @@ from deadtime.systems._step_metrics import OneSignal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-
-Vector = NDArray[np.float64]
 
 # The default time of a step response is _SHORTEST times the longest of all time constants, delays
 # and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _TIMES
@@ -45,7 +43,7 @@ PARTS = frozenset(("time", "outputs", "inputs", "breaks", "reference"))
 class KeptRun(Protocol):
     """A run that gives parts of its response when they are read."""
 
-    def __call__(self, times: Vector) -> Vector:
+    def __call__(self, times: Array) -> Array:
         """Outputs at other times."""
         ...
 
@@ -100,17 +98,17 @@ class Response(ReadOnlyArrays, Pictured):
     [0.         0.1834     0.77112888]
     """
 
-    time: Vector
-    outputs: Vector
-    inputs: Vector
-    breaks: Vector
-    reference: Vector | None = None
-    states: Vector | None = None
-    steady_state: float | Vector | None = None
-    sensitivities: dict[str, Vector] = field(default_factory=dict)
-    input_sensitivities: dict[str, Vector] = field(default_factory=dict)
+    time: Array
+    outputs: Array
+    inputs: Array
+    breaks: Array
+    reference: Array | None = None
+    states: Array | None = None
+    steady_state: float | Array | None = None
+    sensitivities: dict[str, Array] = field(default_factory=dict)
+    input_sensitivities: dict[str, Array] = field(default_factory=dict)
     #: Outputs at other times of the same run.
-    _dense: Callable[[Vector], Vector] | None = None
+    _dense: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "outputs", "inputs", "breaks", "reference", "states"):
@@ -133,7 +131,7 @@ class Response(ReadOnlyArrays, Pictured):
             f"{self.time[-1]:g} s{rests}>"
         )
 
-    def __iter__(self) -> Iterator[Vector]:
+    def __iter__(self) -> Iterator[Array]:
         yield self.time
         yield self.outputs
 
@@ -279,14 +277,14 @@ def response_of(run: KeptRun) -> Response:
     return response
 
 
-def first_duration(A: NDArray[np.float64], delay: float) -> float:
+def first_duration(A: Array, delay: float) -> float:
     """First duration of a step response in s, by its longest delay and its slowest pole."""
     slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(A) if abs(pole) > 0.0]
     duration: float = _SHORTEST * max([delay, *slowest, _LEAST])
     return duration
 
 
-def until_settled(run: Callable[[Vector], Response], A: Vector, delay: float) -> Response:
+def until_settled(run: Callable[[Array], Response], A: Array, delay: float) -> Response:
     """Response of `run` at times that go on until it has settled, found by doubling the last."""
     span = first_duration(A, delay)
     for _ in range(_DOUBLINGS):

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import deadtime.systems._signals as signals
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, increasing, positive, real_array
 from deadtime.systems._native import Signal
 from deadtime.systems._realisation import Differentiable, Realisable, Realisation
 from deadtime.systems._response import Response, until_settled
 
-Vector = NDArray[np.float64]
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
 
 
@@ -31,19 +31,19 @@ class _Run:
     start: float
     arguments: dict[str, Any]
 
-    def __call__(self, times: Vector) -> Vector:
+    def __call__(self, times: Array) -> Array:
         inner = times[times > self.start]
         response = respond(self.system, np.concatenate([[self.start], inner]), **self.arguments)
         outputs = np.atleast_2d(response.outputs)
         return outputs if len(inner) < len(times) else outputs[:, 1:]
 
 
-def _rest(system: Realisable, inputs: Vector | None) -> Vector | None:
+def _rest(system: Realisable, inputs: Array | None) -> Array | None:
     """Steady outputs under constant inputs; None if there are none."""
     gains = None if inputs is None else system._gains_at_rest()
     if gains is None or inputs is None or not np.isfinite(gains).all():
         return None
-    rest: Vector = gains @ inputs
+    rest: Array = gains @ inputs
     return rest
 
 
@@ -164,14 +164,14 @@ def _is_sampled(inputs: Given, model: Realisation) -> bool:
 
 def _input(
     model: Realisation,
-    times: Vector,
+    times: Array,
     inputs: Given,
     interpolation: str,
     input_time: ArrayLike | None,
-    before: Vector,
+    before: Array,
     breaks: tuple[float, ...],
     smooth: dict[str, Any],
-) -> tuple[Signal, Vector | None]:
+) -> tuple[Signal, Array | None]:
     """Give the native inputs, and their last values if these stay constant."""
     start, p = smooth["start"], model.inputs
     if interpolation not in ("hold", "linear"):
@@ -216,7 +216,7 @@ def _past(
     derivative: Callable[..., ArrayLike] | None,
     breaks: tuple[float, ...],
     smooth: dict[str, Any],
-) -> tuple[Signal, Signal | None, Vector]:
+) -> tuple[Signal, Signal | None, Array]:
     """Give the native history, its derivative if needed, and the state at the start."""
     if not callable(history):
         if derivative is not None:
@@ -239,7 +239,7 @@ def _past(
     return found.signal(), None if slopes is None else slopes.signal(), state
 
 
-def _vector(name: str, given: ArrayLike, width: int, what: str = "inputs") -> Vector:
+def _vector(name: str, given: ArrayLike, width: int, what: str = "inputs") -> Array:
     """Check a constant: a vector; a number if it is zero or there is only one component."""
     values = real_array(name, given)
     if values.ndim == 0 and (width == 1 or not values):

@@ -11,14 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import real_array
 from deadtime.systems._native import Signal
 from deadtime.systems._signals_fit import RESOLUTION, pieces
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _FOREVER = float("inf")
 
@@ -26,8 +24,8 @@ _FOREVER = float("inf")
 class Fitted(NamedTuple):
     """A fitted callable: coefficient k of component i in piece j at ``series[j, i, k]``."""
 
-    edges: Vector
-    series: NDArray[np.float64]
+    edges: Array
+    series: Array
     breaks: list[int]
 
     def derivative(self) -> Fitted:
@@ -41,7 +39,7 @@ class Fitted(NamedTuple):
         """Give the native form, defined only within the pieces."""
         return Signal(self.edges, np.ascontiguousarray(self.series), self.breaks)
 
-    def input_signal(self, before: Vector) -> Signal:
+    def input_signal(self, before: Array) -> Signal:
         """Give the native form, constant at `before` before the pieces and constant after them."""
         edges = np.concatenate([[-_FOREVER], self.edges, [_FOREVER]])
         outer = np.zeros((2, *self.series.shape[1:]))
@@ -51,18 +49,18 @@ class Fitted(NamedTuple):
         return Signal(edges, series, [1, *(place + 1 for place in self.breaks)])
 
 
-def constant(values: Vector) -> Signal:
+def constant(values: Array) -> Signal:
     """Give the signal with constant `values`, shape (p,)."""
     return Signal(np.array([-_FOREVER, _FOREVER]), values.reshape(1, -1, 1), [])
 
 
-def step(before: Vector, after: Vector) -> Signal:
+def step(before: Array, after: Array) -> Signal:
     """Give a step at the start from `before` to `after`, both of shape (p,)."""
     series = np.stack([before, after])[:, :, None]
     return Signal(np.array([-_FOREVER, 0.0, _FOREVER]), series, [1])
 
 
-def held(times: Vector, values: Matrix, before: Vector) -> Signal:
+def held(times: Array, values: Array, before: Array) -> Signal:
     """Give a signal that holds each of `values`, shape (p, m), from its time on."""
     edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
     series = np.concatenate([before[:, None], values], axis=1).T[:, :, None]
@@ -76,7 +74,7 @@ def held(times: Vector, values: Matrix, before: Vector) -> Signal:
     )
 
 
-def lines(times: Vector, values: Matrix, before: Vector) -> Signal:
+def lines(times: Array, values: Array, before: Array) -> Signal:
     """Interpolate values, shape (p, m), at `times` linearly; the last one is held."""
     edges = np.concatenate([[-_FOREVER], times, [_FOREVER]])
     series = np.zeros((len(times) + 1, len(values), 2))
@@ -88,8 +86,8 @@ def lines(times: Vector, values: Matrix, before: Vector) -> Signal:
 
 
 def sampled(
-    name: str, function: Callable[..., ArrayLike], times: Vector, width: int, vectorized: bool
-) -> Matrix:
+    name: str, function: Callable[..., ArrayLike], times: Array, width: int, vectorized: bool
+) -> Array:
     """Evaluate a callable at `times` and check the values, shape (width, m)."""
     found: Any = function(times) if vectorized else [function(float(t)) for t in times]
     values = real_array(f"the value of {name}", found)
@@ -124,7 +122,7 @@ def fitted(
 ) -> Fitted:
     """Fit a callable over `span` between its breaks, with times counted from `start`."""
 
-    def sample(times: Vector) -> Matrix:
+    def sample(times: Array) -> Array:
         return sampled(name, function, times, width, vectorized)
 
     gap = RESOLUTION * (span[1] - span[0]) if max_step is None else max_step

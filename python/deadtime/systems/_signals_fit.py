@@ -18,13 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.systems._native import legendre_tables
 
-Vector = NDArray[np.float64]
-Blocks = NDArray[np.float64]
-Sampler = Callable[[Vector], NDArray[np.float64]]
+Sampler = Callable[[Array], Array]
 
 #: Shortest event of a callable that the even samples do not miss, as a fraction of the span: a
 #: smaller one finds more events and calls the function more often.
@@ -68,17 +66,17 @@ _MOST_SAMPLES = 1_000_000
 class Pieces(NamedTuple):
     """Coefficient k of component i in piece j at ``series[j, i, k]``; pieces after a break."""
 
-    edges: Vector
-    series: Blocks
+    edges: Array
+    series: Array
     breaks: list[int]
 
 
 class _Known(NamedTuple):
     """Even samples, the largest modulus of each component, and the shortest interval to halve."""
 
-    times: Vector
-    values: NDArray[np.float64]
-    scale: Vector
+    times: Array
+    values: Array
+    scale: Array
     shortest: float
 
 
@@ -131,13 +129,13 @@ def _known(sample: Sampler, corners: list[float], gap: float) -> _Known:
 
 def _divided(
     name: str, sample: Sampler, corners: list[float], known: _Known
-) -> tuple[tuple[Vector, Blocks], NDArray[np.float64]]:
+) -> tuple[tuple[Array, Array], Array]:
     """Edges and series of the pieces, and intervals, shape (m, 2), that no series can fit."""
     waiting = np.array(list(pairwise(corners)))
     scale = known.scale
-    done: list[NDArray[np.float64]] = []
-    series: list[Blocks] = []
-    rough: list[NDArray[np.float64]] = []
+    done: list[Array] = []
+    series: list[Array] = []
+    rough: list[Array] = []
     count = 0
     while len(waiting):
         a, b = waiting.T
@@ -168,7 +166,7 @@ def _divided(
     return (edges, np.concatenate(series)[order]), np.concatenate(rough)
 
 
-def _values(sample: Sampler, a: Vector, b: Vector) -> tuple[Blocks, tuple[Vector, Blocks]]:
+def _values(sample: Sampler, a: Array, b: Array) -> tuple[Array, tuple[Array, Array]]:
     """Values at the nodes, shape (m, width, node); points close to the ends and values there."""
     half, middle = 0.5 * (b - a), 0.5 * (a + b)
     inset = np.minimum(_INSET * np.maximum(np.abs(a), np.abs(b)), 0.25 * (b - a))
@@ -181,7 +179,7 @@ def _values(sample: Sampler, a: Vector, b: Vector) -> tuple[Blocks, tuple[Vector
     return np.ascontiguousarray(values[:, :, :-2]), (places, values[:, :, -2:])
 
 
-def _blur(values: Blocks, a: Vector, b: Vector) -> NDArray[np.float64]:
+def _blur(values: Array, a: Array, b: Array) -> Array:
     """Effect of rounding of the time on the values of each piece."""
     gaps = 0.5 * np.outer(b - a, np.diff(_NODES))
     rates = (np.abs(np.diff(values, axis=2)) / gaps[:, None, :]).max(axis=2)
@@ -190,17 +188,17 @@ def _blur(values: Blocks, a: Vector, b: Vector) -> NDArray[np.float64]:
 
 
 def _reproduces(
-    series: Blocks,
-    spans: NDArray[np.float64],
-    allowed: NDArray[np.float64],
-    ends: tuple[Vector, Blocks],
+    series: Array,
+    spans: Array,
+    allowed: Array,
+    ends: tuple[Array, Array],
     known: _Known,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Whether each series reproduces the known values: those close to the ends and the samples."""
     places, values = ends
     table = legendre.legvander(places, _TERMS - 1)
     off = np.abs(np.einsum("mek,mwk->mwe", table, series) - values).max(axis=2)
-    good: NDArray[np.bool_] = (off <= _OFF * allowed).all(axis=1)
+    good: Mask = (off <= _OFF * allowed).all(axis=1)
     order = np.argsort(spans[:, 0])
     owner = order[np.searchsorted(spans[order, 0], known.times, side="right") - 1]
     left, right = spans[owner].T
@@ -213,9 +211,7 @@ def _reproduces(
     return good
 
 
-def _jumps(
-    name: str, sample: Sampler, rough: NDArray[np.float64], known: _Known
-) -> NDArray[np.float64]:
+def _jumps(name: str, sample: Sampler, rough: Array, known: _Known) -> Array:
     """First times after the jumps in these intervals; a kink is refused."""
     if len(rough) > _MOST_BREAKS:
         raise ValueError(_not_smooth(name, float(rough[0, 1])))

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from deadtime._base.arrays import Array, Mask
 
 # Points in one magnification around an extremum or a crossing, and how often to magnify: the
 # place is then known to 1e-8 of the output step, the height of a peak to rounding.
@@ -20,10 +19,10 @@ _MAGNIFICATIONS = 4
 class OneSignal:
     """One output over time."""
 
-    time: Vector
-    values: Vector
+    time: Array
+    values: Array
     #: The same output at other times.
-    dense: Callable[[Vector], Vector] | None
+    dense: Callable[[Array], Array] | None
 
     def step_metrics(
         self, settling: float, rise: tuple[float, float], steady_state: float | None
@@ -47,7 +46,7 @@ class OneSignal:
         if span == 0.0:
             return found
 
-        def progress(outputs: Vector) -> Vector:
+        def progress(outputs: Array) -> Array:
             return (outputs - first) / span
 
         found["overshoot"] = 100.0 * max(0.0, self._greatest(progress)[1] - 1.0)
@@ -69,7 +68,7 @@ class OneSignal:
             )
         return found
 
-    def _greatest(self, measure: Callable[[Vector], Vector], first: int = 0) -> tuple[float, float]:
+    def _greatest(self, measure: Callable[[Array], Array], first: int = 0) -> tuple[float, float]:
         """Time and value of the greatest `measure` of the output, from index `first` on."""
         values = measure(self.values[first:])
         best = int(np.argmax(values)) + first
@@ -88,11 +87,11 @@ class OneSignal:
         return time, value
 
     @staticmethod
-    def _crossing(reached: NDArray[np.bool_]) -> int | None:
+    def _crossing(reached: Mask) -> int | None:
         """Index of the first output for which `reached` holds."""
         return int(np.argmax(reached)) if reached.any() else None
 
-    def _refined(self, index: int, reached: Callable[[Vector], NDArray[np.bool_]]) -> float:
+    def _refined(self, index: int, reached: Callable[[Array], Mask]) -> float:
         """Return the time between outputs `index` - 1 and `index` from which `reached` holds."""
         right = float(self.time[index])
         if index == 0 or self.dense is None:

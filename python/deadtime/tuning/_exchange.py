@@ -23,11 +23,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop
 from deadtime.stability import proved_boxes
 from deadtime.tuning._margins import MARGINS, UNITS, RequiredMargins, exact_margins
 from deadtime.tuning._objectives import NEVER, Objective
-from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._problem import Problem, Scenario
 from deadtime.tuning._search import Search
 from deadtime.tuning._survey import surveyed
 
@@ -63,14 +64,14 @@ _BOXES = 20_000
 class Found:
     """Gains, the scenarios they are best for, and their cost in the worst of all scenarios."""
 
-    gains: Vector
+    gains: Array
     scenarios: tuple[Scenario, ...]
     cost: float
     worst: Scenario
     checked: int
 
 
-def best_gains(search: Search, start: Vector | None = None) -> Found:
+def best_gains(search: Search, start: Array | None = None) -> Found:
     """The best gains in the worst scenario of all, from the map or from around a start."""
     problem, objective, required = search.problem, search.objective, search.required
     scenarios = list(problem.corners)
@@ -118,18 +119,18 @@ def best_gains(search: Search, start: Vector | None = None) -> Found:
     return replace(best, scenarios=tuple(scenarios))
 
 
-def _missing(required: RequiredMargins, each: Vector) -> Vector:
+def _missing(required: RequiredMargins, each: Array) -> Array:
     """What margins (scenarios, 3) miss of the requirements at their least."""
     missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
     return np.where(required.vector > 0.0, missing, 0.0)
 
 
-def least_margins(each: Vector) -> Vector:
+def least_margins(each: Array) -> Array:
     """Least of margins (scenarios, 3); none at all where a scenario is not stable."""
     return np.asarray(np.where(np.isnan(each), 0.0, each).min(axis=0))
 
 
-def _unmet(search: Search, required: RequiredMargins, gains: Vector) -> ValueError:
+def _unmet(search: Search, required: RequiredMargins, gains: Array) -> ValueError:
     """The error that names the requirements that are not met, and what is possible."""
     problem, scenarios = search.problem, search.scenarios
     points = search.survey.points[search.survey.stable]
@@ -166,7 +167,7 @@ def fine(problem: Problem) -> tuple[Scenario, ...]:
     return problem.scenarios(_FINE.get(_unknown(problem), 1))
 
 
-def margin_places(search: Search, gains: Vector) -> tuple[Scenario, ...]:
+def margin_places(search: Search, gains: Array) -> tuple[Scenario, ...]:
     """Those its exact margins are computed in: of a region the points with the least estimates."""
     problem = search.problem
     if problem.region is None:
@@ -182,7 +183,7 @@ def _unknown(problem: Problem) -> int:
 
 
 def worst_scenario(
-    problem: Problem, objective: Objective, gains: Vector, scenarios: Sequence[Scenario]
+    problem: Problem, objective: Objective, gains: Array, scenarios: Sequence[Scenario]
 ) -> tuple[float, Scenario]:
     """Cost of gains in the worst scenario, which may lie between those given, and that scenario."""
     from scipy.optimize import minimize_scalar
@@ -205,7 +206,7 @@ def worst_scenario(
     return least, worst
 
 
-def proved(problem: Problem, gains: Vector, required: RequiredMargins) -> tuple[str, ...]:
+def proved(problem: Problem, gains: Array, required: RequiredMargins) -> tuple[str, ...]:
     """What of ``stable``, ``gain_margin``, ``delay_margin`` is proved for all of the intervals."""
     if problem.loop.is_sampled or problem.region is not None:
         return ()

@@ -24,13 +24,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._exchange import best_gains, fine
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import MarginEstimate, RequiredMargins
 from deadtime.tuning._objectives import Objective, objective_named
-from deadtime.tuning._problem import ObjectiveName, Problem, Vector, controller_template, pose
+from deadtime.tuning._problem import ObjectiveName, Problem, controller_template, pose
 from deadtime.tuning._result import Design, FilterChoice
 from deadtime.tuning._search import Search
 from deadtime.tuning._survey import Survey, surveyed
@@ -217,7 +218,7 @@ class _Tried(NamedTuple):
 
     value: float
     noise_gain: float
-    gains: Vector
+    gains: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +236,7 @@ class _Task:
         """The problem with one corner of the filter."""
         return self.problem.filtered(DerivativeFilter(corner, self.damping))
 
-    def tried(self, corner: float, start: Vector) -> _Tried:
+    def tried(self, corner: float, start: Array) -> _Tried:
         """Design with one corner from the gains of another; NaN where none meet the margins."""
         problem = self.at(corner)
         alone = len(start) == 1
@@ -252,7 +253,7 @@ class _Task:
         return _Tried(value, noise_gain(problem.at(found.gains), self.bandwidth), found.gains)
 
 
-def _corners(problem: Problem, omegas: ArrayLike | None) -> Vector:
+def _corners(problem: Problem, omegas: ArrayLike | None) -> Array:
     if omegas is not None:
         corners = np.array(increasing("omegas", omegas))
         if corners.size < 2 or corners[0] <= 0.0:
@@ -280,7 +281,7 @@ def _bandwidth(loop: ControlLoop, bandwidth: float | None, fastest: float) -> fl
 
 
 def _slowest(
-    task: _Task, corners: Vector, tried: Sequence[_Tried], ideal: Design, loss: float
+    task: _Task, corners: Array, tried: Sequence[_Tried], ideal: Design, loss: float
 ) -> float:
     """The slowest corner that loses no more, between the corners tried too."""
     lost = [task.objective.lost(one.value, ideal.value) for one in tried]
@@ -302,7 +303,7 @@ def _slowest(
     )
 
 
-def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float) -> float:
+def _fastest(task: _Task, corners: Array, tried: Sequence[_Tried], most: float) -> float:
     """The fastest corner with no more noise, between the corners tried too."""
     kept = [i for i, one in enumerate(tried) if one.noise_gain <= most]
     if not kept:
@@ -319,7 +320,7 @@ def _fastest(task: _Task, corners: Vector, tried: Sequence[_Tried], most: float)
     )
 
 
-def _towards(corners: Vector, place: int, step: int, keeps: Callable[[float], bool]) -> float:
+def _towards(corners: Array, place: int, step: int, keeps: Callable[[float], bool]) -> float:
     """The corner that still keeps to the rule, halving the way to the neighbour that does not."""
     if not 0 <= place + step < len(corners):
         return float(corners[place])

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Complex
 from deadtime._base.validation import finite, positive
-from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._problem import Problem, Scenario
 
 #: Names of the margins, in the order of every array of them, and their units.
 MARGINS = ("gain_margin", "phase_margin", "delay_margin")
@@ -71,7 +71,7 @@ class RequiredMargins(NamedTuple):
         return {name: value for name, value in self._asdict().items() if value > 0.0}
 
     @property
-    def vector(self) -> Vector:
+    def vector(self) -> Array:
         return np.array(self)
 
     def without(self, name: str) -> RequiredMargins:
@@ -82,11 +82,11 @@ class RequiredMargins(NamedTuple):
         """All requirements multiplied by a factor."""
         return RequiredMargins(*(factor * self.vector).tolist())
 
-    def raised(self, missing: Vector) -> RequiredMargins:
+    def raised(self, missing: Array) -> RequiredMargins:
         """Each requirement raised by what is missing, and a little more."""
         return RequiredMargins(*(self.vector + _RAISED * missing).tolist())
 
-    def shortfall(self, margins: Vector) -> Vector:
+    def shortfall(self, margins: Array) -> Array:
         """Sum of the relative shortfalls of margins (..., 3); 1 for a margin that is NaN."""
         required = self.vector
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,10 +97,10 @@ class RequiredMargins(NamedTuple):
 
 def exact_margins(
     problem: Problem,
-    gains: Vector,
+    gains: Array,
     scenarios: Sequence[Scenario],
     required: RequiredMargins | None = None,
-) -> Vector:
+) -> Array:
     """Gain, phase and delay margin in each scenario, shape (scenarios, 3).
 
     With `required` the delay margin, which takes most of the time, may be NaN where it is not.
@@ -116,9 +116,9 @@ class MarginEstimate:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._omega = _frequencies(problem)
-        self._kept: dict[tuple[float, ...], NDArray[np.complex128]] = {}
+        self._kept: dict[tuple[float, ...], Complex] = {}
 
-    def of(self, points: Vector, scenarios: Sequence[Scenario], stride: int = 1) -> Vector:
+    def of(self, points: Array, scenarios: Sequence[Scenario], stride: int = 1) -> Array:
         """Margins of each row of gains at their least over the scenarios, shape (n, 3).
 
         Only one in `stride` frequencies is used.
@@ -135,7 +135,7 @@ class MarginEstimate:
                 found[part] = np.minimum(found[part], least)
         return found
 
-    def _gains(self, points: Vector) -> Vector:
+    def _gains(self, points: Array) -> Array:
         """All gains of the controller, free and fixed, one row a loop."""
         gains = self._problem.loop.controller.gains
         columns = [
@@ -146,7 +146,7 @@ class MarginEstimate:
         ]
         return np.column_stack(columns)
 
-    def _responses(self, scenario: Scenario) -> NDArray[np.complex128]:
+    def _responses(self, scenario: Scenario) -> Complex:
         """L_i: the loop gain with one gain of one and the others zero."""
         key = tuple(scenario.values())
         if key not in self._kept:
@@ -162,7 +162,7 @@ class MarginEstimate:
         return self._kept[key]
 
 
-def _frequencies(problem: Problem) -> Vector:
+def _frequencies(problem: Problem) -> Array:
     """From far below any crossover to beyond a few turns of the delay, or half the samples."""
     loop = problem.loop
     numbers = loop.parameters
@@ -181,7 +181,7 @@ def _frequencies(problem: Problem) -> Vector:
     return np.unique(np.concatenate([np.geomspace(low, high, _FREQUENCIES), even]))
 
 
-def _margins(L: NDArray[np.complex128], omega: Vector, sampled: bool) -> Vector:
+def _margins(L: Complex, omega: Array, sampled: bool) -> Array:
     """Gain, phase and delay margin of each row, crossings by straight lines in between."""
     size, angle = np.log(np.abs(L)), np.angle(-L)
     grown, turned = np.diff(size, axis=1), np.diff(angle, axis=1)

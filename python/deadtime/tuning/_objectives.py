@@ -22,8 +22,9 @@ from typing import get_args
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop, rest_of, sweep
-from deadtime.tuning._problem import ObjectiveName, Problem, Scenario, Vector
+from deadtime.tuning._problem import ObjectiveName, Problem, Scenario
 from deadtime.tuning._settling import BAND, proved_step
 
 #: Cost of a loop that is unstable or does not settle: above every other cost.
@@ -61,22 +62,22 @@ class Objective(ABC):
     tolerance = 1e-6
 
     @abstractmethod
-    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         """Cost of every row of gains in every scenario."""
 
     @abstractmethod
-    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         """The figure itself, at its worst over the scenarios."""
 
-    def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def coarse(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         """Costs of the gains without their neighbours, which take less time."""
         return self.costs(problem, points, scenarios)
 
-    def proved(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def proved(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         """The figure, where it is simulated with a proof of what follows the simulated time."""
         return self.value(problem, gains, scenarios)
 
-    def worst(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def worst(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         """Cost of one set of gains in its worst scenario."""
         return float(self.costs(problem, gains[None, :], scenarios).max())
 
@@ -88,7 +89,7 @@ class Objective(ABC):
 class _Abscissa(Objective):
     name: ObjectiveName = "abscissa"
 
-    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         # A loop need not be made for every number.
         numbers = problem.loop.parameters
         abscissa_at = problem.loop.specification.abscissa_at
@@ -99,7 +100,7 @@ class _Abscissa(Objective):
             ]
         )
 
-    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         return self.worst(problem, gains, scenarios)
 
 
@@ -107,7 +108,7 @@ class _Damping(Objective):
     name: ObjectiveName = "damping"
     tolerance = 1e-4
 
-    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         return np.array(
             [[self._cost(problem.at(gains, one)) for one in scenarios] for gains in points]
         )
@@ -119,7 +120,7 @@ class _Damping(Objective):
         time = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0) + (loop.sample_time or 0.0)
         return -ratio + _TIE * abscissa * (time or 1.0)
 
-    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         return min(dominant_damping(problem.at(gains, one))[0] for one in scenarios)
 
     def lost(self, value: float, reference: float) -> float:
@@ -131,21 +132,21 @@ class _SettlingTime(Objective):
     simulated = True
     tolerance = 1e-3
 
-    def costs(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         around = _rounded(points)
         costs = self.coarse(problem, around.reshape(-1, points.shape[-1]), scenarios)
         return np.asarray(costs.reshape(*around.shape[:2], -1).max(axis=1))
 
-    def coarse(self, problem: Problem, points: Vector, scenarios: Sequence[Scenario]) -> Vector:
+    def coarse(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         settling, overshoot = _figures(problem, points, scenarios, SEARCH_BAND)
         lost = ~np.isfinite(settling)
         return np.where(lost, NEVER, self._cost(np.where(lost, 0.0, settling), overshoot))
 
-    def value(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         settling, overshoot = _figures(problem, _rounded(gains[None, :])[0], scenarios, BAND)
         return self._figure(settling, overshoot)
 
-    def proved(self, problem: Problem, gains: Vector, scenarios: Sequence[Scenario]) -> float:
+    def proved(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         worst = self.value(problem, gains, scenarios)
         for one in scenarios:
             step = proved_step(problem.at(gains, one), problem.amplitude)
@@ -159,20 +160,20 @@ class _SettlingTime(Objective):
             worst = max(worst, self._figure(*np.array(step)))
         return worst
 
-    def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
+    def _cost(self, settling: Array, overshoot: Array) -> Array:
         return settling
 
-    def _figure(self, settling: Vector, overshoot: Vector) -> float:
+    def _figure(self, settling: Array, overshoot: Array) -> float:
         return float(settling.max())
 
 
 class _Overshoot(_SettlingTime):
     name: ObjectiveName = "overshoot"
 
-    def _cost(self, settling: Vector, overshoot: Vector) -> Vector:
+    def _cost(self, settling: Array, overshoot: Array) -> Array:
         return settling + _OVERSHOOT_WEIGHT * np.maximum(overshoot - NO_OVERSHOOT, 0.0)
 
-    def _figure(self, settling: Vector, overshoot: Vector) -> float:
+    def _figure(self, settling: Array, overshoot: Array) -> float:
         return float(overshoot.max())
 
 
@@ -207,7 +208,7 @@ def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
     return float((-near.real / np.abs(near)).min()), abscissa
 
 
-def _rounded(points: Vector) -> Vector:
+def _rounded(points: Array) -> Array:
     """Each row of gains and its neighbours, shape (rows, 1 + neighbours, gains)."""
     signs = np.array([*itertools.product((-1.0, 1.0), repeat=points.shape[-1])])
     factors = 1.0 + _ROUNDING * np.vstack([np.zeros(points.shape[-1]), signs])
@@ -215,8 +216,8 @@ def _rounded(points: Vector) -> Vector:
 
 
 def _figures(
-    problem: Problem, points: Vector, scenarios: Sequence[Scenario], band: float
-) -> tuple[Vector, Vector]:
+    problem: Problem, points: Array, scenarios: Sequence[Scenario], band: float
+) -> tuple[Array, Array]:
     """Settling time in s, NaN where a loop does not settle, and overshoot in %."""
     values = {name: points[:, [i]] for i, name in enumerate(problem.free)}
     for name in problem.intervals:

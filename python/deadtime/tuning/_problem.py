@@ -9,15 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import Range, finite, interval, non_negative
 from deadtime.estimation import DelayEstimate
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._region import ConfidenceRegion, region_of
 from deadtime.tuning._stabilising import candidate_ranges
-
-Vector: TypeAlias = NDArray[np.float64]
 
 ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
 
@@ -58,11 +56,11 @@ class Problem:
     threads: int | None
     region: ConfidenceRegion | None = None
 
-    def named(self, gains: Sequence[float] | Vector) -> dict[str, float]:
+    def named(self, gains: Sequence[float] | Array) -> dict[str, float]:
         """The free gains by name."""
         return {name: float(value) for name, value in zip(self.free, gains, strict=True)}
 
-    def at(self, gains: Sequence[float] | Vector, scenario: Scenario | None = None) -> ControlLoop:
+    def at(self, gains: Sequence[float] | Array, scenario: Scenario | None = None) -> ControlLoop:
         """The loop with these gains, in one scenario or in the middle."""
         return self.loop.replace(**self.named(gains), **(scenario or {}))
 

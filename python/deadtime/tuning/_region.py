@@ -21,13 +21,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import Range
 from deadtime.estimation import DelayEstimate
-
-Array = NDArray[np.float64]
 
 #: Numbers of the plant that a design can take as not known.
 NUMBERS = ("delay", "gain", "lag", "time_constant")

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from typing import TYPE_CHECKING, NamedTuple
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import between
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime.loops import ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
-from deadtime.tuning._problem import ObjectiveName, Scenario, Vector
+from deadtime.tuning._problem import ObjectiveName, Scenario
 from deadtime.tuning._region import ConfidenceRegion
 
 if TYPE_CHECKING:
@@ -280,9 +281,9 @@ class FilterChoice(ReadOnlyArrays, Pictured):
     rule: str
     design: Design
     ideal: Design
-    omegas: Vector
-    values: Vector
-    noise_gains: Vector
+    omegas: Array
+    values: Array
+    noise_gains: Array
     value: float
     noise_gain: float
     ideal_noise_gain: float

@@ -27,11 +27,11 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Indices
 from deadtime.tuning._margins import MarginEstimate, RequiredMargins
 from deadtime.tuning._objectives import NEVER, Objective
-from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._problem import Problem, Scenario
 from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
 
 #: Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
@@ -90,9 +90,9 @@ _MET = 1e-6
 _UNSTABLE = 3.0
 
 #: Costs of rows of gains in scenarios.
-Judge: TypeAlias = Callable[[Problem, Vector, Sequence[Scenario]], Vector]
+Judge: TypeAlias = Callable[[Problem, Array, Sequence[Scenario]], Array]
 
-Pair: TypeAlias = tuple[Vector, Vector]
+Pair: TypeAlias = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Search:
     required: RequiredMargins
     scenarios: Sequence[Scenario] = ()
 
-    def globally(self) -> Vector:
+    def globally(self) -> Array:
         """The best gains, from the map."""
         points, stable = self.survey.points, np.flatnonzero(self.survey.stable)
         costs = np.full(len(points), np.inf)
@@ -126,7 +126,7 @@ class Search:
         found = [self._by_grids(start) for start in starts]
         return self._polished(*min(found, key=lambda one: self._total(one[0])))
 
-    def _firmest(self, points: Vector, costs: Vector) -> Vector:
+    def _firmest(self, points: Array, costs: Array) -> Array:
         """The best gains with their neighbours, from more starts where those lose much by them."""
         for axes in self.survey.fringes:
             points = np.vstack([points, grid_points(axes)])
@@ -143,16 +143,16 @@ class Search:
                 best, least = gains, cost
         return np.asarray(best, dtype=np.float64)
 
-    def locally(self, start: Vector) -> Vector:
+    def locally(self, start: Array) -> Array:
         """The best gains around a start."""
         return self._polished(*self._by_grids(start))
 
-    def _by_grids(self, start: Vector) -> Pair:
+    def _by_grids(self, start: Array) -> Pair:
         """A better point, and how far around it a better one may still be."""
         reach = _REACH * self.survey.spacing
         low, high = np.array(self.survey.bounds).T
 
-        def narrowed(judge: Judge, around: Vector, reach: Vector, grids: int) -> Pair:
+        def narrowed(judge: Judge, around: Array, reach: Array, grids: int) -> Pair:
             costs = partial(self._totals, judge=judge)
             return _by_grids(costs, around, reach, low, high, grids)
 
@@ -168,7 +168,7 @@ class Search:
             return start, reach
         return narrowed(self.objective.costs, start, reach, _GRIDS)
 
-    def _polished(self, start: Vector, reach: Vector) -> Vector:
+    def _polished(self, start: Array, reach: Array) -> Array:
         """The best point within reach, where costs are continuous."""
         low, high = np.array(self.survey.bounds).T
         if self.objective.simulated:
@@ -177,27 +177,27 @@ class Search:
             return _between_neighbours(self._total, start, reach, low, high)
         return _by_simplices(self._total, start, 0.5 * reach, low, high)
 
-    def short(self, gains: Vector) -> float:
+    def short(self, gains: Array) -> float:
         """By how much gains fall short of the required margins, by the estimate."""
         return self._short(gains, self.objective.worst(self.problem, gains, self.scenarios))
 
-    def _short(self, gains: Vector, cost: float) -> float:
+    def _short(self, gains: Array, cost: float) -> float:
         """The same for gains of this cost; an unstable loop has crossings, which are no margins."""
         stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
         return float(self._shortfalls(gains[None, :])[0]) if stable else _UNSTABLE
 
-    def _shortfalls(self, points: Vector, stride: int = 1) -> Vector:
+    def _shortfalls(self, points: Array, stride: int = 1) -> Array:
         """The same of every row of gains."""
         return self.required.shortfall(self.estimate.of(points, self.scenarios, stride))
 
-    def _total(self, gains: Vector) -> float:
+    def _total(self, gains: Array) -> float:
         """Cost of gains, shortfalls of margins included."""
         cost = self.objective.worst(self.problem, gains, self.scenarios)
         if not self.required.named:
             return cost
         return cost + _PENALTY * self._scale * self._short(gains, cost)
 
-    def _totals(self, axes: list[Vector], judge: Judge) -> Vector:
+    def _totals(self, axes: list[Array], judge: Judge) -> Array:
         """The same of every point of a grid."""
         points = grid_points(axes)
         late = worst_abscissa(self.problem, axes, self.scenarios).ravel()
@@ -223,7 +223,7 @@ class Search:
             return abs(float(self.survey.abscissa.min()))
         return 1.0
 
-    def _map_costs(self, cells: NDArray[np.intp]) -> Vector:
+    def _map_costs(self, cells: Indices) -> Array:
         """Costs of cells of the map; infinite for those left out where a cost takes long."""
         abscissa = self.survey.abscissa.ravel()[cells]
         if self.objective.name == "abscissa":
@@ -240,8 +240,8 @@ class Search:
 
 
 def _between_neighbours(
-    cost: Callable[[Vector], float], start: Vector, reach: Vector, low: Vector, high: Vector
-) -> Vector:
+    cost: Callable[[Array], float], start: Array, reach: Array, low: Array, high: Array
+) -> Array:
     from scipy.optimize import minimize_scalar
 
     ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
@@ -255,13 +255,13 @@ def _between_neighbours(
 
 
 def _by_grids(
-    costs: Callable[[list[Vector]], Vector],
-    start: Vector,
-    reach: Vector,
-    low: Vector,
-    high: Vector,
+    costs: Callable[[list[Array]], Array],
+    start: Array,
+    reach: Array,
+    low: Array,
+    high: Array,
     grids: int,
-) -> tuple[Vector, Vector]:
+) -> tuple[Array, Array]:
     """The best point, and half the width of the next grid."""
     best, least = start, np.inf
     offsets = np.linspace(-1.0, 1.0, _SIDE[len(start)])
@@ -282,8 +282,8 @@ def _by_grids(
 
 
 def _by_simplices(
-    cost: Callable[[Vector], float], start: Vector, size: Vector, low: Vector, high: Vector
-) -> Vector:
+    cost: Callable[[Array], float], start: Array, size: Array, low: Array, high: Array
+) -> Array:
     from scipy.optimize import minimize
 
     best, least, turn, idle = start, cost(start), 1.0, 0

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.stability import StabilityMap, stability_map
-from deadtime.tuning._problem import Problem, Scenario, Vector
+from deadtime.tuning._problem import Problem, Scenario
 
 #: Points of the map along each free gain, for one, two and three of them: more points find narrower
 #: stable regions and cost time in proportion to their product.
@@ -46,8 +46,8 @@ class Survey:
         Maps over two gains, by the other numbers.
     """
 
-    axes: tuple[Vector, ...]
-    abscissa: Vector
+    axes: tuple[Array, ...]
+    abscissa: Array
     maps: Maps = field(default_factory=dict, repr=False)
 
     @property
@@ -56,18 +56,18 @@ class Survey:
         return tuple(map(len, self.axes))
 
     @property
-    def points(self) -> Vector:
+    def points(self) -> Array:
         """Every point of the grid, one a row."""
         return grid_points(self.axes)
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Points that are stable in every scenario, those with gains of zero left out."""
         found = np.isfinite(self.abscissa.ravel()) & np.any(self.points != 0.0, axis=1)
         return np.asarray(found)
 
     @property
-    def fringes(self) -> list[list[Vector]]:
+    def fringes(self) -> list[list[Array]]:
         """Grids with one gain between zero and its first cell, where an axis begins at zero."""
         found = []
         sides = _FRINGE_SIDES[len(self.axes)]
@@ -78,7 +78,7 @@ class Survey:
                 found.append(grid)
         return found
 
-    def off_zero(self, start: Vector) -> Vector:
+    def off_zero(self, start: Array) -> Array:
         """Lower and upper bounds of a search by simulation, rows: gains stay off zero."""
         bounds = np.array(self.bounds).T
         off = _FRINGE.min() * self.spacing
@@ -86,16 +86,16 @@ class Survey:
         return np.asarray(np.where(away, np.array([off, -off]), bounds))
 
     @property
-    def spacing(self) -> Vector:
+    def spacing(self) -> Array:
         return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
         return [(float(axis[0]), float(axis[-1])) for axis in self.axes]
 
-    def chosen(self, points: Vector, costs: Vector, most: int) -> Vector:
+    def chosen(self, points: Array, costs: Array, most: int) -> Array:
         """The points with the least finite costs that are no neighbours of one another."""
-        found: list[Vector] = []
+        found: list[Array] = []
         for place in np.argsort(costs, kind="stable"):
             if not np.isfinite(costs[place]) or len(found) == most:
                 break
@@ -105,7 +105,7 @@ class Survey:
         return np.array(found)
 
 
-def grid_points(axes: Sequence[Vector]) -> Vector:
+def grid_points(axes: Sequence[Array]) -> Array:
     """Every point of a grid, one a row."""
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
@@ -142,10 +142,10 @@ def surveyed(
 
 def worst_abscissa(
     problem: Problem,
-    axes: Sequence[Vector],
+    axes: Sequence[Array],
     scenarios: Sequence[Scenario],
     maps: Maps | None = None,
-) -> Vector:
+) -> Array:
     """Worst spectral abscissa on a grid of the free gains, infinite where one is not stable.
 
     `maps` receives the maps over two gains, where there are no others. Maps are much cheaper than
@@ -173,7 +173,7 @@ def worst_abscissa(
     return worst
 
 
-def charts_at(problem: Problem, survey: Survey, gains: Vector) -> tuple[StabilityMap, ...]:
+def charts_at(problem: Problem, survey: Survey, gains: Array) -> tuple[StabilityMap, ...]:
     """Maps to look at: over two gains, one for each delay; over one gain and the delay, one.
 
     A third gain has the value that was found, the gain of the plant its middle.
@@ -207,11 +207,11 @@ def _by_the_rest(
     return found
 
 
-def _mapped(problem: Problem, numbers: dict[str, float], axes: dict[str, Vector]) -> StabilityMap:
+def _mapped(problem: Problem, numbers: dict[str, float], axes: dict[str, Array]) -> StabilityMap:
     held = {name: value for name, value in numbers.items() if name not in axes}
     return stability_map(problem.loop.replace(**held), axes, threads=problem.threads)
 
 
-def _judged(chart: StabilityMap) -> Vector:
+def _judged(chart: StabilityMap) -> Array:
     """Abscissa where a cell is stable, else infinite."""
     return np.where(chart.stable, chart.abscissa, np.inf)

@@ -29,11 +29,9 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop, LoopModel, LoopRun, SampledLoopGain
-
-Vector = NDArray[np.float64]
 
 #: Part of the deviation that may be left after a period; the period is doubled until it is, at most
 #: this many times.
@@ -88,14 +86,14 @@ def tail_bound(loop: ControlLoop, amplitude: float, end: float) -> float:
     return output if abs(rest[n]) + command <= limit else np.inf
 
 
-def _later(period: Vector, sizes: Vector) -> Vector | None:
+def _later(period: Array, sizes: Array) -> Array | None:
     """Bound on the sizes at the ends of all later periods, which contract."""
     found = np.linalg.solve(np.eye(len(sizes)) - period, sizes)
     holds = np.all(found >= 0.0) and np.all(sizes + period @ found <= found * (1.0 + 1e-9) + 1e-300)
     return np.asarray(found * (1.0 + 1e-6), dtype=np.float64) if holds else None
 
 
-def _power(Z: Vector) -> tuple[Vector, int] | None:
+def _power(Z: Array) -> tuple[Array, int] | None:
     """A power of a matrix whose elements' moduli contract, and which."""
     power = Z
     for doubling in range(_DOUBLINGS):
@@ -105,7 +103,7 @@ def _power(Z: Vector) -> tuple[Vector, int] | None:
     return None
 
 
-def _swept(rows: Vector, Z: Vector, count: int) -> Vector:
+def _swept(rows: Array, Z: Array, count: int) -> Array:
     """Largest moduli of the elements of rows Z^k, k below `count`."""
     most = np.abs(rows)
     for _ in range(count - 1):
@@ -115,7 +113,7 @@ def _swept(rows: Vector, Z: Vector, count: int) -> Vector:
 
 
 def _sampled(
-    loop: ControlLoop, rest: Vector, limit: float, end: float
+    loop: ControlLoop, rest: Array, limit: float, end: float
 ) -> tuple[float, float] | None:
     """Of a sampled loop: z are states, the command that is held, and those under way."""
     from scipy.linalg import expm
@@ -167,7 +165,7 @@ def _sampled(
     return float((np.array(most[len(cells) * (n + 1) :]) + drift).max()), float(commands)
 
 
-def _without_delay(model: LoopModel, away: Vector) -> tuple[float, float] | None:
+def _without_delay(model: LoopModel, away: Array) -> tuple[float, float] | None:
     """Of a continuous loop without delay: z are the states, at the ends of short steps."""
     from scipy.linalg import expm
 
@@ -184,7 +182,7 @@ def _without_delay(model: LoopModel, away: Vector) -> tuple[float, float] | None
     return float(np.abs(output) @ states), float(np.abs(feedback) @ states)
 
 
-def _with_delay(known: Fundamental, sizes: Vector | None) -> tuple[float, float] | None:
+def _with_delay(known: Fundamental, sizes: Array | None) -> tuple[float, float] | None:
     """Of a continuous loop: z are the states, and integral and size of the command under way."""
     if sizes is None:
         return None
@@ -217,13 +215,13 @@ class Fundamental:
         self.within = (expm(held * self.h) - np.eye(n + 1))[:n]
 
     def sizes_at(
-        self, amplitude: float, rest: Vector, limit: float | None, end: float
-    ) -> Vector | None:
+        self, amplitude: float, rest: Array, limit: float | None, end: float
+    ) -> Array | None:
         """abs(x - rest) at `end` or soon after it, and integral and size of what is under way."""
         n, count = len(self.model.B), max(int(np.ceil(end / self.h)), self.cells)
         if count > _MOST_POINTS:
             return None
-        times: Vector = self.h * np.arange(count + 1, dtype=np.float64)
+        times: Array = self.h * np.arange(count + 1, dtype=np.float64)
         states = states_at(self.model, self.delay, times, np.zeros(n), amplitude, limit)
         away = (states - rest[:n, None])[:, None, :]
         # The limit takes commands nearer to that of the rest.
@@ -231,13 +229,13 @@ class Fundamental:
         late = command[0, -self.cells :]
         return np.array([*np.abs(away[:, 0, -1]), late.sum() * self.h, late.max()])
 
-    def bounds(self, delays: int) -> tuple[Vector, Vector, Vector] | None:
+    def bounds(self, delays: int) -> tuple[Array, Array, Array] | None:
         """Q, and the rows of R for output and command, of a period of `delays` delays."""
         model, cells = self.model, self.cells
         n, count = len(model.B), delays * cells
         if count > _MOST_POINTS // (n + 1):
             return None
-        times: Vector = self.h * np.arange(count + 1, dtype=np.float64)
+        times: Array = self.h * np.arange(count + 1, dtype=np.float64)
         unit = [states_at(model, self.delay, times, start, 0.0, None) for start in np.eye(n)]
         states = np.array(unit).transpose(1, 0, 2)  # state, start, time
         driven = np.einsum("ijk,j->ik", states, model.B)[:, None, :]
@@ -251,7 +249,7 @@ class Fundamental:
         every = np.concatenate([states, driven], axis=1)  # state, start or impulse, time
         return self._period(every, *self._cells(every, 0.0), delays)
 
-    def _cells(self, every: Vector, before: float) -> tuple[Vector, Vector, Vector]:
+    def _cells(self, every: Array, before: float) -> tuple[Array, Array, Array]:
         """Bounds on each cell of states, command and output, of the responses in `every`.
 
         `before` bounds the command that is under way at first.
@@ -280,8 +278,8 @@ class Fundamental:
         return state, command, output
 
     def _period(
-        self, every: Vector, size: Vector, command: Vector, output: Vector, delays: int
-    ) -> tuple[Vector, Vector, Vector]:
+        self, every: Array, size: Array, command: Array, output: Array, delays: int
+    ) -> tuple[Array, Array, Array]:
         model, cells, h = self.model, self.cells, self.h
         n, L = len(model.B), abs(model.L)
         last = slice(-cells, None)
@@ -305,11 +303,11 @@ class Fundamental:
 def states_at(
     model: LoopModel,
     delay: float,
-    times: Vector,
-    start: Vector,
+    times: Array,
+    start: Array,
     amplitude: float,
     limit: float | None,
-) -> Vector:
+) -> Array:
     """Every state of a continuous loop after a step, nothing under way at time 0."""
     run = LoopRun(start, command=0.0, reference=amplitude)
     found = [

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, Plant
 from deadtime.recordings import Finding, Recording, copied_setpoint, no_excitation, no_motion
-
-Array = NDArray[np.float64]
 
 #: Ratio of singular values of the scaled Jacobian below which the data do not distinguish two
 #: parameters. Rounding in difference quotients is at about 1e-8, so smaller values mistake rounding

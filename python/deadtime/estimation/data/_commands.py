@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.data._simulated import (
     commands_over_samples,
@@ -15,8 +13,6 @@ from deadtime.estimation.data._simulated import (
 )
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Largest relative difference between the time of a row and the sample time at which a command can
 #: be computed from the rows.

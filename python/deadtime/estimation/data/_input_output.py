@@ -18,15 +18,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._simulated import SimulatedRecording, commands_over_samples
 from deadtime.loops import FirstOrder, Integrator
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Fewest samples for a delay by correlation or regression.
 FEWEST = 16

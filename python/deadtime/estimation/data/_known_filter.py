@@ -18,12 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Radius of the circle to which zeros are moved; zeros at lower frequencies than a quarter of the
 #: rate of the rows stay where they are, up to this radius.

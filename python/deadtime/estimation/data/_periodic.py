@@ -11,14 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Complex, Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: A line of the reference counts as excited above this share of the largest line.
 EXCITED = 1e-3
@@ -49,7 +46,7 @@ class PeriodicSpectra:
         Complex degrees of freedom of each.
     """
 
-    lines: NDArray[np.intp]
+    lines: Indices
     samples: int
     periods: int
     input: Complex
@@ -101,7 +98,7 @@ def periodic_spectra(
     off_u, off_y = u - mean_u, y - mean_y
     scale = 1.0 / (periods * (periods - 1.0))
 
-    def averaged(products: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def averaged(products: Complex) -> Complex:
         summed = products.sum(axis=0) * scale
         width = np.ones(2 * NEIGHBOURS + 1)
         count = np.convolve(np.ones(lines.size), width, "same")

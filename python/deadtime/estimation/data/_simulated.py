@@ -16,8 +16,8 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime.estimation.data._checks import excited, start_and_span
 from deadtime.loops import ControlLoop, P
@@ -29,7 +29,6 @@ from deadtime.systems import Response
 #: commands.
 ALIKE = 0.2
 
-Array = NDArray[np.float64]
 
 #: Longest window, in samples of the recording and of the loop (bounds the time of a fit).
 MOST_SAMPLES = 50_000

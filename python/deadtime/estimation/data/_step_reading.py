@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.data._checks import excited
 from deadtime.loops import ControlLoop, Integrator, P
@@ -34,7 +34,6 @@ ENOUGH = 20
 #: Least share of the step at the end; below it the output does not follow the reference.
 FOLLOWS = 0.5
 
-Array = NDArray[np.float64]
 
 #: A cubic is fitted to this share of a half period on either side of a peak. A cosine deviates from
 #: it by (0.25 π)^4/24 = 1.6 % at the ends and far less at the vertex; a wider part averages more

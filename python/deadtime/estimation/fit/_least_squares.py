@@ -21,14 +21,12 @@ from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.estimation.data._checks import excited
 from deadtime.estimation.fit._directions import Directions, all_directions
 from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Starting points that are refined; the best minimum is taken.
 REFINED = 3

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 
-Array = NDArray[np.float64]
 Values: TypeAlias = dict[str, float]
 
 #: Points of the initial grid over the delay for each sample, and most points.

@@ -12,12 +12,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.estimation.fit._directions import Directions, held_directions
 from deadtime.estimation.fit._least_squares import TO_COMPARE, Minimum, Model, minimise
-
-Array = NDArray[np.float64]
 
 #: Farthest end of an interval, in multiples of the Gaussian one.
 FARTHEST = 64.0

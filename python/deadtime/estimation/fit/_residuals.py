@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from deadtime._base.arrays import Array
 
 #: Excess of the variance of Q over that of chi-squared, in lags over rows, by simulation: without
 #: it, the 1 % level calls 2.5 % of white residuals of 120 rows coloured.
@@ -21,8 +22,6 @@ EXCESS = 1.6
 
 #: Significance level of the whiteness test: this share of white residuals is called coloured.
 SIGNIFICANCE = 0.01
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

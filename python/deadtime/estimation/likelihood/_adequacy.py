@@ -23,8 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
 from deadtime.estimation._native import PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
@@ -40,8 +40,6 @@ from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
 from deadtime.estimation.likelihood._start import is_long
-
-Array = NDArray[np.float64]
 
 #: Starts of the further lag, in rows.
 FURTHER = (0.7, 3.0)

@@ -10,15 +10,11 @@ The fit takes a part of what it sees while the vehicle moves: the probability is
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Indices, Mask
 from deadtime.estimation._native import RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Places = NDArray[np.intp]
 
 #: Rows over which changes are taken.
 OVER = (4, 8, 16)
@@ -40,7 +36,7 @@ def air_at_rest(fit: NoiseFit, run: int) -> float:
     return min(1.0, len(OVER) * min(_over(fit, run, rows, noise, count) for count in OVER))
 
 
-def rows_since_motion(rows: FlightRows, part: RowLikelihood, places: Places) -> Places:
+def rows_since_motion(rows: FlightRows, part: RowLikelihood, places: Indices) -> Indices:
     """How many rows before these places the vehicle moved last; very many where it never did."""
     speed = np.abs(part.rate / part.gain)
     moves = np.flatnonzero(speed > MOVES * float(speed.max()))

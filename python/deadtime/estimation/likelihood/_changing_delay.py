@@ -19,13 +19,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit, changed, with_noise
 from deadtime.estimation.likelihood._start import is_long
-
-Array = NDArray[np.float64]
 
 #: Delays that wander are sums of so many waves at most, with 1, 2, ... half periods in the window,
 #: one for so many rows.

@@ -24,16 +24,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._air_at_rest import RESTS, SHOWS, rows_since_motion
 from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit, PlantModel
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Autocorrelations that are compared, and the fewest pairs of rows of which each is known.
 LAGS, FEWEST = 20, 50

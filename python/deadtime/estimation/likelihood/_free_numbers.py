@@ -18,14 +18,12 @@ from itertools import product
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, airs_of, with_noise
-
-Array = NDArray[np.float64]
 
 #: The plant with such numbers, and the rows under the command that it gets.
 Given: TypeAlias = Callable[[Mapping[str, float]], tuple[PlantModel, Sequence[FlightRows]]]

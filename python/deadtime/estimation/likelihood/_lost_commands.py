@@ -17,8 +17,8 @@ from itertools import product
 from typing import ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.likelihood._free_numbers import numbers_of
 from deadtime.estimation.likelihood._profile import (
@@ -28,8 +28,6 @@ from deadtime.estimation.likelihood._profile import (
 )
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit, changed, with_noise
-
-Array = NDArray[np.float64]
 
 #: The rows of all recordings with the commands that a plant of these numbers leads to.
 Refilled: TypeAlias = Callable[[NoiseFit], Sequence[FlightRows]]

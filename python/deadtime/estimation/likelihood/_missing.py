@@ -19,13 +19,11 @@ from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Indices
 from deadtime.estimation.models._held import path_of
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Rows are that many samples apart, give or take this share of a sample.
 NEAR_WHOLE = 0.25
@@ -146,17 +144,17 @@ class _Gaps(NamedTuple):
 
     time: Array
     #: The row before each gap, how many samples are missing in it, and the row after, s.
-    rows: NDArray[np.intp]
-    counts: NDArray[np.intp]
+    rows: Indices
+    counts: Indices
     ends: Array
     #: Where the samples of each gap begin among all missing ones, and where the last of them end.
-    firsts: NDArray[np.intp]
+    firsts: Indices
     #: Of each missing sample: its time, that of the next one, s, and its number in its gap.
     places: Array
     until: Array
-    number: NDArray[np.intp]
+    number: Indices
     #: Times of the rows and then of the missing samples, put in order.
-    order: NDArray[np.intp]
+    order: Indices
 
     @staticmethod
     def of(recording: Recording, loop: ControlLoop, command: Array) -> _Gaps | None:

@@ -19,8 +19,8 @@ from itertools import combinations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._search import (
@@ -30,8 +30,6 @@ from deadtime.estimation.likelihood._search import (
     changed,
 )
 from deadtime.estimation.likelihood._start import is_long
-
-Array = NDArray[np.float64]
 
 #: Step of difference quotients in the logarithms of the numbers of the noise.
 LOG_STEP = 0.1

@@ -19,12 +19,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Indices, Mask
 from deadtime.estimation.fit._directions import Directions, all_directions, held_directions
 from deadtime.estimation.fit._least_squares import Model
-
-Array = NDArray[np.float64]
 
 #: The noise at which searches begin, in steps: with the first the likelihood is smooth.
 NOISES = (0.5, 0.15)
@@ -76,8 +74,8 @@ class RoundedLikelihood:
     model: Model
     output: Array
     steps: Array
-    recording: NDArray[np.intp]
-    used: NDArray[np.bool_]
+    recording: Indices
+    used: Mask
     errors: Array
 
     def likeliest(self, start: Array) -> Peak:

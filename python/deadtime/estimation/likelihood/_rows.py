@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from deadtime._base.arrays import Array, Mask
 
 #: Spikes of the residuals beyond so many robust deviations are outliers, at most this share of the
 #: rows. Half a window of the median that spikes are measured from, in rows.
@@ -35,7 +34,7 @@ class FlightRows(NamedTuple):
     time: Array
     row_time: float
     output: Array
-    used: NDArray[np.bool_]
+    used: Mask
     command_time: Array
     command: Array
     unknown: tuple[tuple[float, float], ...]
@@ -46,7 +45,7 @@ class FlightRows(NamedTuple):
     rounding: float = 0.0
 
 
-def spikes(residuals: Array, rounding: float) -> NDArray[np.bool_]:
+def spikes(residuals: Array, rounding: float) -> Mask:
     """Rows of these residuals that are outliers: far from the median of their neighbours.
 
     Rows within a step of the rounding are none.
@@ -76,7 +75,7 @@ def _from_neighbours(residuals: Array) -> tuple[Array, float]:
     return away, max(robust, LEAST_ROBUST * float(np.std(inner)))
 
 
-def is_outlier(whitened: Array, residuals: Array, rows: FlightRows) -> NDArray[np.bool_]:
+def is_outlier(whitened: Array, residuals: Array, rows: FlightRows) -> Mask:
     """Rows whose whitened residual, in robust deviations, is beyond `SPIKE`.
 
     Rows within a step of the rounding are none.
@@ -106,7 +105,7 @@ def rounding_of(output: Array) -> float:
     return step if steps.size and is_rounded and np.mean(np.diff(output) == 0.0) >= ROUNDED else 0.0
 
 
-def on_same_step(output: Array) -> NDArray[np.bool_]:
+def on_same_step(output: Array) -> Mask:
     """Rows of a rounded output that tell nothing besides another row on the same step.
 
     Neighbours on one step of the sensor have the same rounding error. Of those the middle row

@@ -14,7 +14,6 @@ from functools import cached_property
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from deadtime.estimation._native import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
@@ -27,8 +26,6 @@ from deadtime.loops import (
     Plant,
     RateLimited,
 )
-
-Array = NDArray[np.float64]
 
 #: Longest delay of the search, as a share of the window.
 LONGEST = 0.6

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
@@ -36,8 +36,6 @@ from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
 from deadtime.estimation.methods._method import Method, Run
-
-Array = NDArray[np.float64]
 
 #: Significance level of the F test that the command improves the model.
 F_TEST_LEVEL = 1e-4

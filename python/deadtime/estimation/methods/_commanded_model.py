@@ -15,8 +15,8 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._commands import commands_of
@@ -40,8 +40,6 @@ from deadtime.estimation.methods._method import (
 from deadtime.estimation.models._held import RATE_LIMITS, Path, path_of
 from deadtime.loops import Plant, RateLimited
 from deadtime.recordings import RecordingCheck
-
-Array = NDArray[np.float64]
 
 
 class Assumed(NamedTuple):

@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import (
@@ -41,8 +41,6 @@ from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Samples for each fitted parameter below which intervals are those of the profile likelihood.
 FEW = 12
@@ -244,7 +242,7 @@ def _message(done: str, held: list[str], reason: str, adequate: bool, advice: st
     return text
 
 
-def is_rounding(residuals: NDArray[np.float64], recording: Recording) -> bool:
+def is_rounding(residuals: Array, recording: Recording) -> bool:
     """Whether the model explains the recording to rounding."""
     return float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(recording.output))
 
@@ -262,7 +260,7 @@ def read_off_estimate(
     method: str,
     simulated: SimulatedRecording,
     values: Mapping[str, float],
-    cov: NDArray[np.float64] | None,
+    cov: Array | None,
     start: float,
     *,
     message: str,
@@ -299,8 +297,8 @@ def estimate_with_residuals(
     loop: ControlLoop,
     recording: Recording,
     values: Mapping[str, float],
-    cov: NDArray[np.float64] | None,
-    residuals: NDArray[np.float64],
+    cov: Array | None,
+    residuals: Array,
     *,
     message: str,
     uncalibrated: str,

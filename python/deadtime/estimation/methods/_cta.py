@@ -23,8 +23,8 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Complex
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._result import DelayEstimate
@@ -44,8 +44,6 @@ from deadtime.estimation.fit._residuals import robust_covariance
 from deadtime.estimation.methods._conclusion import read_off_estimate
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.loops import ControlLoop
-
-Array = NDArray[np.float64]
 
 #: Points of the initial grid over the delay, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 20, 0.005, 0.6
@@ -171,7 +169,7 @@ class _Fit(Fitted):
             output += jump * (1.0 + moved.real)
         return np.asarray(output - self.recording.output)
 
-    def _step_response(self, values: dict[str, float]) -> tuple[NDArray[np.complex128], ...]:
+    def _step_response(self, values: dict[str, float]) -> tuple[Complex, ...]:
         """Rates λ and weights w of the unit step response 1 + sum w e^(λ t) of the output."""
         nodes = self.matrix.shape[0]
         stiffness, lag = values["gain"] * values["Kp"], values["lag"]

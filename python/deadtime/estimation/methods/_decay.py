@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
@@ -37,8 +37,6 @@ from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
-
-Array = NDArray[np.float64]
 
 #: Fewest samples of a tail, and the smallest share of the step that is not rounding.
 FEWEST, LEAST = 5, 1e-6

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import check_delay_free, checked_names
@@ -38,8 +38,6 @@ from deadtime.estimation.methods._conclusion import read_off_estimate
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import held_transfer
 from deadtime.loops import ControlLoop
-
-Array = NDArray[np.float64]
 
 #: Contribution of the other modes to the first extreme as a share, and the factor by which it falls
 #: to the next one. With K Td between 0.5 and 1.5 the second pair of roots decays 30 to 100 times as

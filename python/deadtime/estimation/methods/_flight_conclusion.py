@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import PlantNumbers, RowNoise
@@ -30,8 +29,6 @@ from deadtime.estimation.likelihood._start import excited_part, is_long, on_all_
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
-
-Array = NDArray[np.float64]
 
 #: A lag below so many times its lower bound is none.
 NO_LAG = 2.0

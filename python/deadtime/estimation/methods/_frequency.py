@@ -25,8 +25,8 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Mask
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime.estimation._result import DelayEstimate
@@ -50,8 +50,6 @@ from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import HeldResponse, held_transfer
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Longest delay of the search, as a share of the record or of the periods.
 LONGEST = 0.6
@@ -203,7 +201,7 @@ def _record_misfit(
     data: Recording,
     response: HeldResponse,
     weight: Array,
-    kept: NDArray[np.bool_],
+    kept: Mask,
     values: dict[str, float],
 ) -> Array:
     """Misfit at the `kept` lines of one record, times a weight."""

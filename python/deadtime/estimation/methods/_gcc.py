@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._input_output import (
@@ -37,7 +37,6 @@ from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_
 from deadtime.estimation.methods._method import Method, Run, check_choice
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
-Array = NDArray[np.float64]
 
 #: Significance level of the correlation at one shift. Uncorrelated signals exceed it at the best of
 #: a hundred shifts in one of a hundred recordings.

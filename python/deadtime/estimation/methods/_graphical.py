@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._simulated import SimulatedRecording
@@ -39,7 +39,6 @@ from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_
 from deadtime.estimation.methods._method import Method, Run, check_choice
 
 Construction = Literal["tangent", "two_point", "first_movement"]
-Array = NDArray[np.float64]
 
 #: Movements below this share of the step count as rounding.
 LEAST = 1e-9

@@ -20,8 +20,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate
@@ -44,8 +45,6 @@ from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.methods._waveform import SimulatedModel
 from deadtime.experiments import FlightNoise
-
-Array = NDArray[np.float64]
 
 #: Points of the grid besides zero, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6

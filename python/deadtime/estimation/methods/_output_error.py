@@ -15,7 +15,6 @@ from itertools import product
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
@@ -77,8 +76,6 @@ from deadtime.estimation.methods._method import (
 )
 from deadtime.estimation.methods._rounded_conclusion import read_as_intervals, rounding_is_all
 from deadtime.recordings import RecordingCheck
-
-Array = NDArray[np.float64]
 
 #: Most rounds of predicting the commands between rows and fitting again, and the change of Akaike's
 #: criterion that ends them. The most samples at which a reference may have changed that are tried,

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._result import DelayEstimate
@@ -33,8 +33,6 @@ from deadtime.estimation.methods._conclusion import check_delay_alone, estimate_
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import HeldResponse
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Crossings at the beginning that are left out: from rest, where noise alone switches the relay,
 #: the limit cycle is not yet reached.
@@ -272,7 +270,7 @@ def _delay_by_lag(lag: float, half: float) -> float:
 
 def _path(
     data: Recording, switches: Array, delay: float, lag: float
-) -> tuple[NDArray[np.intp], Array, Array]:
+) -> tuple[Indices, Array, Array]:
     """Rows from the second switch on; the unit path caused by the switches, and the output there.
 
     Path and output are about their means.

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Indices
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import standard_errors
 from deadtime.estimation.fit._least_squares import JointModel, Model
@@ -19,8 +19,6 @@ from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit
 from deadtime.estimation.methods._commanded_model import CommandedModel
 from deadtime.experiments import FlightNoise
-
-Array = NDArray[np.float64]
 
 
 def rounding_is_all(fit: NoiseFit) -> bool:
@@ -35,7 +33,7 @@ def read_as_intervals(
     estimate: DelayEstimate,
     models: Sequence[CommandedModel],
     first: Sequence[FlightRows],
-    repeated: Sequence[NDArray[np.intp]],
+    repeated: Sequence[Indices],
 ) -> DelayEstimate:
     """The estimate with each row as the interval that was rounded to it.
 

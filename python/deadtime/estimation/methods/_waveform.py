@@ -24,8 +24,8 @@ from functools import cached_property
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import (
@@ -45,8 +45,6 @@ from deadtime.estimation.methods._commanded_model import Assumed
 from deadtime.estimation.methods._conclusion import concluded, without_vanishing
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
-
-Array = NDArray[np.float64]
 
 #: Price of air, as ln L, where a fit with it is compared with a simulation without.
 PRICE_OF_AIR = 2.0

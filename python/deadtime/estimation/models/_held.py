@@ -28,16 +28,13 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array, Complex, Indices, Mask
 from deadtime.loops import FactoredPlant, Integrator, Plant, RateLimited, open_response
-
-Array = NDArray[np.float64]
 
 #: Largest relative range of the time between commands that counts as rounding of even times.
 EVEN = 1e-11
 
-Complex = NDArray[np.complex128]
 
 #: Relative step of difference quotients: of a parameter, or of the time between two commands.
 STEP = 1e-5
@@ -57,8 +54,8 @@ class Response(NamedTuple):
 class Places(NamedTuple):
     """Times among commands: the last command before each, and what it says."""
 
-    row: NDArray[np.intp]
-    before: NDArray[np.bool_]
+    row: Indices
+    before: Mask
     since: Array
     command: Array
     integral: Array

@@ -14,8 +14,8 @@ from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import shown, stated
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
@@ -26,8 +26,6 @@ from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import unit_of
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Parameters whose effect is similar to that of a delay.
 SLOW = ("lag", "time_constant")

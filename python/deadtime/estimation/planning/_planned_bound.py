@@ -21,8 +21,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import QUOTIENT, check_distinguishable, standard_errors
@@ -33,8 +33,6 @@ from deadtime.loops import ControlLoop, Plant
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
-
-Array = NDArray[np.float64]
 
 #: Where a delay is a whole number of samples, the derivative is one-sided, towards a longer delay:
 #: the delay is increased by this share of a sample, which is more than rounding.

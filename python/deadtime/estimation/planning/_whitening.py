@@ -23,16 +23,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import whitened_columns
 from deadtime.experiments import Experiment, FlightNoise, RandomProcess, check_reads_samples
 from deadtime.loops import ControlLoop, P
 from deadtime.roots import delay
 from deadtime.systems import TransferFunction
-
-Array = NDArray[np.float64]
 
 #: A random walk is taken as gusts that last so many times as long as the run.
 LONG = 1e5

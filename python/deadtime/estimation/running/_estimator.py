@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, positive
@@ -28,8 +27,6 @@ from deadtime.estimation.running._settings import (
 from deadtime.experiments import FlightNoise, Noise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Rows of an online estimator: time, output or None where it was lost, command or None.
 Row = tuple[float, float | None, float | None]

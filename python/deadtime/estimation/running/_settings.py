@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import interval, non_negative, positive
 from deadtime.estimation.likelihood._search import PlantModel
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
-
-Array = NDArray[np.float64]
 
 #: Number of delays and of lags in a range without a number.
 DELAYS, LAGS = 50, 5

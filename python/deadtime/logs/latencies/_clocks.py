@@ -16,13 +16,11 @@ from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
 from deadtime.estimation import DelayEstimate, path_of
 from deadtime.logs.latencies._windows import Window, trend_of, variance_of
-
-Array = NDArray[np.float64]
 
 #: Largest whole number of rows of one signal in a whole number of the other's, and the largest
 #: difference of two clocks that run on quartz.

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.plain import plain
 from deadtime.estimation import DelayEstimate
 from deadtime.loops import ControlLoop, FactoredPlant, P
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: The sensitivity peak of a well damped loop (Åström and Hägglund 2006).
 PEAK = 1.7

@@ -17,14 +17,12 @@ from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime.estimation import HeldResponse
 from deadtime.logs._log import LogLoop
 from deadtime.logs.latencies._controller import LENGTHS, Between, Command
 from deadtime.recordings import Recording
-
-Array = NDArray[np.float64]
 
 #: Fewest and most rows of a window.
 FEWEST, MOST = 24, 6000
