@@ -7,11 +7,8 @@ import html
 import io
 from typing import TYPE_CHECKING, Any
 
-from deadtime._base.drawing import new_figure
+from deadtime._base.drawing import Figure, new_figure
 from deadtime._base.errors import MissingExtraError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Dots per inch of a picture; one of 7 by 4 inches takes 20 to 60 kB.
 _DOTS = 100

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from deadtime._base.drawing import as_svg, check_matplotlib
+from deadtime._base.drawing import Figure, as_svg, check_matplotlib
 from deadtime._base.extras import library
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def page(template: str, **values: object) -> str:

@@ -7,14 +7,19 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, check_matplotlib
+from deadtime._base.drawing import (
+    COLOURS,
+    DATA,
+    REFERENCE,
+    Axes,
+    Figure,
+    bare_axes,
+    check_matplotlib,
+)
 from deadtime.estimation._result import DelayEstimate, FittedRun
 from deadtime.recordings import Recording
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from deadtime.estimation.planning._identifiability import Identifiability
     from deadtime.estimation.planning._planned_bound import PlannedBound
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between, stated
-from deadtime._base.drawing import empty_figure
+from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import non_negative, real_array
@@ -31,10 +31,6 @@ from deadtime.loops import (
     explorer_of,
 )
 from deadtime.recordings import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)

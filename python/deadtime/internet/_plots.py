@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
-from deadtime._base.drawing import COLOURS, REFERENCE
+from deadtime._base.drawing import COLOURS, REFERENCE, Axes
 from deadtime.internet._result import InternetLoop
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Name, marker and colour of each method.
 LABELS = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from deadtime._base.drawing import new_figure
+from deadtime._base.drawing import Figure, new_figure
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.explorer import Explorer
 from deadtime._base.notebook import Pictured
@@ -19,9 +19,6 @@ from deadtime.loops._in_time import LoopInTime
 from deadtime.loops._plants import Plant
 from deadtime.loops._poles import LoopPoles
 from deadtime.loops._specification import LoopSpecification
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, init=False)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.drawing import Axes, shown_rows
 from deadtime._base.validation import real_array
 from deadtime.loops._characteristic import closed_loop, open_loop
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.loops._specification import LoopSpecification
 from deadtime.loops._stability import sampled_is_stable
 from deadtime.systems import Margins, TransferFunction, margins_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class LoopGain:
@@ -194,7 +192,6 @@ class LoopGain:
         ValueError
             As in `frequency_response` and `margin`.
         """
-        from deadtime._base.drawing import shown_rows
         from deadtime.systems import plot_bode
 
         loop, found = self.specification, self.margin()

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from deadtime._base.drawing import Figure
 from deadtime._base.page import page, write_page
 from deadtime.loops import PV, ControlLoop, Integrator
 from deadtime.paper.comparison import Comparison, Verdict
 from deadtime.paper.reproduction import TITLES, Reproduction
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 HEADS = ("where", "what", "printed", "ours", "verdict", "why, and with which model")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from deadtime._base.drawing import COLOURS, REFERENCE, new_figure
+from deadtime._base.drawing import COLOURS, REFERENCE, Axes, Figure, new_figure
 from deadtime.paper import (
     Figure2,
     Figure3,
@@ -24,9 +24,6 @@ from deadtime.paper import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from deadtime.systems import Response
 
 THIN: dict[str, Any] = {"lw": 1.3}

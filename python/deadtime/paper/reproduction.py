@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from deadtime._base.drawing import Figure
 from deadtime._base.progress import Stages, stage_report
 from deadtime.paper.comparison import Comparison, Verdict
 from deadtime.paper.figure2 import figure2
@@ -19,9 +20,6 @@ from deadtime.paper.gap import gap
 from deadtime.paper.part import Part
 from deadtime.paper.table1 import table1
 from deadtime.paper.table2 import table2
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: The parts, in the order of the paper.
 _IN_ORDER: tuple[Callable[[], Part], ...] = (

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from deadtime._base.drawing import new_figure
+from deadtime._base.drawing import Figure, new_figure
 from deadtime._base.page import page, write_page
 from deadtime.estimation import COLUMNS, plot_fits, truth_row
 from deadtime.reports._study import Study
 from deadtime.systems import plot_responses
 from deadtime.tuning import live_design
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def write_report(study: Study, path: Path) -> Path:

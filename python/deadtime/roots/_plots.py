@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from deadtime._base.drawing import COLOURS
+from deadtime._base.drawing import COLOURS, Axes
 from deadtime.roots._chains import Chain
 from deadtime.roots._root_set import RootSet
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 CHAIN: dict[str, Any] = {"color": "#d1481f", "lw": 1.0, "ls": "--", "zorder": 3}
 

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     import deadtime.roots._native as native
     from deadtime.roots._chains import Chain
 
@@ -110,7 +109,6 @@ class RootSet(ReadOnlyArrays, Pictured):
         -------
         matplotlib.axes.Axes
         """
-        from deadtime._base.drawing import shown_axes
         from deadtime.roots._plots import plot_root_set
 
         axes = shown_axes(ax)

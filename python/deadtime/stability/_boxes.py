@@ -11,13 +11,14 @@ from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, SupportsFloat
+from typing import Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import deadtime.stability._native as native
 from deadtime._base.arrays import Array
+from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
@@ -31,9 +32,6 @@ from deadtime._base.validation import (
 )
 from deadtime.roots import HasFamily, family_of
 from deadtime.stability._arguments import Given, ranges_of, side
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,7 +153,6 @@ class ProvedBoxes(ReadOnlyArrays, Pictured):
         ValueError
             If not exactly two parameters have a range.
         """
-        from deadtime._base.drawing import shown_axes
         from deadtime.stability._plots import plot_boxes
 
         return plot_boxes(shown_axes(ax), self)

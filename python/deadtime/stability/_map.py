@@ -8,12 +8,13 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, SupportsFloat
+from typing import Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array, Mask
+from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.extras import library
 from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.notebook import Pictured
@@ -23,9 +24,6 @@ from deadtime.loops import ControlLoop, Explorer, HeldFamily, Question, numbers_
 from deadtime.roots import HasFamily, ParametricQuasiPolynomial, family_of
 from deadtime.stability._arguments import damping_demand, map_axes, sides
 from deadtime.stability._boundaries import Boundary, boundaries_along, boundaries_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class MapStatus(IntEnum):
@@ -224,7 +222,6 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         -------
         matplotlib.axes.Axes
         """
-        from deadtime._base.drawing import shown_axes
         from deadtime.stability._plots import plot_stability_map
 
         if show not in (None, "abscissa", "counts"):

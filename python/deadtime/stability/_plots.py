@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.drawing import COLOURS
+from deadtime._base.drawing import COLOURS, Axes
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from deadtime.stability._boundaries import Boundary
     from deadtime.stability._boxes import ProvedBoxes
     from deadtime.stability._map import StabilityMap

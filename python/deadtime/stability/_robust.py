@@ -7,22 +7,20 @@ from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
 
 import deadtime.stability._native as native
 from deadtime._base.arrays import Array, Mask
+from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, Range, thread_number
 from deadtime.roots import HasFamily, family_of
 from deadtime.stability._arguments import Given, map_axes, ranges_of, side, sides
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Upper limit on the boxes of one cell of a robust map (bounds time); a cell that needs more is
 #: undecided.
@@ -75,7 +73,6 @@ class RobustMap(ReadOnlyArrays, Pictured):
         -------
         matplotlib.axes.Axes
         """
-        from deadtime._base.drawing import shown_axes
         from deadtime.stability._plots import plot_robust_map
 
         return plot_robust_map(shown_axes(ax), self)

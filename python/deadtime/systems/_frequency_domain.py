@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from deadtime._base.drawing import Axes, shown_axes, shown_rows
 from deadtime._base.validation import real_array
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems._margins import Margins, margins
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class FrequencyDomain(ABC):
@@ -179,7 +177,6 @@ class FrequencyDomain(ABC):
         ValueError
             If the frequencies are no increasing ones above zero; with `margins` as in `margin`.
         """
-        from deadtime._base.drawing import shown_rows
         from deadtime.systems._plots import plot_bode
 
         places = self._plotted(omega, 0.1, 10.0)
@@ -216,7 +213,6 @@ class FrequencyDomain(ABC):
         ValueError
             As in `bode`.
         """
-        from deadtime._base.drawing import shown_axes
         from deadtime.systems._plots import plot_nyquist
 
         places = self._plotted(omega, 1e-3, 100.0)

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.drawing import COLOURS, REFERENCE
+from deadtime._base.drawing import COLOURS, REFERENCE, Axes
 from deadtime.systems._margins import Margins
 from deadtime.systems._response import Response
 from deadtime.systems._transfer import TransferFunction
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
 

@@ -6,19 +6,16 @@ import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from operator import attrgetter, methodcaller
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import finite, positive, real_array
 from deadtime.systems._step_metrics import OneSignal
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 # The default time of a step response is _SHORTEST times the longest of all time constants, delays
 # and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _TIMES
@@ -226,8 +223,6 @@ class Response(ReadOnlyArrays, Pictured):
         MissingExtraError
             If matplotlib is not installed.
         """
-        from deadtime._base.drawing import shown_axes
-
         ax = shown_axes(ax)
         shown = [("output", self.outputs, style)]
         if inputs:

@@ -6,12 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from deadtime._base.drawing import COLOURS, REFERENCE, empty_figure
+from deadtime._base.drawing import COLOURS, REFERENCE, Axes, Figure, empty_figure
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from deadtime.loops import ControlLoop
     from deadtime.systems import Response
     from deadtime.tuning._result import Design, FilterChoice

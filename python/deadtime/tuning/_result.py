@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between
+from deadtime._base.drawing import Figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime.loops import ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
 from deadtime.tuning._problem import ObjectiveName, Scenario
 from deadtime.tuning._region import ConfidenceRegion
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class LeastMargins(NamedTuple):

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from deadtime._base.digits import stated
-from deadtime._base.drawing import empty_figure
+from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
@@ -40,10 +39,6 @@ from deadtime.estimation.planning._whitening import (
 from deadtime.experiments import Experiment, FlightNoise, NoiseModel
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)

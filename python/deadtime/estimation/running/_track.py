@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime._base.digits import between, stated
-from deadtime._base.drawing import new_figure
+from deadtime._base.drawing import Axes, new_figure
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.estimation.running._estimate import OnlineEstimate
 from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from deadtime._base.digits import stated
+from deadtime._base.drawing import Figure
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
@@ -42,9 +43,6 @@ from deadtime.logs.latencies._windows import (
 )
 from deadtime.logs.latencies._words import cost_in_words, numbers_of, why_inadequate
 from deadtime.recordings import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from deadtime._base.digits import time_unit
-from deadtime._base.drawing import COLOURS, DATA, REFERENCE, bare_axes, new_figure
+from deadtime._base.drawing import COLOURS, DATA, REFERENCE, Axes, Figure, bare_axes, new_figure
 from deadtime.logs.latencies._relation import LoopLatency
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Height of a bar's row, and of what is around them, in inches.
 ROW, AROUND = 0.34, 1.3
