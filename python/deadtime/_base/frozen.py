@@ -22,6 +22,18 @@ class FrozenDict(dict[Any, Any]):
         return FrozenDict, (dict(self),)
 
 
+class Immutable:
+    """Base of objects whose attributes are set once, with ``object.__setattr__``."""
+
+    __slots__ = ()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a {type(self).__name__} does not change: cannot set {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a {type(self).__name__} does not change: cannot delete {name!r}")
+
+
 def read_only(value: Any) -> Any:
     """Return an array that cannot be written to, or a dict that cannot, with such values.
 

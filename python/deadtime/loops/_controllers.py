@@ -14,20 +14,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import finite
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
-from deadtime.loops._entries import matrix, vector
+from deadtime.loops._entries import Polynomial, matrix, multiplied, vector
 from deadtime.loops._given_plants import transfer_function_of
 from deadtime.systems import TransferFunction
-
-#: Descending coefficients: numbers, arrays of numbers or symbols.
-Polynomial: TypeAlias = list[Any]
 
 
 class ControllerEquations(NamedTuple):
@@ -94,9 +92,10 @@ class Controller(ABC):
             raise TypeError(f"filter={smooth!r}: give a DerivativeFilter or None")
 
     @classmethod
-    @abstractmethod
+    @cache
     def _gains(cls) -> tuple[str, ...]:
         """Names of the gains."""
+        return tuple(field.name for field in fields(cls) if field.name != "filter")
 
     @property
     def gains(self) -> dict[str, float]:
@@ -144,14 +143,14 @@ class Controller(ABC):
 
     def _replace(self, numbers: Mapping[str, float]) -> Controller:
         """Return the same controller with other numbers."""
-        fields: dict[str, Any] = {n: numbers.get(n, getattr(self, n)) for n in self._gains()}
+        changed: dict[str, Any] = {n: numbers.get(n, getattr(self, n)) for n in self._gains()}
         if self._filter is not None:
-            fields["filter"] = DerivativeFilter(
+            changed["filter"] = DerivativeFilter(
                 omega=numbers.get("omega", self._filter.omega),
                 damping=numbers.get("damping", self._filter.damping),
                 discretisation=self._filter.discretisation,
             )
-        return type(self)(**fields)
+        return type(self)(**changed)
 
     @abstractmethod
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
@@ -180,12 +179,12 @@ class Controller(ABC):
             omega, damping = values["omega"], values["damping"]
             rolled_off = [1.0, 2.0 * (damping * omega), omega * omega]
             slope = [omega * omega * d, 0.0]
-        num = _scaled(p, _multiplied(integral, rolled_off))
+        num = _scaled(p, multiplied(integral, rolled_off))
         if terms.differentiates:
-            num = _summed(num, _multiplied(integral, slope))
+            num = _summed(num, multiplied(integral, slope))
         if terms.integrates:
             num = _summed(num, _scaled(i, rolled_off))
-        return num, _multiplied(integral, rolled_off)
+        return num, multiplied(integral, rolled_off)
 
     def _equations(self, values: Mapping[str, Any]) -> ControllerEquations:
         """Equations of the states: integral of the error first, filter after it."""
@@ -289,10 +288,6 @@ class P(Controller):
 
     Kp: float
 
-    @classmethod
-    def _gains(cls) -> tuple[str, ...]:
-        return ("Kp",)
-
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(values["Kp"])
 
@@ -325,11 +320,7 @@ class PV(Controller):
 
     Kp: float
     Kv: float
-    filter: DerivativeFilter | None = field(default=None)
-
-    @classmethod
-    def _gains(cls) -> tuple[str, ...]:
-        return ("Kp", "Kv")
+    filter: DerivativeFilter | None = None
 
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(values["Kp"], derivative=values["Kv"], differentiates=True)
@@ -362,11 +353,7 @@ class PD(Controller):
 
     Kp: float
     Kd: float
-    filter: DerivativeFilter | None = field(default=None)
-
-    @classmethod
-    def _gains(cls) -> tuple[str, ...]:
-        return ("Kp", "Kd")
+    filter: DerivativeFilter | None = None
 
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(
@@ -397,10 +384,6 @@ class PI(Controller):
 
     Kp: float
     Ki: float
-
-    @classmethod
-    def _gains(cls) -> tuple[str, ...]:
-        return ("Kp", "Ki")
 
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(values["Kp"], integral=values["Ki"], integrates=True)
@@ -433,11 +416,7 @@ class PID(Controller):
     Kp: float
     Ki: float
     Kd: float
-    filter: DerivativeFilter | None = field(default=None)
-
-    @classmethod
-    def _gains(cls) -> tuple[str, ...]:
-        return ("Kp", "Ki", "Kd")
+    filter: DerivativeFilter | None = None
 
     def _terms(self, values: Mapping[str, Any]) -> _Terms:
         return _Terms(
@@ -448,15 +427,6 @@ class PID(Controller):
             differentiates=True,
             derivative_of_error=True,
         )
-
-
-def _multiplied(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Product of two polynomials."""
-    out: Polynomial = [0.0] * (len(p) + len(q) - 1)
-    for i, a in enumerate(p):
-        for j, b in enumerate(q):
-            out[i + j] = out[i + j] + a * b
-    return out
 
 
 def _summed(p: Polynomial, q: Polynomial) -> Polynomial:

@@ -7,7 +7,7 @@ entries of the matrices of many loops; with complex numbers, slopes by the compl
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,9 @@ def _is(other: Any, number: float) -> bool:
     return isinstance(other, (int, float)) and other == number
 
 
+#: Descending coefficients: numbers, arrays of numbers or symbols.
+Polynomial: TypeAlias = list[Any]
+
 #: Of a part without states.
 _NO_VECTOR = np.empty(0)
 _NO_MATRIX = np.empty((0, 0))
@@ -114,3 +117,12 @@ def number(value: Any) -> Any:
     if type(value) is float:
         return value
     return value if isinstance(value, Each) or np.iscomplexobj(value) else float(value)
+
+
+def multiplied(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Product of two polynomials."""
+    out: Polynomial = [0.0] * (len(p) + len(q) - 1)
+    for i, a in enumerate(p):
+        for j, b in enumerate(q):
+            out[i + j] = out[i + j] + a * b
+    return out

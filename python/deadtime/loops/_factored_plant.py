@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from deadtime._base.validation import finite, non_negative, non_zero, positive, unmasked
+from deadtime.loops._entries import multiplied
 from deadtime.loops._plants import NO_GAIN, Plant
 
 #: Names of the numbers of a pair of complex poles.
@@ -132,9 +133,9 @@ class FactoredPlant(Plant):
     def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
         num, den = self._without_lags(values)
         for i in range(1, len(self.lags) + 1):
-            den = _times(den, [values[f"lag_{i}"], 1.0])
+            den = multiplied(den, [values[f"lag_{i}"], 1.0])
         if "zero" in self.parameters:
-            num = _times(num, [values["zero"], 1.0])
+            num = multiplied(num, [values["zero"], 1.0])
         return num, den
 
     def _without_lags(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
@@ -144,13 +145,4 @@ class FactoredPlant(Plant):
             return num, den
         frequency, damping = (values[name] for name in PAIR)
         square = frequency * frequency
-        return [square * num[0]], _times(den, [1.0, 2.0 * damping * frequency, square])
-
-
-def _times(one: list[Any], other: list[Any]) -> list[Any]:
-    """Product of two polynomials with coefficients of any kind."""
-    found: list[Any] = [0.0] * (len(one) + len(other) - 1)
-    for i, a in enumerate(one):
-        for j, b in enumerate(other):
-            found[i + j] = found[i + j] + a * b
-    return found
+        return [square * num[0]], multiplied(den, [1.0, 2.0 * damping * frequency, square])

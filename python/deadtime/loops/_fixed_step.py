@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, positive
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._model import LoopRun, reference_jumps, refuse_discretised
@@ -33,17 +34,6 @@ class FixedStepSettings:
     step: float
     steps: int
     initial_output: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Lines:
-    """Linear interpolation between the steps, as such a tool plots it."""
-
-    times: Array
-    values: Array
-
-    def __call__(self, times: Array) -> Array:
-        return np.interp(times, self.times, self.values)
 
 
 def simulate_fixed_step(
@@ -131,7 +121,7 @@ def simulate_fixed_step(
     jumps = reference_jumps(np.zeros(1), reference, reference_time, before)
     values = loop.parameters
     plant = realise(*loop.plant._polynomials(values))
-    past = float(jumps.at(np.array([np.nextafter(0.0, -1.0)]))[0])
+    past = jumps.just_before(0.0)
     run = LoopRun(*specification.rest_at(initial, past), before, jumps.values, jumps.times)
     settings = FixedStepSettings(
         delay=delay,
@@ -145,6 +135,8 @@ def simulate_fixed_step(
     )
     found = fixed_step_run(plant, loop.controller._equations(values), run, settings)
     times = length * np.arange(settings.steps + 1, dtype=np.float64)
+    # As such a tool plots them.
+    lines: Any = partial(np.interp, xp=times, fp=found.outputs)
     moved = np.diff(jumps.values, prepend=before) != 0.0
     within = (jumps.times >= 0.0) & (jumps.times <= times[-1])
     return Response(
@@ -154,7 +146,7 @@ def simulate_fixed_step(
         breaks=jumps.times[moved & within],
         reference=jumps.at(times),
         steady_state=specification.steady_state(float(jumps.values[-1])),
-        _dense=_Lines(times, found.outputs),
+        _dense=lines,
     )
 
 

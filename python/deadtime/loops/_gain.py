@@ -43,13 +43,7 @@ class LoopGain:
         >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).open_loop()
         (2 + 0.3 s) exp(-0.36 s) / s
         """
-        self.specification.refuse_hold(
-            "has a hold in it, which this transfer function would leave out: use "
-            "continuous().open_loop() to leave it out on purpose"
-        )
-        loop = self.specification
-        _ = loop.known_delay
-        return open_loop(loop.plant, loop.controller, loop.parameters)
+        return open_loop(*self._without_hold("open_loop").known_parts)
 
     def closed_loop(self) -> TransferFunction:
         """Return the transfer function from reference to output, the limit left out.
@@ -70,13 +64,16 @@ class LoopGain:
         >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).closed_loop()
         2 exp(-0.36 s) / (s + (2 + 0.3 s) exp(-0.36 s))
         """
+        loop = self._without_hold("closed_loop")
+        return closed_loop(*loop.known_parts, loop.delay_path)
+
+    def _without_hold(self, question: str) -> LoopSpecification:
+        """The continuous loop, for a question that would leave a hold out."""
         self.specification.refuse_hold(
             "has a hold in it, which this transfer function would leave out: use "
-            "continuous().closed_loop() to leave it out on purpose"
+            f"continuous().{question}() to leave it out on purpose"
         )
-        loop = self.specification
-        _ = loop.known_delay
-        return closed_loop(loop.plant, loop.controller, loop.parameters, loop.delay_path)
+        return self.specification
 
     def margin(self) -> Margins:
         """Return the gain, phase and delay margin of the loop, its limit left out.

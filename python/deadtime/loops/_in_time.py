@@ -222,9 +222,7 @@ class LoopInTime:
                 f"limit={loop.limit}: the command that an impulse causes is beyond any limit; "
                 "leave it out with loop.replace(limit=None)"
             )
-        _ = loop.known_delay
-        closed = closed_loop(loop.plant, loop.controller, loop.parameters, loop.delay_path)
-        found = closed.impulse_response(time)
+        found = closed_loop(*loop.known_parts, loop.delay_path).impulse_response(time)
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
 
 

@@ -9,7 +9,7 @@ from typing import SupportsFloat, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.validation import OpenRange
+from deadtime._base.validation import OpenRange, Range
 from deadtime.loops._characteristic import family_of_loop
 from deadtime.loops._sampled_regions import sampled_poles_in
 from deadtime.loops._specification import LoopSpecification
@@ -241,10 +241,7 @@ class LoopPoles:
         return sampled_is_stable(loop.model, loop.known_delay, loop.sample_time)
 
     def crossings(
-        self,
-        ranges: Mapping[str, tuple[float, float]],
-        *,
-        at: Mapping[str, SupportsFloat] | None = None,
+        self, ranges: Mapping[str, Range], *, at: Mapping[str, SupportsFloat] | None = None
     ) -> Crossings:
         """Every crossing of the imaginary axis as one named number of a continuous loop varies.
 

@@ -15,7 +15,7 @@ from deadtime._base.validation import finite, one_dimensional
 from deadtime.loops._characteristic import closed_loop, reference_to_command
 from deadtime.loops._model import reference_jumps
 from deadtime.loops._specification import LoopSpecification
-from deadtime.systems import Response, TransferFunction, respond, step_response
+from deadtime.systems import Response, TransferFunction
 
 #: Relative error to which an initial output must be the one at rest.
 _AT_REST = 1e-9
@@ -66,7 +66,7 @@ def simulate_with_delays(
     if when.size > 1 and when[1] == start:
         when, held = when[1:], held[1:]
     runs = [
-        respond(driven, times, held, input_time=when, input_before=past)
+        driven.simulate(times, held, input_time=when, input_before=past)
         for driven in (output, command)
     ]
     steady = output.dcgain() * float(jumps.values[-1])
@@ -83,19 +83,17 @@ def simulate_with_delays(
 
 def settled_step_with_delays(loop: LoopSpecification, amplitude: float) -> Response:
     """Step response up to where it has settled."""
-    found = step_response(_driven(loop)[0], None, amplitude, 0)
+    found = _driven(loop)[0].step_response(amplitude=amplitude)
     return simulate_with_delays(loop, found.time, amplitude)
 
 
 def _driven(loop: LoopSpecification) -> tuple[TransferFunction, TransferFunction]:
     """From the reference to the output, and to the command."""
-    _ = loop.known_delay
-    parts = loop.plant, loop.controller, loop.parameters
-    command = reference_to_command(*parts)
+    command = reference_to_command(*loop.known_parts)
     if not command.is_proper:
         raise ValueError(
             "a step of the reference is an impulse of the command of this loop: give its "
             "derivative a DerivativeFilter, or take the derivative of the measurement alone, as PV "
             "does"
         )
-    return closed_loop(*parts, loop.delay_path), command
+    return closed_loop(*loop.known_parts, loop.delay_path), command

@@ -92,6 +92,11 @@ class LoopSpecification:
             )
         return self.delay
 
+    @property
+    def known_parts(self) -> tuple[Plant, Controller, dict[str, float]]:
+        """Plant, controller and all numbers; raises where the delay is None."""
+        return self.plant, self.controller, self.parameters | {"delay": self.known_delay}
+
     def refuse_hold(self, why: str) -> None:
         """Raise where the loop is sampled."""
         if self.sample_time is not None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, NamedTuple, TypeAlias
@@ -280,7 +279,7 @@ def sweep(
     refuse_discretised(common.controller, sampled, "a sweep")
     sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
     times = None if time is None and not responses else _times(time, responses)
-    with nullcontext() if progress is False else reported(progress, math.prod(shape)) as report:
+    with reported(progress, math.prod(shape)) as report:
         if times is None:
             return sets.until_settled(report)
         return sets.outputs(times, report) if responses else sets.decided(times, report)

@@ -19,6 +19,7 @@ from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple, SupportsFloat, cast
 
+from deadtime._base.frozen import Immutable
 from deadtime._base.validation import finite, numbers_at
 from deadtime.roots._native import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
@@ -43,7 +44,7 @@ class FamilyTerm(NamedTuple):
     slopes: tuple[tuple[str, float], ...]
 
 
-class ParametricQuasiPolynomial:
+class ParametricQuasiPolynomial(Immutable):
     """A quasi-polynomial whose coefficients and delays depend on named parameters.
 
     Made by algebra from `parameters`, `s`, `delay` and numbers: ``+``, ``-``, ``*``, whole powers
@@ -94,12 +95,6 @@ class ParametricQuasiPolynomial:
     def _adopt(self, names: tuple[str, ...], terms: Terms) -> None:
         object.__setattr__(self, "_names", names)
         object.__setattr__(self, "_terms", terms)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a {type(self).__name__} does not change: cannot set {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a {type(self).__name__} does not change: cannot delete {name!r}")
 
     @property
     def names(self) -> tuple[str, ...]:

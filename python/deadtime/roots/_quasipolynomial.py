@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import deadtime.roots._native as native
+from deadtime._base.frozen import Immutable
 from deadtime._base.validation import Range, unmasked
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
@@ -38,7 +39,7 @@ Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "ad
 _Family = TypeVar("_Family", covariant=True)
 
 
-class QuasiPolynomial(Characteristic):
+class QuasiPolynomial(Immutable, Characteristic):
     r"""A quasi-polynomial :math:`h(s) = \sum_j p_j(s)\, e^{-s\tau_j}` with real coefficients.
 
     Usually built by algebra with `deadtime.s`, `deadtime.delay` and numbers. Immutable; equal
@@ -102,12 +103,6 @@ class QuasiPolynomial(Characteristic):
         put(self, "_native", native)
         put(self, "_coefficients", _frozen(native.coefficients()))
         put(self, "_delays", _frozen(native.delays()))
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a QuasiPolynomial does not change: cannot set {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a QuasiPolynomial does not change: cannot delete {name!r}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (QuasiPolynomial, (self._coefficients, self._delays))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, SupportsFloat, TypeAlias, cast
 
 from deadtime._base.arrays import Array
@@ -46,25 +46,44 @@ def ranges_of(given: Given) -> dict[str, Range]:
     return ends
 
 
-def map_axes(ranges: Mapping[str, Any], shape: tuple[int, int]) -> dict[str, Array]:
-    """Points of the two axes by their names."""
+def map_axes(
+    ranges: Mapping[str, Any], shape: Sequence[int], least: int = 2, most: float = _MAX_CELLS
+) -> dict[str, Array]:
+    """Points of the two axes by their names; `least` along each, and at `most` as many cells."""
     if not isinstance(ranges, Mapping):
         raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
     if len(ranges) != 2:
         raise ValueError(
             f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}): a map has two"
         )
+    sizes = two_sizes("shape", shape, least)
+    _refuse_more(sizes, most)
     axes = {
         name: points_of(name, given, size)
-        for (name, given), size in zip(ranges.items(), _shape(shape), strict=True)
+        for (name, given), size in zip(ranges.items(), sizes, strict=True)
     }
-    cells = math.prod(len(points) for points in axes.values())
-    if cells > _MAX_CELLS:
+    _refuse_more(map(len, axes.values()), most)
+    return axes
+
+
+def two_sizes(name: str, given: Sequence[int], least: int) -> tuple[int, int]:
+    """Numbers of points along two axes."""
+    try:
+        first, second = (operator.index(size) for size in given)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{name}={given!r}: give two whole numbers") from error
+    if min(first, second) < least:
+        raise ValueError(f"{name}={given!r}: give at least {least} points along each axis")
+    return first, second
+
+
+def _refuse_more(sizes: Iterable[int], most: float) -> None:
+    cells = math.prod(sizes)
+    if cells > most:
         raise ValueError(
-            f"{cells} cells: more than {_MAX_CELLS} are more than a picture holds; take a smaller "
+            f"{cells} cells: more than {most} are more than a picture holds; take a smaller "
             "shape, or several maps of smaller ranges"
         )
-    return axes
 
 
 def damping_demand(given: object) -> tuple[float, float] | None:
@@ -75,18 +94,3 @@ def damping_demand(given: object) -> tuple[float, float] | None:
     except (TypeError, ValueError) as error:
         raise TypeError(f"damping={given!r}: give (ratio, horizon), such as (0.4, 5.0)") from error
     return finite("damping ratio", ratio), finite("horizon of the damping", horizon)
-
-
-def _shape(shape: Sequence[int]) -> tuple[int, int]:
-    try:
-        first, second = (operator.index(size) for size in shape)
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"shape={shape!r}: give two whole numbers") from error
-    if min(first, second) < 2:
-        raise ValueError(f"shape={shape!r}: give at least 2 points a range")
-    if first * second > _MAX_CELLS:
-        raise ValueError(
-            f"shape={shape!r}: more than {_MAX_CELLS} cells are more than a picture holds; take "
-            "fewer, or several maps of smaller ranges"
-        )
-    return first, second

@@ -8,7 +8,6 @@ infinity; both are excluded for all members of a box at once, and the roots of o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, SupportsFloat
@@ -241,7 +240,7 @@ def proved_boxes(
     share = finite("tol", tol)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"tol={share}: give a share of the ranges, from 0 to 1")
-    with nullcontext() if progress is False else reported(progress) as report:
+    with reported(progress) as report:
         found = native.proved_boxes(
             family_of(family, tuple(ends), at)._family,
             ends,
@@ -313,7 +312,7 @@ def largest_stable_box(
     """
     ends = ranges_of(ranges)
     step = positive("tol", tol)
-    with nullcontext() if progress is False else reported(progress) as report:
+    with reported(progress) as report:
         found = native.largest_stable_box(
             family_of(family, tuple(ends), at)._family,
             ends,

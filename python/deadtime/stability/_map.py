@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -382,7 +381,7 @@ def stability_map(
     question = Question(bool(abscissa), finite("decay", decay), damping_demand(damping), proof)
     size = len(axes[first]), len(axes[second])
     judged: ParametricQuasiPolynomial | None = None
-    with nullcontext() if progress is False else reported(progress, math.prod(size)) as report:
+    with reported(progress, math.prod(size)) as report:
         held: HeldFamily | None = None
         if isinstance(family, ControlLoop) and family.is_sampled:
             numbers = numbers_of(family.parameters, (*names, *fixed)) | fixed

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import SupportsFloat
@@ -143,7 +142,7 @@ def robust_map(
         raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
     known = family_of(family, (first, second, *held), at)
     cells = math.prod(len(points) for points in axes.values())
-    with nullcontext() if progress is False else reported(progress, cells) as report:
+    with reported(progress, cells) as report:
         unstable = native.robust_map(
             known._family,
             axes,

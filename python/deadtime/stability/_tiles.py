@@ -11,8 +11,9 @@ from typing import Any, SupportsFloat
 
 from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import Points, numbers_at, points_of
+from deadtime._base.validation import Points, numbers_at
 from deadtime.roots import HasFamily
+from deadtime.stability._arguments import map_axes, two_sizes
 from deadtime.stability._map import StabilityMap, stability_map
 
 
@@ -154,30 +155,11 @@ def tiles(
     >>> one.place[0], one.map(abscissa=False).unstable.shape
     (slice(10000, 11000, None), (1000, 1000))
     """
-    if not isinstance(ranges, Mapping):
-        raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
-    if len(ranges) != 2:
-        raise ValueError(
-            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}): a map has two"
-        )
-    sizes = _two("shape", shape), _two("tile", tile)
-    axes = {
-        name: points_of(name, given, size)
-        for (name, given), size in zip(ranges.items(), sizes[0], strict=True)
-    }
+    axes = map_axes(ranges, shape, least=1, most=math.inf)
+    sizes = two_sizes("tile", tile, least=1)
     lengths = [len(points) for points in axes.values()]
     first, second = (
         tuple(min(part, length - start) for start in range(0, length, part))
-        for length, part in zip(lengths, sizes[1], strict=True)
+        for length, part in zip(lengths, sizes, strict=True)
     )
     return Tiles(family, axes, numbers_at(at, tuple(axes)), (first, second))
-
-
-def _two(name: str, given: tuple[int, int]) -> tuple[int, int]:
-    try:
-        first, second = (operator.index(size) for size in given)
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"{name}={given!r}: give two whole numbers") from error
-    if min(first, second) < 1:
-        raise ValueError(f"{name}={given!r}: give at least one point along each axis")
-    return first, second

@@ -19,7 +19,6 @@ from deadtime.systems._response import (
     response_of as response_of,
     until_settled as until_settled,
 )
-from deadtime.systems._run import respond as respond, step_response as step_response
 from deadtime.systems._transfer import TransferFunction, feedback
 
 __all__ = ["DelaySystem", "Margins", "Response", "TransferFunction", "feedback"]

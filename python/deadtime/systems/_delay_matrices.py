@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array, Complex
-from deadtime._base.frozen import equal
+from deadtime._base.frozen import Immutable, equal
 from deadtime._base.validation import non_negative, real_array, unmasked
 
 #: One matrix, without delay, or matrices by their delays in s.
 Matrices: TypeAlias = ArrayLike | Mapping[float, ArrayLike]
 
 
-class DelayMatrices:
+class DelayMatrices(Immutable):
     """Base of `DelaySystem`, whose documentation says what the matrices are."""
 
     __slots__ = ("_A", "_B", "_C", "_D", "_E", "_N")
@@ -77,12 +77,6 @@ class DelayMatrices:
         values = (state, inputs, outputs, direct, derivative, late)
         for name, value in zip(DelayMatrices.__slots__, values, strict=True):
             object.__setattr__(self, name, value)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a {type(self).__name__} does not change: cannot set {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a {type(self).__name__} does not change: cannot delete {name!r}")
 
     @property
     def A(self) -> dict[float, Array]:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import OpenRange
@@ -32,7 +31,7 @@ from deadtime.roots import (
     family_of,
     margin_of_family,
 )
-from deadtime.systems._delay_matrices import DelayMatrices, Matrices
+from deadtime.systems._delay_matrices import DelayMatrices
 from deadtime.systems._margins import Margins
 from deadtime.systems._poles import HasPoles
 from deadtime.systems._realisation import Realisable, Realisation, of_matrices
@@ -105,24 +104,10 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
 
     __slots__ = ("_expansion", "_realisation")
 
-    #: The expanded determinant, or why there is none; None until asked for.
-    _expansion: QuasiPolynomial | ValueError | None
-    #: The form that is simulated; None until asked for.
-    _realisation: Realisation | None
-
-    def __init__(
-        self,
-        A: Matrices,
-        B: Matrices | None = None,
-        C: Matrices | None = None,
-        D: Matrices | None = None,
-        *,
-        E: ArrayLike | None = None,
-        N: Mapping[float, ArrayLike] | None = None,
-    ) -> None:
-        super().__init__(A, B, C, D, E=E, N=N)
-        object.__setattr__(self, "_expansion", None)
-        object.__setattr__(self, "_realisation", None)
+    #: The expanded determinant, or why there is none; from when it is asked for.
+    _expansion: QuasiPolynomial | ValueError
+    #: The form that is simulated; from when it is asked for.
+    _realisation: Realisation
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (self._A, self._B, self._C, self._D, self._E, self._N)
@@ -169,7 +154,7 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         >>> dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]], 0.5: [[0, 0], [1.5, 0]]}).characteristic()
         4 + 0.4 s + s^2 - 1.5 exp(-0.5 s)
         """
-        if self._expansion is None:
+        if not hasattr(self, "_expansion"):
             try:
                 found: QuasiPolynomial | ValueError = expanded(
                     [[self._entry(i, j) for j in self._states] for i in self._states]
@@ -179,7 +164,6 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
             object.__setattr__(self, "_expansion", found)
         if isinstance(self._expansion, QuasiPolynomial):
             return self._expansion
-        assert self._expansion is not None
         raise type(self._expansion)(*self._expansion.args)
 
     def transfer_function(self, output: int = 0, input: int = 0) -> TransferFunction:  # noqa: A002
@@ -338,9 +322,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     # Responses
 
     def _realised(self) -> Realisation:
-        if self._realisation is None:
+        if not hasattr(self, "_realisation"):
             object.__setattr__(self, "_realisation", self._realise())
-        assert self._realisation is not None
         return self._realisation
 
     def _realise(self, differentiated: bool = False) -> Realisation:

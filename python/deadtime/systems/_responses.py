@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime.systems._realisation import Realisable, Realisation
 from deadtime.systems._response import Response
-from deadtime.systems._run import Given, impulse_response, respond, step_response
+from deadtime.systems._run import Drive, Given, impulse_response, respond, step_response
 
 
 class HasResponses(ABC):
@@ -127,21 +127,20 @@ class HasResponses(ABC):
         >>> print(ramp.outputs.round(4))
         [0.     4.4998 9.5   ]
         """
-        return respond(
-            self,
-            time,
+        drive = Drive(
             inputs,
-            interpolation=interpolation,
-            input_time=input_time,
-            input_before=input_before,
-            input_breaks=input_breaks,
-            history=history,
-            history_derivative=history_derivative,
-            history_breaks=history_breaks,
-            initial_state=initial_state,
-            vectorized=vectorized,
-            max_step=max_step,
+            interpolation,
+            input_time,
+            input_before,
+            tuple(input_breaks),
+            history,
+            history_derivative,
+            tuple(history_breaks),
+            initial_state,
+            vectorized,
+            max_step,
         )
+        return respond(self, time, drive)
 
     def step_response(
         self,

@@ -6,7 +6,7 @@ Before the start the state is given by the history, and the inputs have the valu
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -24,16 +24,33 @@ Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
+class Drive:
+    """The arguments of `simulate` besides the time."""
+
+    inputs: Given = 1.0
+    interpolation: str = "hold"
+    input_time: ArrayLike | None = None
+    input_before: ArrayLike = 0.0
+    input_breaks: Sequence[float] = ()
+    history: Given = 0.0
+    history_derivative: Callable[..., ArrayLike] | None = None
+    history_breaks: Sequence[float] = ()
+    initial_state: ArrayLike | None = None
+    vectorized: bool = False
+    max_step: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class _Run:
     """The arguments of a simulation, which is repeated for other times."""
 
     system: Realisable
     start: float
-    arguments: dict[str, Any]
+    drive: Drive
 
     def __call__(self, times: Array) -> Array:
         inner = times[times > self.start]
-        response = respond(self.system, np.concatenate([[self.start], inner]), **self.arguments)
+        response = respond(self.system, np.concatenate([[self.start], inner]), self.drive)
         outputs = np.atleast_2d(response.outputs)
         return outputs if len(inner) < len(times) else outputs[:, 1:]
 
@@ -47,26 +64,11 @@ def _rest(system: Realisable, inputs: Array | None) -> Array | None:
     return rest
 
 
-def respond(
-    system: Realisable,
-    time: ArrayLike,
-    inputs: Given = 1.0,
-    *,
-    interpolation: str = "hold",
-    input_time: ArrayLike | None = None,
-    input_before: ArrayLike = 0.0,
-    input_breaks: Iterable[float] = (),
-    history: Given = 0.0,
-    history_derivative: Callable[..., ArrayLike] | None = None,
-    history_breaks: Iterable[float] = (),
-    initial_state: ArrayLike | None = None,
-    vectorized: bool = False,
-    max_step: float | None = None,
-) -> Response:
+def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     """Check the arguments of `simulate` and run the system."""
-    input_breaks, history_breaks = tuple(input_breaks), tuple(history_breaks)
-    model = _realisation(system)
-    if not model.has_states and (callable(history) or np.any(history) or initial_state is not None):
+    model, history = _realisation(system), drive.history
+    has_past = callable(history) or np.any(history) or drive.initial_state is not None
+    if not model.has_states and has_past:
         raise TypeError(
             "a transfer function says nothing of the state: give a DelaySystem to start from "
             "another history than zero"
@@ -75,13 +77,11 @@ def respond(
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     start = float(times[0])
-    before = _vector("input_before", input_before, model.inputs)
-    step = None if max_step is None else positive("max_step", max_step)
-    smooth: dict[str, Any] = {"start": start, "vectorized": vectorized, "max_step": step}
-    source, last = _input(
-        model, times, inputs, interpolation, input_time, before, input_breaks, smooth
-    )
-    past, slopes, state = _past(model, start, history, history_derivative, history_breaks, smooth)
+    before = _vector("input_before", drive.input_before, model.inputs)
+    step = None if drive.max_step is None else positive("max_step", drive.max_step)
+    smooth: dict[str, Any] = {"start": start, "vectorized": drive.vectorized, "max_step": step}
+    source, last = _input(model, times, drive, before, smooth)
+    past, slopes, state = _past(model, drive, smooth)
     if not model.has_states and before.any():
         if model.rest is None:
             raise ValueError(
@@ -90,27 +90,16 @@ def respond(
             )
         state = model.rest * before
         past = signals.constant(state)
-    if initial_state is not None:
-        state = _vector("initial_state", initial_state, model.states, "states")
+    if drive.initial_state is not None:
+        state = _vector("initial_state", drive.initial_state, model.states, "states")
     found = model.native.simulate(times - start, state, past, slopes, source)
     count = len(times)
     outputs = found.outputs.reshape(count, model.outputs).T
     shown = found.inputs.reshape(count, model.inputs).T
     if (model.inputs, model.outputs) == (1, 1):
         outputs, shown = outputs[0], shown[0]
-    arguments: dict[str, Any] = {
-        "inputs": inputs,
-        "interpolation": interpolation,
-        "input_time": times if input_time is None and _is_sampled(inputs, model) else input_time,
-        "input_before": input_before,
-        "input_breaks": input_breaks,
-        "history": history,
-        "history_derivative": history_derivative,
-        "history_breaks": history_breaks,
-        "initial_state": initial_state,
-        "vectorized": vectorized,
-        "max_step": max_step,
-    }
+    if drive.input_time is None and _is_sampled(drive.inputs, model):
+        drive = replace(drive, input_time=times)
     rest = _rest(system, last)
     return Response(
         time=times,
@@ -119,7 +108,7 @@ def respond(
         states=found.states.reshape(count, model.states).T,
         breaks=found.breaks + start,
         steady_state=float(rest[0]) if rest is not None and outputs.ndim == 1 else rest,
-        _dense=_Run(system, start, arguments) if len(times) > 1 else None,
+        _dense=_Run(system, start, drive) if len(times) > 1 else None,
     )
 
 
@@ -137,8 +126,10 @@ def step_response(
     height = np.zeros(model.inputs)
     height[index] = finite("amplitude", amplitude)
     if time is not None:
-        return respond(system, time, height)
-    return until_settled(lambda times: respond(system, times, height), model.A, model.longest)
+        return respond(system, time, Drive(height))
+    return until_settled(
+        lambda times: respond(system, times, Drive(height)), model.A, model.longest
+    )
 
 
 def impulse_response(system: Differentiable, time: ArrayLike | None, input: int) -> Response:  # noqa: A002
@@ -163,17 +154,11 @@ def _is_sampled(inputs: Given, model: Realisation) -> bool:
 
 
 def _input(
-    model: Realisation,
-    times: Array,
-    inputs: Given,
-    interpolation: str,
-    input_time: ArrayLike | None,
-    before: Array,
-    breaks: tuple[float, ...],
-    smooth: dict[str, Any],
+    model: Realisation, times: Array, drive: Drive, before: Array, smooth: dict[str, Any]
 ) -> tuple[Signal, Array | None]:
     """Give the native inputs, and their last values if these stay constant."""
     start, p = smooth["start"], model.inputs
+    inputs, input_time, interpolation = drive.inputs, drive.input_time, drive.interpolation
     if interpolation not in ("hold", "linear"):
         raise ValueError(f"interpolation={interpolation!r}: give 'hold' or 'linear'")
     if callable(inputs):
@@ -183,7 +168,7 @@ def _input(
         if span[0] == span[1]:
             value = signals.sampled("input u(t)", inputs, times, p, smooth["vectorized"])[:, 0]
             return signals.step(before, value), None
-        found = signals.fitted("input u(t)", inputs, span, breaks, p, **smooth)
+        found = signals.fitted("input u(t)", inputs, span, drive.input_breaks, p, **smooth)
         return found.input_signal(before), None
     if p == 0:
         return signals.constant(before), np.zeros(0)
@@ -210,14 +195,11 @@ def _input(
 
 
 def _past(
-    model: Realisation,
-    start: float,
-    history: Given,
-    derivative: Callable[..., ArrayLike] | None,
-    breaks: tuple[float, ...],
-    smooth: dict[str, Any],
+    model: Realisation, drive: Drive, smooth: dict[str, Any]
 ) -> tuple[Signal, Signal | None, Array]:
     """Give the native history, its derivative if needed, and the state at the start."""
+    start, breaks = smooth["start"], drive.history_breaks
+    history, derivative = drive.history, drive.history_derivative
     if not callable(history):
         if derivative is not None:
             raise ValueError("history_derivative goes with a callable history: leave it out")

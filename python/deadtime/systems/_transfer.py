@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.frozen import Immutable
 from deadtime._base.validation import OpenRange, non_negative, unmasked
 from deadtime.roots import (
     Parameter,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     pass
 
 
-class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):
+class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writable):
     """A transfer function num(s)/den(s) of two quasi-polynomials.
 
     Usually made by dividing: ``2.0 / s * delay(0.36)``. Immutable. A delay common to numerator
@@ -98,12 +99,6 @@ class TransferFunction(FrequencyDomain, HasPoles, HasResponses, Writable):
         n, d = without_common_delay(n, d)
         object.__setattr__(self, "_num", n)
         object.__setattr__(self, "_den", d)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a TransferFunction does not change: cannot set {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a TransferFunction does not change: cannot delete {name!r}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (TransferFunction, (self._num, self._den))
