@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 from deadtime._deadtime import FlightLikelihood, OnlineBank, PlantNumbers, RowNoise
+from deadtime.estimation.likelihood._disturbances import Disturbance
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.running._estimate import BankNumbers
-from deadtime.estimation.running._settings import BankSettings, GivenDisturbance
+from deadtime.estimation.running._settings import BankSettings
 
 WHITE, AIR, AIR_TIME, SENSOR, SENSOR_TIME = 0.006, 0.08, 0.9, 0.004, 0.2
 DELAYS = [0.27, 0.285, 0.3, 0.312, 0.33]
@@ -27,8 +28,8 @@ def settings(**changed):
         "delays": DELAYS,
         "layers": [([0.15], 0.0, [0.0] * count)],
         "disturbances": [
-            GivenDisturbance(True, AIR_TIME, AIR / WHITE),
-            GivenDisturbance(False, SENSOR_TIME, SENSOR / WHITE),
+            Disturbance(True, AIR_TIME, AIR / WHITE),
+            Disturbance(False, SENSOR_TIME, SENSOR / WHITE),
         ],
         "gain": (0.7, 0.4),
         "trim": 0.05,

@@ -19,7 +19,6 @@ which is left out: an estimator would have to know how the spectrum of the air d
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import whitened_columns
+from deadtime.estimation.likelihood._disturbances import disturbances_of
 from deadtime.experiments import Experiment, FlightNoise, RandomProcess, check_reads_samples
 from deadtime.loops import ControlLoop, P
 from deadtime.roots import delay
@@ -37,14 +37,6 @@ LONG = 1e5
 
 #: Most rows of the dense covariance.
 MOST_ROWS = 3000
-
-
-class Disturbance(NamedTuple):
-    """An Ornstein-Uhlenbeck process, in standard deviations of the white noise."""
-
-    at_input: bool
-    time_constant: float
-    deviation: float
 
 
 def trim_is_free(noise: FlightNoise) -> bool:
@@ -62,13 +54,7 @@ def trim_response(loop: ControlLoop, time: Array) -> Array:
 
 def in_open_loop(loop: ControlLoop, time: Array, columns: Array, noise: FlightNoise) -> Array:
     """Columns, a row each, whitened by the covariance of air and sensor without the loop."""
-    T, white = LONG * float(time[-1] - time[0]), noise.white
-    disturbances = [
-        Disturbance(True, noise.air_time, noise.air / white),
-        Disturbance(True, T, noise.air_walk * math.sqrt(T / 2.0) / white),
-        Disturbance(False, noise.sensor_time, noise.sensor / white),
-    ]
-    present = [one for one in disturbances if one.deviation > 0.0]
+    present = disturbances_of(noise, LONG * float(time[-1] - time[0]))
     if not present:
         return columns
     num, den = loop.plant._polynomials({**loop.plant.parameters, "gain": 1.0})

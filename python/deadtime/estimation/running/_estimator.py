@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
-from deadtime._base.validation import finite, positive
+from deadtime._base.validation import finite, non_negative, positive
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import OnlineBank
 from deadtime.estimation._result import DelayEstimate
@@ -19,10 +19,11 @@ from deadtime.estimation.running._settings import (
     DELAYS,
     LAGS,
     BankSettings,
+    alarm_of,
+    coarser,
     lag_sets,
     plant_model,
     points_of_range,
-    settings_of,
 )
 from deadtime.experiments import FlightNoise, Noise
 from deadtime.loops import ControlLoop
@@ -147,24 +148,30 @@ class OnlineEstimator:
         level: float = 0.95,
     ) -> None:
         self._loop = loop
-        self._delays = points_of_range("delays", delays, DELAYS)
+        points = points_of_range("delays", delays, DELAYS)
         self._lags = None if lags is None else points_of_range("lags", lags, LAGS)
-        self._model = plant_model(loop, ("delay", "gain"))
+        model = plant_model(loop, ("delay", "gain"))
         known = loop.parameters.get("gain")
         size = abs(known) if known else 1.0
-        self._gain = (float(known or 1.0), 0.5 * size) if gain is None else gain
-        self._lag_prior = np.zeros(1 if self._lags is None else self._lags.size)
-        self._freedom = GIVEN
+        self._settings = BankSettings(
+            num=model.num,
+            den=model.den,
+            air_behind_lags=model.air_behind_lags,
+            own_lag=model.own_lag,
+            delays=points.tolist(),
+            layers=[(one, model.zero, [0.0] * points.size) for one in lag_sets(model, self._lags)],
+            gain=(float(known or 1.0), 0.5 * size) if gain is None else gain,
+            memory=positive("memory", memory),
+            drift=non_negative("drift", drift),
+            gain_walk=non_negative("gain_drift", gain_drift * size),
+            width=positive("width", width),
+            alarm=alarm_of(false_alarms_per_hour),
+            every=coarser(points),
+            at_rest=at_rest,
+            level=level,
+            freedom=GIVEN,
+        )
         self._doubts: tuple[str, ...] = ()
-        self._options = {
-            "drift": drift,
-            "gain_walk": gain_drift * size,
-            "false_alarms_per_hour": false_alarms_per_hour,
-            "memory": memory,
-            "width": width,
-            "at_rest": at_rest,
-            "level": level,
-        }
         self._bank: OnlineBank | None = None
         self._changes: list[float] = []
         self._noise: FlightNoise | None = None
@@ -173,8 +180,7 @@ class OnlineEstimator:
         self._next_fit = math.inf
         self._reason = "the noise is being learned"
         # The settings are checked now, not with the first row.
-        checked = self._settings(FlightNoise(white=1.0))
-        OnlineBank(checked)
+        OnlineBank(self._settings)
         if noise is not None:
             self._begin(_flight_noise(noise))
 
@@ -207,8 +213,13 @@ class OnlineEstimator:
             options["gain"] = (fit.gain, 3.0 * spread)
         found = cls(fit.loop, **options)
         if found._lags is not None and error > 0.0 and fit.lag:
-            found._lag_prior = -0.5 * ((found._lags - fit.lag) / error) ** 2
-        found._freedom = min(MOST_FITTED, float(fit.residuals.size))
+            prior = (-0.5 * ((found._lags - fit.lag) / error) ** 2).tolist()
+            layers = [
+                (lags, zero, [weight] * len(flat))
+                for (lags, zero, flat), weight in zip(found._settings.layers, prior, strict=True)
+            ]
+            found._settings = found._settings._replace(layers=layers)
+        found._settings = found._settings._replace(freedom=_freedom_of(fit))
         if not fit.adequate:
             found._doubts = (f"the fit it began with was not ({fit.message})",)
         found._begin(fitted if noise is None else _flight_noise(noise))
@@ -222,7 +233,7 @@ class OnlineEstimator:
     @property
     def delays(self) -> tuple[float, float]:
         """The range of delays, s."""
-        return float(self._delays[0]), float(self._delays[-1])
+        return self._settings.delays[0], self._settings.delays[-1]
 
     def update(
         self, time: float, output: float | None, command: float | None = None
@@ -304,22 +315,8 @@ class OnlineEstimator:
         message = f"{found.message}; {reason}" if found.message else reason
         return replace(found, adequate=False, message=message)
 
-    def _settings(self, noise: FlightNoise) -> BankSettings:
-        sets = lag_sets(self._model, self._lags)
-        prior = np.repeat(self._lag_prior[:, None], self._delays.size, axis=1)
-        return settings_of(
-            self._model,
-            noise,
-            delays=self._delays,
-            lags=sets,
-            prior=prior,
-            gain=self._gain,
-            freedom=self._freedom,
-            **self._options,  # type: ignore[arg-type]
-        )
-
     def _begin(self, noise: FlightNoise) -> None:
-        self._bank = OnlineBank(self._settings(noise))
+        self._bank = OnlineBank(self._settings.under(noise))
         self._noise = noise
 
     def _learn(self, time: float, output: float | None, command: float | None) -> OnlineEstimate:
@@ -333,8 +330,8 @@ class OnlineEstimator:
         self._rows.append((time, None if output is None else finite("output", output)))
         if command is not None:
             self.command(time, command)
-        sets = lag_sets(self._model, self._lags)
-        totals = [sum(one) - self._model.zero + self._model.own_lag for one in sets]
+        settings = self._settings
+        totals = [sum(lags) - zero + settings.own_lag for lags, zero, _ in settings.layers]
         lags = (min(totals), max(totals))
         if time >= self._next_fit and len(self._rows) >= FEWEST:
             self._next_fit = time + LEARN
@@ -342,13 +339,13 @@ class OnlineEstimator:
                 fit = self._fit()
             except DeadtimeError as error:
                 self._reason = str(error)
-                if not self._options["at_rest"]:
+                if not settings.at_rest:
                     self._forget(time - LAST)
             else:
                 if fit.adequate or time - self._rows[0][0] >= LAST:
                     return self._replay(fit)
                 self._reason = fit.message
-        return not_yet(time, self.delays, lags, self._gain, self._reason)
+        return not_yet(time, self.delays, lags, settings.gain, self._reason)
 
     def _forget(self, time: float) -> None:
         """Forget what was before `time`, but for the command that held then."""
@@ -372,7 +369,7 @@ class OnlineEstimator:
     def _replay(self, fit: DelayEstimate) -> OnlineEstimate:
         """Begin with the noise of a fit, and give the bank what was kept."""
         noise = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
-        self._freedom = min(MOST_FITTED, float(fit.residuals.size))
+        self._settings = self._settings._replace(freedom=_freedom_of(fit))
         if not fit.adequate:
             self._doubts = (f"the first {LAST:.0f} s did not fit ({fit.message})",)
         self._begin(noise)
@@ -391,6 +388,11 @@ class OnlineEstimator:
         self._rows.clear()
         self._commands.clear()
         return self._estimate(numbers)
+
+
+def _freedom_of(fit: DelayEstimate) -> float:
+    """Rows that count for the deviation of the noise of a fit."""
+    return min(MOST_FITTED, float(fit.residuals.size))
 
 
 def _flight_noise(noise: Noise) -> FlightNoise:

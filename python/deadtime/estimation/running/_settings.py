@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime._base.validation import interval, non_negative, positive
+from deadtime._base.validation import interval, non_negative
+from deadtime.estimation.likelihood._disturbances import Disturbance, disturbances_of
 from deadtime.estimation.likelihood._search import PlantModel
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
@@ -35,14 +36,6 @@ SELDOM = 4.0
 COARSE = 0.01
 
 
-class GivenDisturbance(NamedTuple):
-    """Air or coloured noise, in deviations of the white noise."""
-
-    at_input: bool
-    time_constant: float
-    deviation: float
-
-
 class BankSettings(NamedTuple):
     """The settings of the kernel, by its names."""
 
@@ -52,11 +45,7 @@ class BankSettings(NamedTuple):
     own_lag: float
     delays: list[float]
     layers: list[tuple[list[float], float, list[float]]]
-    disturbances: list[GivenDisturbance]
     gain: tuple[float, float]
-    trim: float
-    white: float
-    freedom: float
     memory: float
     drift: float
     gain_walk: float
@@ -65,6 +54,20 @@ class BankSettings(NamedTuple):
     every: int
     at_rest: bool
     level: float
+    freedom: float
+    white: float = 1.0
+    trim: float = 0.0
+    disturbances: Sequence[Disturbance] = ()
+
+    def under(self, noise: FlightNoise) -> BankSettings:
+        """The settings for this noise."""
+        if noise.white <= 0.0:
+            raise ValueError(f"noise={noise!r} has no white noise: give its deviation, above zero")
+        return self._replace(
+            white=noise.white,
+            trim=OF_TRIM * abs(noise.trim),
+            disturbances=disturbances_of(noise, SLOW),
+        )
 
 
 def points_of_range(name: str, given: Any, number: int) -> Array:
@@ -102,54 +105,12 @@ def lag_sets(model: PlantModel, lags: Array | None) -> list[list[float]]:
     return [[float(lag), *model.lags[1:]] for lag in lags]
 
 
-def settings_of(
-    model: PlantModel,
-    noise: FlightNoise,
-    *,
-    delays: Array,
-    lags: Sequence[Sequence[float]],
-    prior: Array,
-    gain: tuple[float, float],
-    drift: float,
-    gain_walk: float,
-    false_alarms_per_hour: float,
-    freedom: float,
-    memory: float,
-    width: float,
-    at_rest: bool,
-    level: float,
-) -> BankSettings:
-    """Check and join everything. `prior`, shape (lags, delays), holds logarithms."""
-    if noise.white <= 0.0:
-        raise ValueError(f"noise={noise!r} has no white noise: give its deviation, above zero")
-    disturbances = [
-        GivenDisturbance(True, noise.air_time, noise.air / noise.white),
-        GivenDisturbance(True, SLOW, noise.air_walk * math.sqrt(SLOW / 2.0) / noise.white),
-        GivenDisturbance(False, noise.sensor_time, noise.sensor / noise.white),
-    ]
+def alarm_of(false_alarms_per_hour: float) -> float:
+    """Mean time between the false alarms that the sum of a change is held against, s."""
     rate = non_negative("false_alarms_per_hour", false_alarms_per_hour)
-    spacing = float(np.median(np.diff(delays)))
-    return BankSettings(
-        num=model.num,
-        den=model.den,
-        air_behind_lags=model.air_behind_lags,
-        own_lag=model.own_lag,
-        delays=delays.tolist(),
-        layers=[
-            (list(one), model.zero, weights)
-            for one, weights in zip(lags, prior.tolist(), strict=True)
-        ],
-        disturbances=[one for one in disturbances if one.deviation > 0.0],
-        gain=gain,
-        trim=OF_TRIM * abs(noise.trim),
-        white=noise.white,
-        freedom=freedom,
-        memory=positive("memory", memory),
-        drift=non_negative("drift", drift),
-        gain_walk=non_negative("gain_drift", gain_walk),
-        width=positive("width", width),
-        alarm=HOUR / (SELDOM * rate) if rate else math.inf,
-        every=max(1, round(COARSE / spacing)),
-        at_rest=at_rest,
-        level=level,
-    )
+    return HOUR / (SELDOM * rate) if rate else math.inf
+
+
+def coarser(delays: Array) -> int:
+    """Every how many of these delays the second bank has one."""
+    return max(1, round(COARSE / float(np.median(np.diff(delays)))))
