@@ -15,16 +15,8 @@ from deadtime._base.validation import OpenRange
 from deadtime.estimation._estimate import METHODS, checked_run
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
-from deadtime.estimation.methods._arx_scan import ARXScan
-from deadtime.estimation.methods._decay import Decay
-from deadtime.estimation.methods._decrement import Decrement
-from deadtime.estimation.methods._gcc import GCC
-from deadtime.estimation.methods._graphical import Graphical
-from deadtime.estimation.methods._method import Method, paired_runs
-from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._method import paired_runs
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
-from deadtime.estimation.methods._relay import Relay
-from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -50,6 +42,11 @@ LABELS = {
     "exact": "exact overshoot",
     "saturated": "overshoot with limit",
 }
+
+#: The methods that read a part of the recording, and those that fit all of it, of which the last
+#: needs the command.
+READINGS = ("decrement", "decay", "graphical", "relay", "gcc", "arx_scan")
+FITS = ("waveform", "output_error")
 
 #: Names of the fits of all samples within a sentence.
 IN_WORDS = {
@@ -341,23 +338,20 @@ def compare_methods(
             refusals[name] = str(error).rstrip(".")
     # Each is for another kind of experiment; their refusals need no report, and what they warn of
     # is said by `limitations`.
-    readings: list[Method] = [Decrement(), Decay(), Graphical(), Relay(), GCC(), ARXScan()]
-    for method in readings:
+    for name in READINGS:
         with suppress(NotIdentifiableError, RecordingError, ValueError), catch_warnings():
             simplefilter("ignore")
-            estimates[method.name] = method.estimate(runs, plain)
-    fits: list[Method] = [Waveform()]
-    if recording.command is not None:
-        fits.append(OutputError())
-    for method in fits:
-        frees = {method.name: plain}
+            estimates[name] = METHODS[name]().estimate(runs, plain)
+    fits = FITS if recording.command is not None else FITS[:1]
+    for fit in fits:
+        frees = {fit: plain}
         if named != plain:
-            frees[f"{method.name} with lag"] = named
+            frees[f"{fit} with lag"] = named
         for name, free in frees.items():
             try:
-                estimates[name] = method.estimate(runs, free)
+                estimates[name] = METHODS[fit]().estimate(runs, free)
             except NotIdentifiableError as error:
                 refusals[name] = str(error).rstrip(".")
-    if not any(method.name in estimates for method in fits):
+    if not any(name in estimates for name in fits):
         raise NotIdentifiableError(refusals["waveform"])
     return Comparison(estimates, refusals)

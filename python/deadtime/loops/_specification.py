@@ -7,13 +7,14 @@ them take the specification.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.frozen import PickledByFields
 from deadtime._base.validation import non_negative, positive
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
@@ -29,7 +30,7 @@ DELAY_PATHS = ("command", "measurement")
 
 
 @dataclass(frozen=True)
-class LoopSpecification:
+class LoopSpecification(PickledByFields):
     """Plant, controller, delay, hold and limit of a loop; see `ControlLoop` for each."""
 
     plant: Plant
@@ -67,10 +68,6 @@ class LoopSpecification:
                     f"{name}={value}: a hold or a limit needs a plant that is rational but for one "
                     f"delay in series, and this one has delays inside; leave {name} out"
                 )
-
-    def __getstate__(self) -> dict[str, Any]:
-        # The cached native loop does not pickle, and is quickly built again.
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -2,7 +2,6 @@
 
 from deadtime.recordings._check import RecordingCheck
 from deadtime.recordings._check_excitation import (
-    copied_setpoint as copied_setpoint,
     no_excitation as no_excitation,
     no_motion as no_motion,
 )

@@ -9,7 +9,7 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.loops import ControlLoop, FactoredPlant, Integrator, ParametricPlant, Plant
-from deadtime.recordings import Finding, Recording, copied_setpoint, no_excitation, no_motion
+from deadtime.recordings import Finding, Recording, no_excitation, no_motion
 
 #: Ratio of singular values of the scaled Jacobian below which the data do not distinguish two
 #: parameters. Rounding in difference quotients is at about 1e-8, so smaller values mistake rounding
@@ -101,11 +101,6 @@ def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
 def excited(recording: Recording) -> float:
     """Size of the excitation: the range of the reference, or of the output if that is constant."""
     return float(np.ptp(recording.reference)) or float(np.ptp(recording.output))
-
-
-def check_setpoint_active(recording: Recording) -> None:
-    """Refuse a reference that equals the output, as loggers write it while a mode is inactive."""
-    _refuse(copied_setpoint(recording.reference, recording.output))
 
 
 def _refuse(finding: Finding | None) -> None:

@@ -280,6 +280,7 @@ def minimise(
     start: Array,
     space: Directions | None = None,
     tolerance: float = TO_ROUNDING,
+    evaluations: int = EVALUATIONS,
 ) -> Minimum:
     """Search from `start` over the points of a space.
 
@@ -315,7 +316,7 @@ def minimise(
         xtol=tolerance,
         ftol=tolerance,
         gtol=None,  # an absolute bound, in units of the output squared
-        max_nfev=EVALUATIONS,
+        max_nfev=evaluations,
     )
     point = base + free @ found.x
     return Minimum(point, np.asarray(found.fun), model.jacobian(point))

@@ -51,9 +51,6 @@ class ColouredProfile(LikelihoodProfile):
 
     colour: Mapping[str, float] = field(default_factory=dict)
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return ColouredProfile, (self.fit, self.names, self.preferred, self._ends, self.colour)
-
     @cached_property
     def unseen(self) -> dict[str, float]:
         """Factors for air that may be there unseen, and for the colour."""

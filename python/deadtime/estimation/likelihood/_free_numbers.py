@@ -90,9 +90,6 @@ class NumbersProfile(LikelihoodProfile):
 
     free: FreeNumbers = field(default_factory=lambda: FreeNumbers({}, np.zeros((0, 0)), {}))
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return NumbersProfile, (self.fit, self.names, self.preferred, self._ends, self.free)
-
     @property
     def bounds(self) -> dict[str, float]:
         """Standard errors for the fitted noise, also those of these numbers."""

@@ -56,9 +56,6 @@ class LostCommandsProfile(LikelihoodProfile):
     commands_given: ClassVar[bool] = False
     cov: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return LostCommandsProfile, (self.fit, self.names, self.preferred, self._ends, self.cov)
-
     @property
     def common(self) -> Array:
         """Covariance of the common numbers."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.frozen import PickledByFields
 from deadtime.estimation._native import PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._search import (
     PARTS,
@@ -55,7 +56,7 @@ UNRESOLVED, SPLIT = 4.0, 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class LikelihoodProfile:
+class LikelihoodProfile(PickledByFields):
     """The profile of one fit.
 
     Attributes
@@ -71,9 +72,6 @@ class LikelihoodProfile:
     #: Whether the commands are given, not functions of the plant that is fitted.
     commands_given: ClassVar[bool] = True
     _ends: dict[tuple[str, float], tuple[float, float]] = field(default_factory=dict)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return LikelihoodProfile, (self.fit, self.names, self.preferred, self._ends)
 
     @property
     def centre(self) -> PlantNumbers:

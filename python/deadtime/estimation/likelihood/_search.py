@@ -15,6 +15,7 @@ from itertools import islice
 
 import numpy as np
 
+from deadtime._base.frozen import PickledByFields
 from deadtime.estimation._native import FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.loops import (
@@ -190,7 +191,7 @@ class PlantModel:
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseFit:
+class NoiseFit(PickledByFields):
     """Plant and noise that make the recordings likeliest.
 
     Attributes
@@ -230,9 +231,6 @@ class NoiseFit:
             total += PRICE_OF_SENSOR * (noise.sensor > 0.0) + PRICE_OF_TRIM * self.trim
             total += PRICE_OF_SCATTER * ((noise.stamps > 0.0) + (noise.arrivals > 0.0))
         return float(total)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return NoiseFit, (self.model, self.runs, self.trim, self.numbers, self.given_gain)
 
     @property
     def gain(self) -> float:

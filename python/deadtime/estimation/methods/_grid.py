@@ -39,7 +39,8 @@ from deadtime.estimation.data._checks import (
     start_and_span,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
-from deadtime.estimation.fit._least_squares import Ends
+from deadtime.estimation.fit._directions import Directions, all_directions
+from deadtime.estimation.fit._least_squares import Ends, minimise
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
 from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
@@ -55,6 +56,9 @@ REFINED = 3
 #: A lag is set to zero where this raises the cost by no more than this share: next to zero it acts
 #: like a delay, and the two cannot be distinguished.
 VANISHING = 1e-6
+
+#: Relative change of cost or parameters at which a search ends, and its most evaluations.
+TOLERANCE, EVALUATIONS = 1e-12, 60
 
 #: Two-sided 95 % quantile of the normal distribution.
 TWO_SIDED_95 = 1.96
@@ -271,33 +275,11 @@ class _Problem(SimulatedModel):
 
     def _minimised(self, point: Array, held: int | None = None) -> Array:
         """Least squares over all parameters, or all but one, from a point."""
-        from scipy.optimize import least_squares
-
-        loose = [place for place in range(point.size) if place != held]
-
-        def at(moved: Array) -> Array:
-            whole = point.copy()
-            whole[loose] = moved
-            return whole
-
-        def misfit(moved: Array) -> Array:
-            return self.misfit(at(moved))
-
-        def jacobian(moved: Array) -> Array:
-            return self.jacobian(at(moved))[:, loose]
-
-        found = least_squares(
-            misfit,
-            np.clip(point, self.low, self.high)[loose],
-            jac=jacobian,
-            bounds=(self.low[loose], self.high[loose]),
-            x_scale=self.scale[loose],
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=None,  # an absolute bound, in units of the output squared
-            max_nfev=60,
-        )
-        return at(np.asarray(found.x))
+        space = all_directions(point.size)
+        if held is not None:
+            base = np.where(np.arange(point.size) == held, point, 0.0)
+            space = Directions(base, np.delete(space.free, held, axis=1))
+        return minimise(self, point, space, TOLERANCE, EVALUATIONS).point
 
 
 def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:

@@ -18,6 +18,10 @@ from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
+#: What a track takes over from its estimates.
+NUMBERS = ("time", "delay", "lag", "delay_plus_lag", "gain")
+MARKS = ("known", "informed", "changed", "adequate")
+
 
 @dataclass(frozen=True, eq=False)
 class DelayTrack(ReadOnlyArrays):
@@ -73,27 +77,13 @@ class DelayTrack(ReadOnlyArrays):
         if not estimates:
             raise ValueError("no estimates: give at least one")
 
-        def numbers(name: str) -> Array:
-            return np.array([getattr(one, name) for one in estimates], dtype=float)
-
-        def marks(name: str) -> Mask:
-            return np.array([getattr(one, name) for one in estimates], dtype=bool)
-
         ends = np.array([one.ci for one in estimates])
-        return cls(
-            time=numbers("time"),
-            delay=numbers("delay"),
-            low=ends[:, 0],
-            high=ends[:, 1],
-            lag=numbers("lag"),
-            delay_plus_lag=numbers("delay_plus_lag"),
-            gain=numbers("gain"),
-            known=marks("known"),
-            informed=marks("informed"),
-            changed=marks("changed"),
-            adequate=marks("adequate"),
-            last=estimates[-1],
-        )
+        columns: dict[str, Any] = {
+            name: np.array([getattr(one, name) for one in estimates], dtype=kind)
+            for names, kind in ((NUMBERS, float), (MARKS, bool))
+            for name in names
+        }
+        return cls(low=ends[:, 0], high=ends[:, 1], last=estimates[-1], **columns)
 
     def __len__(self) -> int:
         return int(self.time.size)
