@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+#: Version of what is written as JSON: a new one where a key goes or changes its meaning.
+SCHEMA = 1
+
+
+def json_text(schema: str, found: Mapping[str, Any]) -> str:
+    """Values as JSON, the name of their schema first; numbers that are not finite become null."""
+    named = {"schema": f"deadtime.{schema}/{SCHEMA}", **found}
+    return json.dumps(plain(named), indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def plain(value: Any) -> Any:

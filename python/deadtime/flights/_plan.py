@@ -14,15 +14,19 @@ from deadtime.links.safety import Limits
 #: Smallest step, m or rad: several times the noise of what is measured.
 LEAST_STEP = 0.02
 
-#: What differs from the defaults of `FlightPlan` on the axes that are not absolute. Gains and the
-#: assumed delay leave room for a vehicle that leans before it accelerates.
+#: What differs from the defaults of `FlightPlan` on the height of ArduPilot and PX4, and on their
+#: heading.
+AUTOPILOT: Mapping[str, Any] = {"gains": (0.8, 1.4), "prior_delay": 0.5, "prior_gain": 1.0}
+
+#: What differs on the axes that are not absolute. Gains and the assumed delay leave room for a
+#: vehicle that leans before it accelerates.
 USUAL: Mapping[str, Mapping[str, Any]] = {
     "z": {},
     **{
         name: {"gains": (0.5, 0.8), "step": 0.5, "base": 0.0, "prior_delay": 0.9, "prior_gain": 1.0}
         for name in ("x", "y")
     },
-    "yaw": {"gains": (0.8, 1.4), "step": 0.4, "base": 0.0, "prior_delay": 0.5, "prior_gain": 1.0},
+    "yaw": {**AUTOPILOT, "step": 0.4, "base": 0.0},
 }
 
 
@@ -37,9 +41,13 @@ class FlightPlan:
     step : float
         Size of the steps, m or rad.
     base : float
-        Reference before the steps: a height, m, or from where the vehicle took off, m or rad.
-    settle, hold : float
-        Time at the base before the first step, and on each step, s.
+        Height the steps go up from, m.
+
+        On another axis than z: from where the vehicle took off, m or rad.
+    settle : float
+        Time at the base before the first step, s.
+    hold : float
+        Time on each step that is learnt from, s.
     checked_hold : float
         Time on each step of the flights with designed gains, s.
     sample_time : float
@@ -80,8 +88,18 @@ class FlightPlan:
     axis: AxisName = "z"
 
     @classmethod
-    def of_axis(cls, axis: AxisName, **changes: Any) -> Self:
+    def of_axis(cls, axis: AxisName, autopilot: bool = False, **changes: Any) -> Self:
         """The usual plan for an axis, with changes.
+
+        Parameters
+        ----------
+        axis : {"z", "x", "y", "yaw"}
+            The axis.
+        autopilot : bool
+            Whether ArduPilot or PX4 is flown, whose height takes longer to follow than that of an
+            AR.Drone.
+        **changes
+            Attributes that are not the usual ones.
 
         Raises
         ------
@@ -90,7 +108,8 @@ class FlightPlan:
         """
         if axis not in USUAL:
             raise ValueError(f"no axis {axis!r}: there are {', '.join(USUAL)}")
-        return cls(**{"axis": axis, **USUAL[axis], **changes})
+        usual = AUTOPILOT if autopilot and axis == "z" else USUAL[axis]
+        return cls(**{"axis": axis, **usual, **changes})
 
     @property
     def flown_axis(self) -> Axis:

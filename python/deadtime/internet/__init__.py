@@ -2,6 +2,12 @@
 
 from deadtime.internet._loop import GAINS as GAINS, run_internet_loop
 from deadtime.internet._plots import LABELS as LABELS, plot_internet_loop as plot_internet_loop
-from deadtime.internet._result import InternetLoop, InternetRun, Spread
+from deadtime.internet._result import (
+    COLUMNS as COLUMNS,
+    InternetLoop,
+    InternetRun,
+    in_ms as in_ms,
+)
+from deadtime.internet._spread import Spread
 
 __all__ = ["InternetLoop", "InternetRun", "Spread", "run_internet_loop"]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from deadtime._base.drawing import COLOURS, REFERENCE, Axes
-from deadtime.internet._result import InternetLoop
+from deadtime.internet._result import NAMES, InternetLoop
 
 #: Name, marker and colour of each method.
 LABELS = {
-    "dominant": ("paper's overshoot", "o", COLOURS[1]),
-    "exact": ("exact overshoot", "s", COLOURS[3]),
-    "waveform": ("waveform", "D", COLOURS[0]),
-    "output_error": ("output error", "^", COLOURS[2]),
+    "dominant": (NAMES["dominant"], "o", COLOURS[1]),
+    "exact": (NAMES["exact"], "s", COLOURS[3]),
+    "waveform": (NAMES["waveform"], "D", COLOURS[0]),
+    "output_error": (NAMES["output_error"], "^", COLOURS[2]),
 }
 
 

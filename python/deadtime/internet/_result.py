@@ -18,16 +18,17 @@ runs, and more accurately in steps that are replayed at other times of the measu
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.digits import between, shown
+from deadtime._base.digits import shown, stated
 from deadtime.estimation import DelayEstimate
 from deadtime.internet._replay import MAPS, interval_of_mean
+from deadtime.internet._spread import Spread
 from deadtime.links.udp import Trial
 from deadtime.recordings import Recording
 
@@ -39,66 +40,22 @@ METHODS = {
     "output_error": False,
 }
 
+#: Their names in tables.
+NAMES = {
+    "dominant": "paper's overshoot",
+    "exact": "exact overshoot",
+    "waveform": "waveform",
+    "output_error": "output error",
+}
+
+#: Headings of the columns of `InternetLoop.rows`.
+COLUMNS = ("K", "round trip p50 / p95", "lost", "late", "age", "Mo", *NAMES.values())
+
 #: Names of two of them at the beginning of a sentence.
 IN_WORDS = {"dominant": "The paper's overshoot method", "waveform": "The fit of the waveform"}
 
-#: Width of a 95 % interval in standard errors.
-TWO_SIDED = 3.92
-
 #: Largest spread of ages from processes that wake up late, as a share of the sample time.
 UNSTEADY = 0.3
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Mean and interval of one delay over several runs.
-
-    Attributes
-    ----------
-    count : int
-        Runs with an estimate.
-    mean : float
-        Mean of the estimates, s.
-    low, high : float
-        95 % interval of the mean delay, s: from replayed steps (`replayed`), or from the
-        differences between runs (Student's t); NaN where neither exists.
-    replayed : bool
-        Whether it is from replayed steps; it then includes the error of the method.
-    """
-
-    count: int
-    mean: float
-    low: float
-    high: float
-    replayed: bool = False
-
-    @property
-    def error(self) -> float:
-        """The standard error that the interval amounts to, s; NaN without one."""
-        return (self.high - self.low) / TWO_SIDED
-
-    @property
-    def interval(self) -> str:
-        """The interval in words, with how it was found; empty without one."""
-        if not math.isfinite(self.low):
-            return ""
-        how = "corrected by replaying" if self.replayed else "by the spread of the runs"
-        return f"{how} {between(self.low, self.high, self.error, 's')}"
-
-    @staticmethod
-    def of(values: Sequence[float]) -> Spread:
-        """The spread of these delays."""
-        from scipy import special
-
-        count = len(values)
-        if count == 0:
-            return Spread(0, math.nan, math.nan, math.nan)
-        mean = float(np.mean(values))
-        if count == 1:
-            return Spread(1, mean, math.nan, math.nan)
-        quantile = float(special.stdtrit(count - 1, 0.975))
-        half = quantile * float(np.std(values, ddof=1)) / math.sqrt(count)
-        return Spread(count, mean, mean - half, mean + half)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +114,26 @@ class InternetRun:
         fit = self.estimates.get(method)
         return math.nan if fit is None else fit.delay
 
+    def row(self) -> tuple[str, ...]:
+        """The run in a row with the headings `COLUMNS`; times in ms."""
+        trip, link = self.round_trip, self.plant["link"]
+        return (
+            f"{self.trial.gain:g}",
+            f"{in_ms(trip['p50'])} / {in_ms(trip['p95'])}",
+            str(link["lost"] + self.controller["link"]["lost"]),
+            f"{link['late']}/{link['received']}",
+            in_ms(self.age),
+            f"{100 * self.overshoot:.1f} %" if math.isfinite(self.overshoot) else "–",
+            *(self._estimate(method) for method in NAMES),
+        )
+
+    def _estimate(self, method: str) -> str:
+        fit = self.estimates.get(method)
+        if fit is None:
+            return "refused"
+        words = stated(1e3 * fit.delay, 1e3 * fit.stderr.get("delay", math.nan))
+        return words if fit.adequate and "±" in words else in_ms(fit.delay)
+
     def budget(self) -> dict[str, float]:
         """The parts of the mean age, s.
 
@@ -169,6 +146,11 @@ class InternetRun:
             "hold": 0.5 * self.trial.sample_time,
         }
         return {**parts, "waiting": self.age - sum(parts.values())}
+
+
+def in_ms(value: float | None) -> str:
+    """A time in a table, ms."""
+    return "–" if value is None or not math.isfinite(value) else f"{1e3 * value:.1f}"
 
 
 def _number(value: float | None) -> float:
@@ -211,6 +193,29 @@ class InternetLoop:
         """The delay that a method should find, from the measured age, s."""
         hold = 0.5 * self.runs[0].trial.sample_time
         return self.age - (0.0 if METHODS[method] else hold)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A row for each run, with the headings `COLUMNS`; times in ms."""
+        return [run.row() for run in self.runs]
+
+    def lines(self) -> list[str]:
+        """A line for each method: mean, 95 % interval, and what was measured."""
+        found = []
+        for method, name in NAMES.items():
+            spread = self.spread(method)
+            mean = shown(spread.mean, spread.error, "s") if spread.count else "–"
+            interval = f"; {spread.interval}" if spread.interval else ""
+            measured = stated(self.expected(method), math.nan, "s")
+            found.append(f"{name:<20}mean {mean}{interval}; measured {measured}")
+        return found
+
+    def refusals(self) -> list[str]:
+        """Why methods gave no estimate of a run, a sentence each."""
+        return [
+            f"K = {run.trial.gain:g}, {NAMES[method]}: {why}"
+            for run in self.runs
+            for method, why in run.refusals.items()
+        ]
 
     def explanation(self) -> list[str]:
         """Comparison of the estimates with the measured delay, in sentences."""

@@ -8,6 +8,7 @@ from event to event, for tests and simulated experiments. Each vehicle has a pac
 from deadtime.links.axes import AXES, Axis, AxisReader
 from deadtime.links.clock import now
 from deadtime.links.journal import Journal
+from deadtime.links.landing import run_landing, terminated_like_interrupted
 from deadtime.links.safety import Limits, UnitCommand, Watch, largest_gain
 from deadtime.links.vehicle import Motion, Vehicle, VehicleState
 from deadtime.links.virtual_time import run
@@ -26,4 +27,6 @@ __all__ = [
     "largest_gain",
     "now",
     "run",
+    "run_landing",
+    "terminated_like_interrupted",
 ]

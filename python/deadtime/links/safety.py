@@ -63,7 +63,7 @@ class Limits:
     max_climb : float
         Largest commanded vertical speed, m/s.
     max_speed : float
-        Largest commanded horizontal speed, m/s.
+        Largest horizontal speed commanded, m/s.
     max_yaw_rate : float
         Largest commanded turn, rad/s.
     max_body_rate : float
@@ -71,9 +71,12 @@ class Limits:
     min_thrust, max_thrust : float
         Least and largest commanded thrust, as shares of all that the motors have. Hovering takes a
         quarter to a half.
-    min_height, max_height : float
-        Beyond these a flight is aborted, m. The upper one is set in the vehicle too, where it has
-        such a setting.
+    min_height : float
+        Height below which a flight is aborted, m.
+    max_height : float
+        Height that ends a flight, m.
+
+        It is set in the vehicle too, where it has such a setting.
     max_angle : float
         Roll or pitch beyond which a flight is aborted, rad.
     min_battery : float
@@ -83,8 +86,9 @@ class Limits:
     max_heading_error : float
         The same of a heading, rad.
     max_distance : float
-        Horizontal distance from where the vehicle took off beyond which a flight is aborted, m,
-        where it reports its position.
+        Horizontal distance from the take-off that ends a flight, m.
+
+        Where the vehicle reports its position.
     max_jump : float
         Largest plausible rate of change of the measured height, m/s.
     max_state_age : float

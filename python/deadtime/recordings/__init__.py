@@ -13,6 +13,7 @@ from deadtime.recordings._first_bytes import (
     opened as opened,
     whole as whole,
 )
+from deadtime.recordings._growing import Row, Sent, growing_rows
 from deadtime.recordings._recording import (
     LARGEST as LARGEST,
     MINIMUM_SAMPLES as MINIMUM_SAMPLES,
@@ -27,7 +28,10 @@ __all__ = [
     "Hole",
     "Recording",
     "RecordingCheck",
+    "Row",
+    "Sent",
     "SentCommands",
     "Step",
+    "growing_rows",
     "read_recording",
 ]

@@ -68,8 +68,10 @@ class OnlineEstimator:
     loop : ControlLoop
         What is known of the plant; controller and delay do not count.
     delays : (low, high) or (low, high, n) or array_like
-        Delays of the filters, s; 50 of them by default. A delay outside cannot be found, but that
-        it may be outside is said.
+        The delay is between these, s.
+
+        Those of the filters, 50 by default. A delay outside cannot be found, but that it may be
+        outside is said.
     lags : (low, high) or (low, high, n), optional
         Lags of the filters, s, in place of the first lag of the plant; 5 of them by default.
         Without: the lag of the plant is known.
@@ -81,11 +83,15 @@ class OnlineEstimator:
         Mean and standard deviation of the gain before the first row. By default the gain of the
         plant and half of it.
     drift : float
-        Standard deviation that the delay gains in one second by its walk, s/√s.
+        What the delay gains by drifting in a second, s.
+
+        The standard deviation of its walk, s/√s.
     gain_drift : float
         The same for the gain, in parts of it.
     false_alarms_per_hour : float
-        Changes that are reported where there is none, at most in the mean; zero for no search.
+        Changes reported where there is none, an hour at most.
+
+        In the mean; zero for no search.
     memory : float
         Over how many seconds the scale of the noise is estimated again.
     width : float

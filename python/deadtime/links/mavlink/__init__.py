@@ -2,6 +2,7 @@
 
 from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.client import MAVLinkVehicle
+from deadtime.links.mavlink.listening import heard_rows
 from deadtime.links.mavlink.time_sync import LinkTime
 
-__all__ = ["LinkAddress", "LinkTime", "MAVLinkVehicle"]
+__all__ = ["LinkAddress", "LinkTime", "MAVLinkVehicle", "heard_rows"]

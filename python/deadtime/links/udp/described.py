@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, fields
+from typing import Annotated, Literal, TypeAlias, get_args
 
+from deadtime._base.bounds import Bounds
 from deadtime.links.udp.controller import ControllerOptions
 from deadtime.links.udp.delays import Constant, Delays, LogNormal, Normal, ShiftedGamma
 from deadtime.links.udp.network import Bursts, Network
@@ -13,8 +15,12 @@ from deadtime.links.udp.policies import DropLate, HoldThenZero, JitterBuffer, Ne
 from deadtime.links.udp.relay import RelayOptions
 
 #: Names of delays and policies in options.
-DELAYS = ("normal", "gamma", "lognormal")
-POLICIES = ("newest", "drop-late", "hold", "jitter-buffer")
+DelaysName: TypeAlias = Literal["normal", "gamma", "lognormal"]
+PolicyName: TypeAlias = Literal["newest", "drop-late", "hold", "jitter-buffer"]
+DELAYS, POLICIES = get_args(DelaysName), get_args(PolicyName)
+
+#: Numbers that options give.
+FROM_ZERO, FROM_ONE = Bounds(0.0), Bounds(1.0)
 
 KINDS = {"constant": Constant, "normal": Normal, "gamma": ShiftedGamma, "lognormal": LogNormal}
 
@@ -22,7 +28,7 @@ KINDS = {"constant": Constant, "normal": Normal, "gamma": ShiftedGamma, "lognorm
 LEAST = 0.8
 
 
-def delays_of(kind: str, mean: float, deviation: float) -> Delays:
+def delays_of(kind: DelaysName, mean: float, deviation: float) -> Delays:
     """One-way delays of this kind; constant ones without deviation."""
     if kind not in DELAYS:
         raise ValueError(f"the delays {kind!r} are none of {', '.join(DELAYS)}")
@@ -38,31 +44,36 @@ def delays_of(kind: str, mean: float, deviation: float) -> Delays:
 
 
 def network_of(
-    kind: str = "gamma",
-    delay: float = 0.05,
-    jitter: float = 0.0,
-    loss: float = 0.0,
-    burst: float = 1.0,
-    duplication: float = 0.0,
+    kind: DelaysName = "gamma",
+    delay: Annotated[float, FROM_ZERO] = 0.05,
+    jitter: Annotated[float, FROM_ZERO] = 0.0,
+    loss: Annotated[float, FROM_ZERO] = 0.0,
+    burst: Annotated[float, FROM_ONE] = 1.0,
+    duplication: Annotated[float, FROM_ZERO] = 0.0,
     ordered: bool = False,
 ) -> Network:
     """One direction of a network, from the numbers of options.
 
     Parameters
     ----------
-    kind : str
-        Distribution of the delays: ``"normal"``, ``"gamma"`` or ``"lognormal"``; the last two
-        begin at 0.8 of the mean.
-    delay, jitter : float
-        Mean and standard deviation of the one-way delay, s.
+    delay : float
+        Mean one-way delay, s.
+    jitter : float
+        Its standard deviation, s.
+    kind : {"gamma", "normal", "lognormal"}
+        Its distribution.
+
+        Delays of the first and the last kind begin at 0.8 of the mean.
     loss : float
-        Share of lost packets.
+        Part of the packets lost.
     burst : float
-        Mean number of packets lost in a row; 1 for independent losses.
+        Mean length of a burst of losses.
+
+        In packets; 1 for independent losses.
     duplication : float
-        Share of packets that arrive twice.
+        Part that comes twice.
     ordered : bool
-        Whether no packet overtakes another.
+        No packet overtakes another.
 
     Examples
     --------
@@ -78,15 +89,16 @@ def network_of(
     )
 
 
-def policy_of(name: str, number: float | None = None) -> Policy:
+def policy_of(name: PolicyName = "newest", number: float | None = None) -> Policy:
     """The policy of this name.
 
     Parameters
     ----------
-    name : str
-        ``"newest"``, ``"drop-late"``, ``"hold"`` or ``"jitter-buffer"``.
+    name : {"newest", "drop-late", "hold", "jitter-buffer"}
+        What the plant does with late commands.
     number : float, optional
-        Its time in s, or the number of held samples.
+        Of the policy: largest age (drop-late), samples held (hold), constant age (jitter-buffer);
+        times in s.
     """
     if name not in POLICIES:
         raise ValueError(f"the policy {name!r} is none of {', '.join(POLICIES)}")
@@ -130,7 +142,7 @@ def network_from(text: str) -> Network:
         raise ValueError(f"{text!r} does not describe a network: {error}") from None
 
 
-def policy_words(policy: Policy) -> tuple[str, float | None]:
+def policy_words(policy: Policy) -> tuple[PolicyName, float | None]:
     """Name and number of a policy, for `policy_of`."""
     if isinstance(policy, NewestWins):
         return "newest", None

@@ -29,21 +29,25 @@ class Trial:
     forward_path, return_path : Network
         Network from the plant to the controller, and back.
     seed : int
-        Seed of all delays and losses.
+        Of delays and losses.
     sample_time : float
         Time between two measurements, s.
     duration : float
         Duration of the run, s; the reference steps after `rest`.
     rest : float
         Time before the step, s.
-    plant_gain, lag : float
-        Of the integrator; the lag in s.
+    plant_gain : float
+        Gain of the integrator.
+    lag : float
+        Lag of the plant, s.
     limit : float
-        Largest size of the command, on both sides.
+        Largest size of the command.
+
+        On both sides.
     policy : Policy
         What the plant does with late commands.
     watchdog : float
-        Longest silence that both ends accept, s.
+        Silence after which each side is safe, s.
     safe : float
         The command that is applied after such a silence.
     """

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from ipaddress import ip_address
-from typing import get_args
+from typing import Annotated, get_args
 
-from deadtime._base.validation import non_negative
+from deadtime._base.bounds import Bounds, check_bounds
 from deadtime.links.addresses import canonical, is_loopback
 from deadtime.links.ardrone2.emulator.motion import DELAYS, PlantName
 
@@ -14,9 +14,11 @@ LOOPBACK = "127.0.0.1"
 
 #: First port of the vehicle: navdata, commands and control.
 PORT_BASE = 5550
-#: Largest delays, for which commands and navdata in transit are kept, and largest noise that
-#: navdata can represent.
-LARGEST = {"delay": 100.0, "jitter": 100.0, "downlink": 20.0, "noise": 10.0}
+#: Delays, s: commands and navdata in transit are kept.
+DELAY, DOWNLINK = Bounds(0.0, 100.0), Bounds(0.0, 20.0)
+#: Noise that navdata can represent, m.
+NOISE = Bounds(0.0, 10.0)
+PERCENT, SEED, PORT = Bounds(0.0, 100.0), Bounds(0), Bounds(0, 65535)
 PORTS_FROM_BASE = {
     "ftp_port": 1,
     "navdata_port": 4,
@@ -33,35 +35,51 @@ class EmulatorOptions:
     Parameters
     ----------
     plant : {"kit", "paper", "real", "thrust"}
-        Dynamics from the commanded climb to the height.
+        How height answers the commanded climb.
     delay : float, optional
-        Transport delay of motion commands, s; by default that of the plant.
+        Transport delay, s. Without: the plant's.
+
+        That of motion commands, up to 100 s.
     jitter : float
-        Each motion command takes up to this much longer, uniformly, s; none overtakes another.
+        Motion commands take up to this much longer, s.
+
+        Uniformly distributed, up to 100 s; none overtakes another.
     downlink : float
         Delay of navdata, s.
+
+        Up to 20 s.
     noise : float
-        Standard deviation of the measured height, m; for the measured climb ten times as much,
-        in m/s.
+        Noise of the height, m.
+
+        Its standard deviation, up to 10 m; the measured climb has ten times as much, in m/s.
     battery : float
-        Charge at the start, percent.
+        Charge, percent.
+
+        At the start.
     seed : int
-        Of noise and jitter.
+        Seed of noise and jitter.
     host : str
-        Address to listen on.
+        Address to listen on; others than 127.* can be reached from afar.
     clients : tuple of str
         Addresses of the accepted hosts; without any, every host that can reach the emulator.
         Required where other machines can reach it: a forged address then cannot make it send
         navdata to other hosts.
     navdata_port, command_port, control_port : int
-        0 takes a free one.
-    ftp_port, video_port : int, optional
-        Ports for file and video connections, which report that there is no data; none by default.
+        This port; 0: a free one.
+    ftp_port : int, optional
+        Port that tells that there are no files; ps_drone needs 21.
+
+        None by default.
+    video_port : int, optional
+        This port; 0: a free one.
+
+        It reports that there is no video. None by default.
     worst_case : bool
-        Do the worst where the behaviour of the vehicle is not known: hold the last motion until the
-        link is lost, and take off whenever it is on the ground and the take-off bit is set.
-        Otherwise be forgiving: hover 0.25 s after the last motion command, and take off when the
-        bit becomes set.
+        Do the worst that the vehicle may do: hold the last motion until the link is lost, take off
+        whenever the bit is set; or hover 0.25 s after the last motion.
+
+        The bit is that of the take-off. The vehicle that is forgiving takes off when it becomes
+        set.
 
     Raises
     ------
@@ -79,39 +97,25 @@ class EmulatorOptions:
     """
 
     plant: PlantName = "kit"
-    delay: float | None = None
-    jitter: float = 0.0
-    downlink: float = 0.0
-    noise: float = 0.002
-    battery: float = 100.0
-    seed: int = 0
+    delay: Annotated[float | None, DELAY] = None
+    jitter: Annotated[float, DELAY] = 0.0
+    downlink: Annotated[float, DOWNLINK] = 0.0
+    noise: Annotated[float, NOISE] = 0.002
+    battery: Annotated[float, PERCENT] = 100.0
+    seed: Annotated[int, SEED] = 0
     host: str = LOOPBACK
-    navdata_port: int = 5554
-    command_port: int = 5556
-    control_port: int = 5559
+    navdata_port: Annotated[int, PORT] = 5554
+    command_port: Annotated[int, PORT] = 5556
+    control_port: Annotated[int, PORT] = 5559
     clients: tuple[str, ...] = ()
-    ftp_port: int | None = None
-    video_port: int | None = None
+    ftp_port: Annotated[int | None, PORT] = None
+    video_port: Annotated[int | None, PORT] = None
     worst_case: bool = True
 
     def __post_init__(self) -> None:
         if self.plant not in DELAYS:
             raise ValueError(f"plant={self.plant!r} is none of {', '.join(get_args(PlantName))}")
-        for name, largest in LARGEST.items():
-            if getattr(self, name) is None:
-                continue
-            value = non_negative(name, getattr(self, name))
-            if value > largest:
-                raise ValueError(f"{name}={value}: give no more than {largest:g}")
-            object.__setattr__(self, name, value)
-        if not 0.0 <= self.battery <= 100.0:
-            raise ValueError(f"battery={self.battery} is outside 0 to 100: give a percentage")
-        if self.seed < 0:
-            raise ValueError(f"seed={self.seed} is negative: give 0 or more")
-        for name in PORTS_FROM_BASE:
-            port = getattr(self, name)
-            if port is not None and not 0 <= port <= 65535:
-                raise ValueError(f"{name}={port} is no port: give 1 to 65535, or 0 for a free one")
+        check_bounds(self)
         for client in self.clients:
             try:
                 ip_address(client)
