@@ -38,6 +38,8 @@ def test_the_table_shows_the_evidence_and_the_estimate_follows(roll):
         "further lag below",
     ):
         assert words in result.stdout
+    # The columns once had the headings of the table of methods.
+    assert ["plant", "BIC"] in [line.split()[:2] for line in result.stdout.splitlines()]
 
 
 def test_a_formula_with_two_lags_has_a_name_for_each(roll):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.table import Table
 
 from deadtime.estimation import (
     COLUMNS,
-    COLUMNS as PLANT_COLUMNS,
+    PLANT_COLUMNS,
     Comparison,
     PlantChoice,
     truth_row,
@@ -18,13 +17,7 @@ from deadtime.estimation import (
 
 def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = None) -> Table:
     """The delay by every method, with the truth beside it where it is known."""
-    table = Table(title="Delay of the loop", title_justify="left", box=None, padding=(0, 1, 0, 0))
-    for index, head in enumerate(COLUMNS):
-        justify: Literal["left", "right"] = "right" if 0 < index < len(COLUMNS) - 1 else "left"
-        table.add_column(head, justify=justify, no_wrap=True)
-    for row in comparison.rows():
-        # A reason does not fit into a cell; it is said in full below the table.
-        table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))
+    table = _table("Delay of the loop", COLUMNS, comparison.rows(), (COLUMNS[0], COLUMNS[-1]))
     if truth is not None:
         table.add_section()
         table.add_row(*truth_row(truth), style="bold")
@@ -33,9 +26,16 @@ def estimates_table(comparison: Comparison, truth: Mapping[str, float] | None = 
 
 def choice_table(choice: PlantChoice) -> Table:
     """The plants that were tried, the likeliest first."""
-    table = Table(title="Plants", title_justify="left", box=None, padding=(0, 1, 0, 0))
-    for index, head in enumerate(PLANT_COLUMNS):
-        table.add_column(head, justify="right" if index else "left", no_wrap=True)
-    for row in choice.rows():
+    return _table("Plants", PLANT_COLUMNS, choice.rows(), PLANT_COLUMNS[:1])
+
+
+def _table(
+    title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[str]
+) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    for head in heads:
+        table.add_column(head, justify="left" if head in left else "right", no_wrap=True)
+    for row in rows:
+        # A reason does not fit into a cell; it is said in full below the table.
         table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))
     return table

@@ -13,6 +13,7 @@ while the loop runs. Each method is a class that holds its options.
 # estimated while a loop runs.
 
 from deadtime.estimation._choose import (
+    PLANT_COLUMNS as PLANT_COLUMNS,
     PlantChoice,
     bic as bic,
     choose_plant,

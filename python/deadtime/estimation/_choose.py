@@ -39,7 +39,7 @@ LONG, SHORT, ZEROS = 3.0, 0.5, (0.3, 3.0)
 ALIKE, DAMPING = 0.7, 0.7
 
 #: Headings of the table.
-COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
+PLANT_COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
 
 #: Points of the distribution of delay and lag together, and the least weight of a plant in it.
 PLACES, LEAST = 4001, 1e-3
@@ -107,7 +107,7 @@ class PlantChoice(ReadOnlyArrays):
         return float(low), float(high)
 
     def rows(self) -> list[list[str]]:
-        """The plants as cells of a table with the headings `COLUMNS`, the likeliest first."""
+        """The plants as cells of a table with the headings `PLANT_COLUMNS`, the likeliest first."""
         least = min(self.criteria.values())
         found = []
         for name in sorted(self.criteria, key=lambda name: self.criteria[name]):
@@ -153,8 +153,8 @@ class PlantChoice(ReadOnlyArrays):
         return f"<PlantChoice {self.chosen} of {len(self.estimates)} plants: {self.best!r}>"
 
     def __str__(self) -> str:
-        rows = [list(COLUMNS), *self.rows()]
-        full = [row for row in rows if len(row) == len(COLUMNS)]
+        rows = [list(PLANT_COLUMNS), *self.rows()]
+        full = [row for row in rows if len(row) == len(PLANT_COLUMNS)]
         widths = [max(len(cell) for cell in column) for column in zip(*full, strict=True)]
         lines = [
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
