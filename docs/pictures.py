@@ -12,9 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from deadtime import paper
 from deadtime._base.drawing import new_figure
-from deadtime._cli.vehicles import emulated_drone
 from deadtime.estimation import Waveform
-from deadtime.flights import FlightPlan, fly_experiment
+from deadtime.flights import FlightPlan, FlownVehicle, fly_experiment
 from deadtime.flights._plots import plot_checked, plot_learned, plot_telemetry
 from deadtime.flights._runs import read_telemetry
 from deadtime.internet._loop import run_internet_loop
@@ -202,7 +201,7 @@ def estimating() -> None:
 def flying() -> None:
     """The experiment of `deadtime fly`, on the emulator in virtual time."""
     with tempfile.TemporaryDirectory() as folder:
-        connect = emulated_drone("kit", 0, FlightPlan().limits)
+        connect = FlownVehicle.emulated().connect
         found = fly_experiment(connect, FlightPlan(), Path(folder), run=virtual_time.run)
         figure, axes = new_figure(7.5, 4.6, rows=2)
         plot_checked(axes, [found.before, *found.checked])

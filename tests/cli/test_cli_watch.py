@@ -14,13 +14,14 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from browser import check_tab, chromium
+from deadtime._cli.watch import recorded_rows
 from deadtime._cli.watch_page import WatchPage
-from deadtime._cli.watched import Columns, Row, Sent, growing, heard, recorded
 from deadtime.estimation import online
-from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink import LinkAddress, heard_rows
 from deadtime.links.mavlink.codec import Codec, dialect
+from deadtime.recordings import Row, Sent, growing_rows
 
-COLUMNS = Columns("time", "output", "command")
+COLUMNS = ("time", "output", "command")
 
 
 def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path):
@@ -37,9 +38,9 @@ def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path):
 
     writer = threading.Thread(target=write)
     writer.start()
-    found = list(growing(part, COLUMNS, silence=1.0))
+    found = list(growing_rows(part, COLUMNS, silence=1.0))
     writer.join()
-    assert found == list(recorded(whole, COLUMNS))
+    assert found == list(recorded_rows(whole, COLUMNS))
 
 
 def test_a_saved_recording_is_watched_as_it_is(tmp_path):
@@ -47,19 +48,19 @@ def test_a_saved_recording_is_watched_as_it_is(tmp_path):
     times = np.arange(9.0)
     saved = dtm.Recording(times, times, 2.0 * times, 3.0 * times)
     saved.save(path)
-    assert list(growing(path, COLUMNS, 0.1)) == list(recorded(path, COLUMNS))
+    assert list(growing_rows(path, COLUMNS, 0.1)) == list(recorded_rows(path, COLUMNS))
 
 
 def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,output,command\n0.0,,0.5\n0.1,1.0,\n")
-    assert list(growing(path, COLUMNS, 0.1)) == [Row(0.0, None, 0.5), Row(0.1, 1.0, None)]
+    assert list(growing_rows(path, COLUMNS, 0.1)) == [Row(0.0, None, 0.5), Row(0.1, 1.0, None)]
     path.write_text("time,output,command\n0.0,height,0.5\n")
     with pytest.raises(dtm.RecordingError, match=r"line 2 of .*log\.csv is '0.0,height,0.5'"):
-        list(growing(path, COLUMNS, 0.1))
+        list(growing_rows(path, COLUMNS, 0.1))
     path.write_text("time,output\n")
     with pytest.raises(dtm.RecordingError, match="no column 'command', only time, output"):
-        list(growing(path, COLUMNS, 0.1))
+        list(growing_rows(path, COLUMNS, 0.1))
 
 
 def test_a_link_is_listened_to_and_never_answered():
@@ -69,7 +70,7 @@ def test_a_link_is_listened_to_and_never_answered():
         port = free.getsockname()[1]
     found = []
     listener = threading.Thread(
-        target=lambda: found.extend(heard(LinkAddress("udp", "127.0.0.1", port), "z", 0.5))
+        target=lambda: found.extend(heard_rows(LinkAddress("udp", "127.0.0.1", port), "z", 0.5))
     )
     listener.start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
@@ -101,7 +102,7 @@ def test_a_link_is_listened_to_and_never_answered():
 
 def test_a_link_that_would_be_sent_to_is_refused():
     with pytest.raises(ValueError, match="give udp:HOST:PORT"):
-        list(heard(LinkAddress.of("tcp:127.0.0.1:5760"), "z", 0.1))
+        list(heard_rows(LinkAddress.of("tcp:127.0.0.1:5760"), "z", 0.1))
 
 
 def test_labels_are_as_large_on_a_phone_and_nothing_is_missing():

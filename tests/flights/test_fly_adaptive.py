@@ -11,12 +11,11 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from command_line import one_clear_line, run as run_command
-from deadtime._cli.vehicles import emulated_drone
 from deadtime.estimation import OnlineEstimator
-from deadtime.flights import AdaptivePlan, FlightPlan, MovingDelay
+from deadtime.flights import AdaptivePlan, FlightPlan, FlownVehicle, MovingDelay
 from deadtime.flights._adaptive import STEP_COLUMNS, AdaptiveStudy
 from deadtime.flights._adaptive_control import AdaptiveControl, ChosenSet, ScheduledControl
-from deadtime.links import Limits, now, run
+from deadtime.links import now, run
 from deadtime.tuning import SwitchingProof, adaptive_gains
 
 LOOP = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(1.0), sample_time=0.1, limit=1.0)
@@ -105,7 +104,7 @@ def test_the_emulator_obeys_a_delay_that_moves():
             await asyncio.sleep(0.1)
 
     async def fly():
-        async with emulated_drone("kit", 0, Limits(max_climb=1.0), moving)() as drone:
+        async with FlownVehicle.emulated(moving=moving).connect() as drone:
             await drone.take_off()
             found = []
             for begin in (1e9, now() - 50.0):  # before the move; at its longest

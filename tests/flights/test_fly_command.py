@@ -15,8 +15,8 @@ import pytest
 from browser import check_page
 from command_line import run
 from deadtime._cli.fly import _free_folder
-from deadtime._cli.landing import run_landing, terminated_like_interrupted
 from deadtime.flights._step_test import HEIGHT, row_columns
+from deadtime.links import run_landing, terminated_like_interrupted
 from deadtime.links.ardrone2.emulator import Phase
 from emulated import emulator, skip_if_too_busy
 

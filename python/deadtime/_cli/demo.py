@@ -2,35 +2,49 @@
 
 from __future__ import annotations
 
-import csv
 import shlex
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import numpy as np
 
+from deadtime._base.bounds import Bounds
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.comparisons import estimates_table
-from deadtime._cli.show import print_json, print_points, print_table, print_text, stages
+from deadtime._cli.fills import filled
+from deadtime._cli.show import print_json, print_points, print_table, print_text, stages, write_rows
 from deadtime.loops import ControlLoop
-from deadtime.recordings import Recording
 from deadtime.reports import demo_recording, study, write_report
 
+#: What is written of the flight.
+COLUMNS = ("time", "reference", "output")
 
+
+@filled
 def command(
-    folder: Annotated[Path, typer.Option(help="Where to write.")] = Path("demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the sensor noise.")] = 1,
+    folder: Path = Path("demo"),
+    seed: Annotated[int, Bounds(0)] = 1,
     as_json: opt.As_json = False,
 ) -> None:
-    """Fly a simulated loop with known truth and find its delay and its gains; no hardware."""
+    """Fly a simulated loop with known truth and find its delay and its gains; no hardware.
+
+    Parameters
+    ----------
+    folder
+        Where to write.
+    seed
+        Seed of the sensor noise.
+    """
     check_pages()
     with stages(6, quiet=as_json) as begin:
         begin("flying the simulated loop")
         flight = demo_recording(seed)
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / "flight.csv"
-        _write_flight(flight.recording, file)
+        rows = np.column_stack([getattr(flight.recording, name) for name in COLUMNS]).tolist()
+        cells = [(f"{time:.3f}", f"{ref:.3f}", f"{output:.5f}") for time, ref, output in rows]
+        write_rows(file, ("t_s", "ref_m", "height_m"), cells)
         found = study(
             flight.recording, flight.known, window=flight.window, truth=flight, progress=begin
         )
@@ -56,16 +70,6 @@ def command(
     print_text(f"\nThe flight is in {file}, the report in {page}. To go on:")
     for line in _next_commands(found.known, flight.window, file, found.fit):
         print(f"  {line}")
-
-
-def _write_flight(recording: Recording, path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        rows = csv.writer(stream)
-        rows.writerow(["t_s", "ref_m", "height_m"])
-        for time, reference, output in zip(
-            recording.time, recording.reference, recording.output, strict=True
-        ):
-            rows.writerow([f"{time:.3f}", f"{reference:.3f}", f"{output:.5f}"])
 
 
 def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path, fit: object) -> list[str]:

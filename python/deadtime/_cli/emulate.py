@@ -5,22 +5,24 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
+from collections.abc import Coroutine
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from deadtime._base.bounds import Bounds
 from deadtime._base.validation import positive
 from deadtime._cli import options as opt
+from deadtime._cli.fills import Fills, Given, filled
 from deadtime._cli.show import console
 from deadtime.links import Journal
 from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions, Phase, Truth
-from deadtime.links.ardrone2.emulator.motion import PlantName
-from deadtime.links.ardrone2.emulator.options import LOOPBACK, PORT_BASE, ports_from
+from deadtime.links.ardrone2.emulator.options import PORT_BASE, ports_from
 from deadtime.links.parent_watch import parent_ended
 
 command = typer.Typer(
@@ -36,8 +38,6 @@ COLUMNS = ("time_s", "height_m", "climb_m_s", "setpoint_m_s", "battery_percent",
 
 PORTS = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port")
 
-Port = Annotated[int | None, typer.Option(min=0, max=65535, help="This port; 0: a free one.")]
-
 
 @command.callback()
 def _group() -> None:
@@ -45,79 +45,41 @@ def _group() -> None:
 
 
 @command.command()
+@filled
 def ardrone2(
-    plant: Annotated[
-        PlantName, typer.Option(help="How height answers the commanded climb.")
-    ] = "kit",
-    delay: Annotated[
-        float | None, typer.Option(min=0.0, help="Transport delay, s. Without: the plant's.")
-    ] = None,
-    jitter: Annotated[
-        float, typer.Option(min=0.0, help="Motion commands take up to this much longer, s.")
-    ] = 0.0,
-    downlink: Annotated[float, typer.Option(min=0.0, help="Delay of navdata, s.")] = 0.0,
-    noise: Annotated[float, typer.Option(min=0.0, help="Noise of the height, m.")] = 0.002,
-    battery: Annotated[float, typer.Option(min=0.0, max=100.0, help="Charge, percent.")] = 100.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of noise and jitter.")] = 0,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; others than 127.* can be reached from afar.")
-    ] = LOOPBACK,
-    client: Annotated[
-        list[str] | None,
-        typer.Option(help="Answer this IP address only; again for more. Needed with --host."),
-    ] = None,
-    port_base: Annotated[
-        int,
-        typer.Option(min=0, max=65000, help="Ports from here: +1, +4, +5, +6, +9. 0: free ones."),
-    ] = PORT_BASE,
-    navdata_port: Port = None,
-    command_port: Port = None,
-    control_port: Port = None,
-    ftp_port: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=65535, help="Port that tells that there are no files; ps_drone needs 21."
-        ),
-    ] = None,
-    video_port: Port = None,
-    worst_case: Annotated[
-        bool,
-        typer.Option(
-            "--worst-case/--forgiving",
-            help="Do the worst that the vehicle may do: hold the last motion until the link is "
-            "lost, take off whenever the bit is set; or hover 0.25 s after the last motion.",
-        ),
-    ] = True,
-    duration: Annotated[float | None, typer.Option(help="End after so long, s.")] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Write what the drone does, without noise, as CSV.")
-    ] = None,
-    until_input_ends: Annotated[
-        bool, typer.Option(help="End when standard input does, as whoever started this does.")
-    ] = False,
+    *,
+    vehicle: Annotated[
+        Given,
+        Fills(EmulatorOptions, "plant delay jitter downlink noise battery seed host"),
+    ],
+    client: list[str] | None = None,
+    port_base: Annotated[int, Bounds(0, 65000)] = PORT_BASE,
+    ports: Annotated[Given, Fills(EmulatorOptions, " ".join(PORTS), optional=True)],
+    worst: Annotated[Given, Fills(EmulatorOptions, "worst_case=--worst-case/--forgiving")],
+    duration: float | None = None,
+    record: Path | None = None,
+    until_input_ends: Annotated[bool, typer.Option()] = False,
     as_json: opt.As_json = False,
 ) -> None:
-    """Emulate an AR.Drone 2.0 until Ctrl-C: navdata, commands and configuration, in real time."""
-    ports = ports_from(port_base)
-    chosen = zip(
-        PORTS, (navdata_port, command_port, control_port, ftp_port, video_port), strict=True
-    )
-    ports |= {name: port for name, port in chosen if port is not None}
+    """Emulate an AR.Drone 2.0 until Ctrl-C: navdata, commands and configuration, in real time.
+
+    Parameters
+    ----------
+    client
+        Answer this IP address only; again for more. Needed with --host.
+    port_base
+        Ports from here: +1, +4, +5, +6, +9. 0: free ones.
+    duration
+        End after so long, s.
+    record
+        Write what the drone does, without noise, as CSV.
+    until_input_ends
+        End when standard input does, as whoever started this does.
+    """
     if duration is not None:
         positive("--duration", duration)
-    options = EmulatorOptions(
-        plant,
-        delay,
-        jitter,
-        downlink,
-        noise,
-        battery,
-        seed,
-        host=host,
-        clients=tuple(client or ()),
-        worst_case=worst_case,
-        **ports,
-    )
+    given = vehicle | ports_from(port_base) | ports | worst
+    options = EmulatorOptions(**given, clients=tuple(client or ()))
     asyncio.run(_emulate(options, duration, record, until_input_ends, as_json))
 
 
@@ -132,19 +94,17 @@ async def _emulate(
         journal = None if record is None else stack.enter_context(Journal(record, COLUMNS))
         async with Emulator(options) as emulator:
             print_address(emulator, as_json)
-            live = None
+            ended = parent_ended() if until_input_ends else asyncio.Event()
+            work: list[Coroutine[Any, Any, object]] = [ended.wait()]
+            if journal is not None:
+                work.append(_keep(emulator, journal))
             if not as_json and console.is_terminal:
                 live = stack.enter_context(Live(console=console, auto_refresh=False))
-            ended = parent_ended() if until_input_ends else asyncio.Event()
-            tasks: list[asyncio.Task[object]] = [asyncio.create_task(ended.wait())]
-            if journal is not None:
-                tasks.append(asyncio.create_task(_keep(emulator, journal)))
-            if live is not None:
-                tasks.append(asyncio.create_task(_show(emulator, live)))
+                work.append(_show(emulator, live))
+            tasks = [asyncio.create_task(part) for part in work]
             try:
-                done, _ = await asyncio.wait(
-                    tasks, timeout=duration, return_when=asyncio.FIRST_COMPLETED
-                )
+                first = asyncio.FIRST_COMPLETED
+                done, _ = await asyncio.wait(tasks, timeout=duration, return_when=first)
                 for task in done:
                     task.result()
             finally:

@@ -8,62 +8,51 @@ from typing import Annotated
 import typer
 
 from deadtime._cli import options as opt
+from deadtime._cli.fills import Given, filled
 from deadtime._cli.show import print_json, print_text
 from deadtime.estimation import estimate_delay
 from deadtime.recordings import read_recording
 
 
+@filled
 def command(
-    file: Annotated[
-        Path | None,
-        typer.Argument(
-            help="Table with a step of the loop: the delay and the gain of the plant come from it. "
-            "Without: the loop of the options.",
-            show_default=False,
-        ),
-    ] = None,
-    kp: Annotated[float, typer.Option(help="Proportional gain.")] = 1.5,
+    *,
+    file: Annotated[Path | None, typer.Argument(show_default=False)] = None,
+    kp: float = 1.5,
     kv: opt.Kv = 0.0,
-    ki: Annotated[float, typer.Option(help="Integral gain.")] = 0.0,
-    kd: Annotated[float, typer.Option(help="Gain on the derivative of the error.")] = 0.0,
-    delay: Annotated[float, typer.Option(help="Delay of the loop, s.")] = 0.36,
-    plant: opt.Plant = None,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
+    ki: float = 0.0,
+    kd: float = 0.0,
+    delay: float = 0.36,
+    numbers: Annotated[Given, opt.LOOP],
     filter: opt.Filter = None,  # noqa: A002
-    time: opt.Time = "time",
-    reference: opt.Reference = "reference",
-    output: opt.Output = "output",
-    command: opt.Command = None,
+    columns: Annotated[Given, opt.COLUMNS],
     window: opt.Window = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Write the page here, and do not open it.", show_default=False),
-    ] = None,
+    out: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Look at a loop live in the browser: its map of gains, roots, margins, responses."""
-    loop = opt.described_loop(
-        kp,
-        kv,
-        delay,
-        gain,
-        lag,
-        ki=ki,
-        kd=kd,
-        sample_time=sample_time,
-        limit=limit,
-        corner=filter,
-        plant=plant,
-    )
+    """Look at a loop live in the browser: its map of gains, roots, margins, responses.
+
+    Parameters
+    ----------
+    file
+        Table with a step of the loop: the delay and the gain of the plant come from it. Without:
+        the loop of the options.
+    kp
+        Proportional gain.
+    ki
+        Integral gain.
+    kd
+        Gain on the derivative of the error.
+    delay
+        Delay of the loop, s.
+    out
+        Write the page here, and do not open it.
+    """
+    loop = opt.described_loop(kp, kv, delay, ki=ki, kd=kd, corner=filter, **numbers)
     if file is None:
         page = loop.explore()
     else:
-        recording = read_recording(
-            file, time=time, reference=reference, output=output, command=command
-        )
+        recording = read_recording(file, **columns)
         found = estimate_delay(recording, loop, free=("delay", "gain"), window=window)
         if not as_json:
             print_text(found.summary())

@@ -8,28 +8,27 @@ from typing import Annotated
 import typer
 
 from deadtime._cli import options as opt
+from deadtime._cli.fills import filled
 from deadtime._cli.show import print_json, print_points, print_table, print_text, results_table
 from deadtime.logs import Log, LogLoop, open_log
 
 
+@filled
 def command(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            help="Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD.",
-            show_default=False,
-        ),
-    ],
-    loop: Annotated[
-        str | None,
-        typer.Option(
-            help="Tell about this loop only, for example 'roll rate'.", show_default=False
-        ),
-    ] = None,
+    log: Annotated[Path, typer.Argument(show_default=False)],
+    loop: str | None = None,
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains."""
+    """Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains.
+
+    Parameters
+    ----------
+    log
+        Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD.
+    loop
+        Tell about this loop only, for example 'roll rate'.
+    """
     found = open_log(log, flight=flight)
     if loop is not None:
         one = found.loop(loop)

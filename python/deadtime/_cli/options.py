@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from deadtime._base.validation import finite
+from deadtime._cli.fills import Fills
 from deadtime._cli.plants import plant_from
 from deadtime._cli.show import check_picture
 from deadtime.loops import (
@@ -24,6 +25,7 @@ from deadtime.loops import (
     P,
     RationalPlant,
 )
+from deadtime.recordings import read_recording
 
 
 def _drawn_later(path: Path | None) -> Path | None:
@@ -81,6 +83,16 @@ Flight = Annotated[
 ]
 
 
+#: The columns of a table that is read.
+COLUMNS = Fills(
+    read_recording,
+    "time reference output command",
+    time=Time,
+    reference=Reference,
+    output=Output,
+    command=Command,
+)
+
 #: Upper limit on the ratio of the simulated time to the shortest time of the loop (bounds time).
 MOST_PARTS = 1e6
 
@@ -89,17 +101,17 @@ SHORT_TIMES = ("delay", "lag", "sample_time")
 
 def described_loop(
     kp: float,
-    kv: float = 0.0,
+    kv: Kv = 0.0,
     delay: float | None = None,
-    gain: float = 1.0,
-    lag: float = 0.0,
+    gain: Gain = 1.0,
+    lag: Lag = 0.0,
     *,
     ki: float = 0.0,
     kd: float = 0.0,
-    sample_time: float | None = None,
-    limit: float | None = None,
+    sample_time: Sample_time = None,
+    limit: Limit = None,
     corner: float | None = None,
-    plant: str | None = None,
+    plant: Plant = None,
 ) -> ControlLoop:
     """The loop that the options describe: an integrator or `plant`, and the controller."""
     given = {"kp": kp, "kv": kv, "ki": ki, "kd": kd, "gain": gain, "lag": lag}
@@ -117,6 +129,10 @@ def described_loop(
         limit=limit,
     )
     return loop if plant is None else loop.replace(gain=gain)
+
+
+#: The numbers of a loop that have no special help in a command.
+LOOP = Fills(described_loop, "plant gain lag sample_time limit")
 
 
 def _described_controller(

@@ -14,9 +14,12 @@ from deadtime.links.parent_watch import first_line
 #: Longest time to start, and to end after a request, s.
 STARTING, ENDING = 30.0, 3.0
 
+#: What a client connects to.
+PORTS = ("navdata_port", "command_port", "control_port")
+
 
 @contextmanager
-def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
+def own_emulator(plant: str, seed: int) -> Iterator[dict[str, int]]:
     """Run ``deadtime emulate ardrone2`` on free ports: navdata, command and control.
 
     It runs in a separate session, so that Ctrl-C in the terminal does not end it before the drone
@@ -40,31 +43,24 @@ def own_emulator(plant: str, seed: int) -> Iterator[tuple[int, int, int]]:
         # The equivalent of a session on Windows.
         creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
     )
-    try:
-        yield _ports(process)
-    finally:
-        _end(process)
+    with process:
+        try:
+            yield _ports(process)
+        finally:
+            process.terminate()
+            try:
+                process.wait(ENDING)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
-def _ports(process: subprocess.Popen[str]) -> tuple[int, int, int]:
+def _ports(process: subprocess.Popen[str]) -> dict[str, int]:
     line = first_line(process, STARTING)
     try:
         ports = json.loads(line)
-        return int(ports["navdata_port"]), int(ports["command_port"]), int(ports["control_port"])
+        return {name: int(ports[name]) for name in PORTS}
     except (ValueError, KeyError, TypeError):
         raise LinkError(
             f"the emulator did not start within {STARTING:g} s: run 'deadtime emulate ardrone2' "
             "to see why"
         ) from None
-
-
-def _end(process: subprocess.Popen[str]) -> None:
-    process.terminate()
-    try:
-        process.wait(ENDING)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    for stream in (process.stdin, process.stdout):
-        if stream is not None:
-            stream.close()

@@ -5,34 +5,35 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
+from deadtime._cli.fills import Fills, Given, filled
 from deadtime._cli.show import print_json, print_text, stages
 from deadtime.recordings import read_recording
 from deadtime.reports import study, write_report
 
 
+@filled
 def command(
+    *,
     file: opt.File,
     kp: opt.Kp,
-    time: opt.Time = "time",
-    reference: opt.Reference = "reference",
-    output: opt.Output = "output",
-    command: opt.Command = None,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
-    plant: opt.Plant = None,
-    gain: opt.Gain = 1.0,
+    columns: Annotated[Given, opt.COLUMNS],
+    numbers: Annotated[Given, Fills(opt.described_loop, "sample_time limit plant gain")],
     window: opt.Window = None,
-    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("report.html"),
+    out: Path = Path("report.html"),
     as_json: opt.As_json = False,
 ) -> None:
-    """Write one page about a recording: delay, map of gains, a controller to try."""
+    """Write one page about a recording: delay, map of gains, a controller to try.
+
+    Parameters
+    ----------
+    out
+        The page to write.
+    """
     check_pages()
-    recording = read_recording(file, time=time, reference=reference, output=output, command=command)
-    loop = opt.described_loop(kp, gain=gain, sample_time=sample_time, limit=limit, plant=plant)
+    recording = read_recording(file, **columns)
+    loop = opt.described_loop(kp, **numbers)
     with stages(5, quiet=as_json) as begin:
         found = study(recording, loop, window=window, progress=begin)
     write_report(found, out)

@@ -9,6 +9,7 @@ import typer
 
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
+from deadtime._cli.fills import filled
 from deadtime._cli.show import (
     print_json,
     print_points,
@@ -33,22 +34,27 @@ STYLES = {
 SETTLED = (Verdict.EXACT, Verdict.MEASURED)
 
 
+@filled
 def command(
-    out: Annotated[Path, typer.Option(help="Folder for the figures and the page.")] = Path(
-        "reproduction"
-    ),
-    page: Annotated[
-        Path | None, typer.Option(help="The page. Without: reproduction.html in the folder.")
-    ] = None,
+    out: Path = Path("reproduction"),
+    page: Path | None = None,
     only: Annotated[
         str | None, typer.Option(help=f"Parts, between commas, of {', '.join(PARTS)}.")
     ] = None,
-    pictures: Annotated[
-        Literal["png", "svg", "pdf"], typer.Option(help="Format of the figures.")
-    ] = "png",
+    pictures: Literal["png", "svg", "pdf"] = "png",
     as_json: opt.As_json = False,
 ) -> None:
-    """Reproduce the paper on delays in quadrotor control: each printed number beside ours."""
+    """Reproduce the paper on delays in quadrotor control: each printed number beside ours.
+
+    Parameters
+    ----------
+    out
+        Folder for the figures and the page.
+    page
+        The page. Without: reproduction.html in the folder.
+    pictures
+        Format of the figures.
+    """
     check_pages()
     names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
     count = len(PARTS) if names is None else len(set(names))

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import typer
 
+from deadtime._base.bounds import Bounds
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
+from deadtime._cli.fills import Fills, Given, filled
 from deadtime._cli.show import print_json, print_table, print_text, results_table, save_figure
 from deadtime._cli.verdicts import listed, verdict
 from deadtime.roots import plot_certificate, plot_root_set
@@ -17,31 +18,35 @@ from deadtime.roots import plot_certificate, plot_root_set
 HEADS = ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius")
 
 
+@filled
 def command(
+    *,
     kp: opt.Kp,
     delay: opt.Delay,
     kv: opt.Kv = 0.0,
-    plant: opt.Plant = None,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
+    numbers: Annotated[Given, Fills(opt.described_loop, "plant gain lag sample_time")],
     filter: opt.Filter = None,  # noqa: A002
-    re: Annotated[opt.Ends | None, typer.Option(help="Region: real parts, 1/s.")] = None,
-    im: Annotated[opt.Ends | None, typer.Option(help="Region: imaginary parts, rad/s.")] = None,
-    rightmost: Annotated[
-        int, typer.Option(min=1, help="At most how many of those with Im s >= 0, without a region.")
-    ] = 3,
+    re: opt.Ends | None = None,
+    im: opt.Ends | None = None,
+    rightmost: Annotated[int, Bounds(1)] = 3,
     plot: opt.Plot = None,
-    certificate: Annotated[
-        Path | None,
-        typer.Option(help="File the proof of their number as JSON; with --plot, draw it, too."),
-    ] = None,
+    certificate: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Characteristic roots of a loop: the rightmost ones, or all in a region."""
-    loop = opt.described_loop(
-        kp, kv, delay, gain, lag, sample_time=sample_time, corner=filter, plant=plant
-    )
+    """Characteristic roots of a loop: the rightmost ones, or all in a region.
+
+    Parameters
+    ----------
+    re
+        Region: real parts, 1/s.
+    im
+        Region: imaginary parts, rad/s.
+    rightmost
+        At most how many of those with Im s >= 0, without a region.
+    certificate
+        File the proof of their number as JSON; with --plot, draw it, too.
+    """
+    loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
     if (re is None) != (im is None):
         raise ValueError("a region needs both --re and --im")
     found = loop.rightmost(rightmost) if re is None else loop.poles(re, im)

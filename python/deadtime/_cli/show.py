@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,28 +17,19 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from deadtime._base.drawing import check_matplotlib
-from deadtime._base.plain import plain
+from deadtime._base.plain import json_text
 from deadtime._cli.readable import shows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Version of what the commands print as JSON: a new one where a key goes or changes its meaning.
-SCHEMA = 1
-
 console = Console()
 PICTURES = (".png", ".svg", ".pdf")
 
 
-def as_json_text(schema: str, found: Mapping[str, Any]) -> str:
-    """Values as JSON, the name of their schema first; numbers that are not finite become null."""
-    said = {"schema": f"deadtime.{schema}/{SCHEMA}", **found}
-    return json.dumps(plain(said), indent=2, ensure_ascii=False, allow_nan=False)
-
-
 def print_json(schema: str, found: Mapping[str, Any]) -> None:
     """Print values as JSON."""
-    text = as_json_text(schema, found)
+    text = json_text(schema, found)
     print(text if shows(text) else json.dumps(json.loads(text), indent=2))
 
 
@@ -88,61 +82,50 @@ def save_figure(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
+def write_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows([heads, *rows])
+
+
 ERRORS = Console(stderr=True)
 
 
-def _bar() -> Progress:
-    """A progress bar on standard error that is removed at its end."""
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=ERRORS,
-        transient=True,
-    )
+@contextmanager
+def _bar(what: str, total: int, quiet: bool) -> Iterator[Callable[..., object]]:
+    """Change a progress bar on standard error, which is removed at its end, if there is one."""
+    if quiet or not ERRORS.is_terminal:
+        yield lambda **change: None
+        return
+    words = TextColumn("{task.description}")
+    columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=ERRORS, transient=True) as progress:
+        yield partial(progress.update, progress.add_task(what, total=total))
 
 
 @contextmanager
 def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int], object]]:
     """A progress bar over `total` items; call it with the number of finished items."""
-    if quiet or not ERRORS.is_terminal:
-        yield False
-        return
-    with _bar() as progress:
-        task = progress.add_task(what, total=total)
-        yield lambda done: progress.update(task, completed=done)
+    with _bar(what, total, quiet) as change:
+        yield False if quiet or not ERRORS.is_terminal else lambda done: change(completed=done)
 
 
 @contextmanager
 def results(what: str, count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """Lines on standard error as results come, above a progress bar over so many."""
-    if quiet or not ERRORS.is_terminal:
-        yield lambda line: None
-        return
-    with _bar() as progress:
-        task = progress.add_task(what, total=count)
+    with _bar(what, count, quiet) as change:
 
         def tell(line: str) -> None:
-            print_text(line, wrapped=False, on=ERRORS)
-            progress.advance(task)
+            if not quiet and ERRORS.is_terminal:
+                print_text(line, wrapped=False, on=ERRORS)
+            change(advance=1)
 
         yield tell
 
 
 @contextmanager
-def stages(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+def stages(count: int, quiet: bool) -> Iterator[Callable[[str], object]]:
     """A progress bar over named stages, on standard error; call it as each stage begins."""
-    if quiet or not ERRORS.is_terminal:
-        yield lambda stage: None
-        return
-    with _bar() as progress:
-        task = progress.add_task("", total=count)
-        begun = 0
-
-        def begin(stage: str) -> None:
-            nonlocal begun
-            progress.update(task, description=stage, completed=begun)
-            begun += 1
-
-        yield begin
+    begun = itertools.count()
+    with _bar("", count, quiet) as change:
+        yield lambda stage: change(description=stage, completed=next(begun))

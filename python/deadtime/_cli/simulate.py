@@ -2,62 +2,61 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import typer
 
+from deadtime._base.bounds import Bounds
 from deadtime._base.drawing import new_figure
 from deadtime._cli import options as opt
-from deadtime._cli.show import print_json, print_text, save_figure
+from deadtime._cli.fills import Given, filled
+from deadtime._cli.show import print_json, print_text, save_figure, write_rows
 from deadtime._cli.verdicts import verdict
 from deadtime.systems import plot_responses
 
 #: Metrics that a step response has also without a steady state.
 PEAK = ("peak", "peak_time")
 
+#: Columns of the table that is written.
+HEADS = ("time_s", "reference", "output", "command")
 
+
+@filled
 def command(
+    *,
     kp: opt.Kp,
     delay: opt.Delay,
     kv: opt.Kv = 0.0,
-    plant: opt.Plant = None,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    sample_time: opt.Sample_time = None,
-    limit: opt.Limit = None,
+    numbers: Annotated[Given, opt.LOOP],
     filter: opt.Filter = None,  # noqa: A002
-    duration: Annotated[float, typer.Option(min=1e-6, help="How long, s.")] = 10.0,
-    amplitude: Annotated[float, typer.Option(help="Size of the step.")] = 1.0,
-    points: Annotated[int, typer.Option(min=2, max=10_000_000, help="Output times.")] = 501,
-    out: Annotated[
-        Path | None, typer.Option(help="Write time, reference, output, command.")
-    ] = None,
+    duration: Annotated[float, Bounds(1e-6)] = 10.0,
+    amplitude: float = 1.0,
+    points: Annotated[int, Bounds(2, 10_000_000)] = 501,
+    out: Path | None = None,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Simulate the step response of a loop, exactly."""
-    loop = opt.described_loop(
-        kp, kv, delay, gain, lag, sample_time=sample_time, limit=limit, corner=filter, plant=plant
-    )
+    """Simulate the step response of a loop, exactly.
+
+    Parameters
+    ----------
+    duration
+        How long, s.
+    amplitude
+        Size of the step.
+    points
+        Output times.
+    out
+        Write time, reference, output, command.
+    """
+    loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
     opt.check_duration(loop, duration)
     time = np.linspace(0.0, duration, points)
     response = loop.simulate(time, amplitude)
     if out is not None:
-        with out.open("w", newline="", encoding="utf-8") as stream:
-            rows = csv.writer(stream)
-            rows.writerow(["time_s", "reference", "output", "command"])
-            rows.writerows(
-                zip(
-                    time.tolist(),
-                    [amplitude] * points,
-                    response.outputs.tolist(),
-                    response.inputs.tolist(),
-                    strict=True,
-                )
-            )
+        columns = (time, np.full(points, amplitude), response.outputs, response.inputs)
+        write_rows(out, HEADS, np.column_stack(columns).tolist())
     if plot is not None:
         figure, axes = new_figure(7.0, 3.8)
         plot_responses(axes, {"response": response})
@@ -79,7 +78,7 @@ def command(
             },
         )
         return
-    limited = " (without the limit on its command)" if limit is not None else ""
+    limited = " (without the limit on its command)" if loop.limit is not None else ""
     print_text(f"the loop{limited} is {verdict(loop)}")
     for name, value in figures.items():
         if stable or name in PEAK:

@@ -1,126 +1,121 @@
-"""The vehicles that ``deadtime fly`` flies, in real or virtual time."""
+"""The vehicle that ``deadtime fly`` flies: its options, and how its flights end on a signal."""
 
 from __future__ import annotations
 
-import asyncio
-import itertools
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass, field
-from statistics import median
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Annotated
 
-from deadtime._cli.landing import run_landing, terminated_like_interrupted
+import typer
+
+from deadtime._base.bounds import Bounds
 from deadtime._cli.own_emulator import own_emulator
-from deadtime.flights import Connect, Flown, MovingDelay
-from deadtime.links import Limits, Vehicle, run as run_virtual
-from deadtime.links.ardrone2 import ARDrone2
-from deadtime.links.ardrone2.emulator import Emulator, EmulatorOptions
+from deadtime.flights import FlownVehicle, MovingDelay
+from deadtime.links import Limits, terminated_like_interrupted
+from deadtime.links.ardrone2.emulator import EmulatorOptions
 from deadtime.links.ardrone2.emulator.motion import PlantName
-from deadtime.links.mavlink import LinkTime, MAVLinkVehicle
-
-#: UDP ports of navdata and commands, TCP port of the control connection.
-Ports = tuple[int, int, int]
-
-#: Difference between the noise seeds of successive links. It is large, so that runs with different
-#: values of --seed share none.
-SEED_STEP = 1_000_003
+from deadtime.links.mavlink import LinkAddress
 
 
 @dataclass(frozen=True)
-class FlownVehicle:
-    """A vehicle: how to connect to it, its name, what runs it, and what its link has measured."""
+class VehicleOptions:
+    """The options that say what is flown.
 
-    connect: Connect
-    name: str
-    run: Callable[..., Flown]
-    link_times: list[LinkTime] = field(default_factory=list)
-
-    def round_trip(self) -> float | None:
-        """Median round trip of the link while it was open, s, where the vehicle tells."""
-        return median(one.median for one in self.link_times) if self.link_times else None
-
-
-@contextmanager
-def flown_vehicle(
-    host: str | None,
-    link: str | None,
-    plant: PlantName,
-    seed: int,
-    virtual_time: bool,
-    height: float,
-    limits: Limits,
-    ports: Ports,
-    consent: bool = False,
-    moving: MovingDelay | None = None,
-) -> Iterator[FlownVehicle]:
-    name = f"an emulated AR.Drone 2.0 ({plant})"
-    if virtual_time:
-        yield FlownVehicle(emulated_drone(plant, seed, limits, moving), name, run_virtual)
-    elif link is not None:
-        with terminated_like_interrupted():
-            times: list[LinkTime] = []
-            connect = over_mavlink(link, height, limits, times, simulated=not consent)
-            yield FlownVehicle(connect, f"the vehicle at {link}", run_landing, times)
-    elif host is not None:
-        with terminated_like_interrupted():
-            yield FlownVehicle(lambda: _client(host, limits, ports), host, run_landing)
-    else:
-        with terminated_like_interrupted(), own_emulator(plant, seed) as own:
-            here = EmulatorOptions().host
-            yield FlownVehicle(lambda: _client(here, limits, own), name, run_landing)
-
-
-def over_mavlink(
-    link: str, height: float, limits: Limits, times: list[LinkTime], simulated: bool = False
-) -> Connect:
-    """Connect to a vehicle, or to a `simulated` one only.
-
-    What TIMESYNC says at the end of each connection goes to `times`.
+    Parameters
+    ----------
+    host : str, optional
+        Address of an AR.Drone 2.0. Without --host or --link: an emulator is started.
+    link : str, optional
+        Vehicle with ArduPilot or PX4: udp:HOST:PORT waits there for it, udpout:HOST:PORT sends
+        first, tcp:HOST:PORT connects, serial:DEVICE:BAUD is a serial port. Several links to it have
+        commas between them.
+    consent : bool
+        Needed with --host, and with a --link to another computer or to what is no simulator: a
+        vehicle is about to take off there.
+    plant : {"kit", "paper", "real", "thrust"}
+        What the emulator flies like.
+    moving_delay : str, optional
+        Delay of the emulator's commands in --virtual-time, s: the first one, and the one that it
+        goes to and back from during --adapt.
+    seed : int
+        Of the emulator's noise.
+    virtual_time : bool
+        Emulator and client in one process, in seconds.
+    ports : dict of str to int
+        Ports of the host.
     """
 
-    @asynccontextmanager
-    async def connect() -> AsyncIterator[Vehicle]:
-        async with MAVLinkVehicle(
-            link, limits, take_off_height=height, simulated=simulated
-        ) as vehicle:
-            yield vehicle
-            if vehicle.link_time is not None:
-                times.append(vehicle.link_time)
+    host: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None
+    link: Annotated[str | None, typer.Option(metavar="KIND:HOST:PORT,…")] = None
+    consent: bool = False
+    plant: PlantName = EmulatorOptions.plant
+    moving_delay: Annotated[str | None, typer.Option(metavar="FIRST,LONGEST")] = None
+    seed: Annotated[int, Bounds(0)] = 0
+    virtual_time: bool = False
+    ports: dict[str, int] = field(default_factory=dict)
 
-    return connect
+    def __post_init__(self) -> None:
+        if self.host is not None and self.link is not None:
+            raise ValueError("--host is an AR.Drone, --link ArduPilot or PX4: take one")
 
+    @property
+    def elsewhere(self) -> str | None:
+        """Where it is flown, if that is not on this computer alone."""
+        if self.link is None or all(address.loopback for address in LinkAddress.all_of(self.link)):
+            return self.host
+        return self.link
 
-def _client(host: str, limits: Limits, ports: Ports) -> ARDrone2:
-    navdata, command, control = ports
-    return ARDrone2(host, limits, navdata_port=navdata, command_port=command, control_port=control)
+    @property
+    def name(self) -> str:
+        """The vehicle in words, before it is connected to."""
+        if self.elsewhere is not None:
+            return f"a drone at {self.elsewhere}"
+        return f"an emulator ({self.plant})" if self.link is None else f"the vehicle at {self.link}"
 
-
-def emulated_drone(
-    plant: PlantName, seed: int, limits: Limits, moving: MovingDelay | None = None
-) -> Connect:
-    """Connect to an emulator in the same event loop; each link has a different noise seed.
-
-    Its transport delay is that of the plant, or one that moves.
-    """
-    seeds = itertools.count(seed, SEED_STEP)
-
-    @asynccontextmanager
-    async def connect() -> AsyncIterator[Vehicle]:
-        options = EmulatorOptions(
-            plant=plant, seed=next(seeds), navdata_port=0, command_port=0, control_port=0
-        )
-        async with Emulator(options) as emulator:
-            ports = (emulator.navdata_port, emulator.command_port, emulator.control_port)
-            moves = (
-                None
-                if moving is None
-                else asyncio.create_task(moving.drive(emulator.drone.set_delay))
+    def check_consent(self) -> None:
+        """Refuse a vehicle that is not on this computer alone without consent."""
+        if self.elsewhere is not None and not self.consent:
+            raise ValueError(
+                f"nothing was sent to {self.elsewhere}: a drone there would take off twice and fly "
+                "as said above. If nobody and nothing can be hurt by it, add --i-have-a-safe-area"
             )
-            try:
-                async with _client(emulator.host, limits, ports) as drone:
-                    yield drone
-            finally:
-                if moves is not None:
-                    moves.cancel()
 
-    return connect
+    def moving(self) -> MovingDelay | None:
+        """The delay of the emulator, if it moves."""
+        if self.virtual_time and (self.host is not None or self.link is not None):
+            raise ValueError(
+                "--virtual-time is for the emulator, others are in real time: take one"
+            )
+        if self.moving_delay is None:
+            return None
+        if not self.virtual_time:
+            raise ValueError("--moving-delay is for the emulator in --virtual-time: add that")
+        try:
+            first, longest = (float(part) for part in self.moving_delay.split(","))
+        except ValueError:
+            raise ValueError(
+                f"--moving-delay {self.moving_delay}: give two delays, such as 0.1,0.5"
+            ) from None
+        return MovingDelay((first, longest))
+
+    @contextmanager
+    def flown(
+        self, limits: Limits, height: float, moving: MovingDelay | None
+    ) -> Iterator[FlownVehicle]:
+        """The vehicle; outside virtual time each signal that ends the command lands it first."""
+        emulated = FlownVehicle.emulated(self.plant, self.seed, limits, moving)
+        if self.virtual_time:
+            yield emulated
+            return
+        with ExitStack() as stack:
+            stack.enter_context(terminated_like_interrupted())
+            if self.link is not None:
+                found = FlownVehicle.over_mavlink(self.link, limits, height, not self.consent)
+            elif self.host is not None:
+                found = FlownVehicle.ardrone2(self.host, limits, **self.ports)
+            else:
+                ports = stack.enter_context(own_emulator(self.plant, self.seed))
+                found = FlownVehicle.ardrone2(EmulatorOptions().host, limits, **ports)
+                found = replace(found, name=emulated.name)
+            yield found

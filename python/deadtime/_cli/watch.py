@@ -12,77 +12,71 @@ import typer
 from deadtime._base.errors import RecordingError
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
+from deadtime._cli.fills import Fills, Given, filled
 from deadtime._cli.show import print_json, print_text
 from deadtime._cli.watch_page import WatchPage
-from deadtime._cli.watched import Columns, Row, Sent, growing, heard, recorded
 from deadtime.estimation import DelayTrack, OnlineEstimate, OnlineEstimator
-from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink import LinkAddress, heard_rows
+from deadtime.recordings import Row, Sent, growing_rows, read_recording
 
 
+@filled
 def command(
-    source: Annotated[
-        str,
-        typer.Argument(
-            help="A table as of `estimate`; with --follow a CSV that grows; or udp:HOST:PORT, "
-            "where a MAVLink link is listened to. Nothing is ever sent.",
-            show_default=False,
-        ),
-    ],
+    *,
+    source: Annotated[str, typer.Argument(show_default=False)],
     time: opt.Time = "time",
     output: opt.Output = "output",
-    command: Annotated[str, typer.Option(help="Column of the command.")] = "command",
-    plant: opt.Plant = None,
-    gain: opt.Gain = 1.0,
-    lag: opt.Lag = 0.0,
-    lags: Annotated[
-        opt.Ends | None,
-        typer.Option(help="The lag is between these, s. Without: it is --lag.", show_default=False),
-    ] = None,
-    delays: Annotated[opt.Ends, typer.Option(help="The delay is between these, s.")] = (0.0, 0.6),
-    noise: Annotated[
-        float | None,
-        typer.Option(
-            help="Deviation of the sensor's white noise. Without: noise and air are learned from "
-            "the first seconds.",
-            show_default=False,
-        ),
-    ] = None,
-    drift: Annotated[
-        float, typer.Option(help="What the delay gains by drifting in a second, s.")
-    ] = 0.001,
-    false_alarms: Annotated[
-        float, typer.Option(help="Changes reported where there is none, an hour at most.")
-    ] = 1.0,
-    follow: Annotated[
-        bool, typer.Option("--follow", help="The file grows: wait for further lines.")
-    ] = False,
-    axis: Annotated[Literal["x", "y", "z"], typer.Option(help="Of a link.")] = "z",
-    silence: Annotated[
-        float, typer.Option(help="End after so many seconds without a line or message.")
-    ] = math.inf,
-    every: Annotated[float, typer.Option(help="Time between lines that are printed, s.")] = 1.0,
-    page: Annotated[
-        bool, typer.Option("--page", help="Serve a live page as well, to this computer alone.")
-    ] = False,
+    command: str = "command",
+    numbers: Annotated[Given, Fills(opt.described_loop, "plant gain lag")],
+    lags: opt.Ends | None = None,
+    delays: Annotated[Given, Fills(OnlineEstimator, "delays", delays=opt.Ends)],
+    noise: float | None = None,
+    followed: Annotated[
+        Given, Fills(OnlineEstimator, "drift false_alarms_per_hour=--false-alarms")
+    ],
+    follow: bool = False,
+    axis: Literal["x", "y", "z"] = "z",
+    silence: float = math.inf,
+    every: float = 1.0,
+    page: bool = False,
     as_json: opt.As_json = False,
 ) -> None:
-    """Follow the delay of a loop row by row, with its interval, while the loop runs."""
+    """Follow the delay of a loop row by row, with its interval, while the loop runs.
+
+    Parameters
+    ----------
+    source
+        A table as of `estimate`; with --follow a CSV that grows; or udp:HOST:PORT, where a MAVLink
+        link is listened to. Nothing is ever sent.
+    command
+        Column of the command.
+    lags
+        The lag is between these, s. Without: it is --lag.
+    noise
+        Deviation of the sensor's white noise. Without: noise and air are learned from the first
+        seconds.
+    follow
+        The file grows: wait for further lines.
+    axis
+        Of a link.
+    silence
+        End after so many seconds without a line or message.
+    every
+        Time between lines that are printed, s.
+    page
+        Serve a live page as well, to this computer alone.
+    """
     if page:
         check_pages()
-    loop = opt.described_loop(1.0, gain=gain, lag=lag or (0.1 if lags else 0.0), plant=plant)
-    estimator = OnlineEstimator(
-        loop,
-        delays=delays,
-        lags=lags,
-        noise=noise,
-        drift=drift,
-        false_alarms_per_hour=false_alarms,
-    )
+    if lags:
+        numbers["lag"] = numbers["lag"] or 0.1
+    loop = opt.described_loop(1.0, **numbers)
+    estimator = OnlineEstimator(loop, lags=lags, noise=noise, **delays, **followed)
     shown = WatchPage(source) if page else None
     if shown is not None and not as_json:
         print_text(f"page: {shown.address}")
     found: list[OnlineEstimate] = []
-    events = _events(source, Columns(time, output, command), follow, axis, silence)
+    events = _events(source, (time, output, command), follow, axis, silence)
     rows = 0
     try:
         for estimate in _estimates(estimator, events):
@@ -110,13 +104,23 @@ def command(
 
 
 def _events(
-    source: str, columns: Columns, follow: bool, axis: str, silence: float
+    source: str, columns: tuple[str, str, str], follow: bool, axis: str, silence: float
 ) -> Iterator[Row | Sent]:
     if source.startswith(("udp:", "udpout:", "tcp:")):
-        return heard(LinkAddress.of(source), axis, silence)
+        return heard_rows(LinkAddress.of(source), axis, silence)
     if follow:
-        return growing(Path(source), columns, silence)
-    return recorded(Path(source), columns)
+        return growing_rows(Path(source), columns, silence)
+    return recorded_rows(Path(source), columns)
+
+
+def recorded_rows(file: Path, columns: tuple[str, str, str]) -> Iterator[Row]:
+    """The rows of a table that is complete."""
+    time, output, command = columns
+    # No reference is needed.
+    found = read_recording(file, time=time, reference=output, output=output, command=command)
+    assert found.command is not None
+    values = (found.time, found.output, found.command)
+    return (Row(*row) for row in zip(*(column.tolist() for column in values), strict=True))
 
 
 def _estimates(

@@ -1,7 +1,7 @@
 """The experiment with a vehicle: fly steps, estimate the delay, design gains, fly these."""
 
 from deadtime.flights._adaptive import AdaptivePlan, AdaptiveStudy, fly_adaptive
-from deadtime.flights._fly import Connect as Connect, Flown as Flown, fly_axes, fly_experiment
+from deadtime.flights._fly import fly_axes, fly_experiment
 from deadtime.flights._moving_delay import MovingDelay
 from deadtime.flights._page import PARTS as PARTS, write_flight_page
 from deadtime.flights._plan import USUAL as USUAL, FlightPlan
