@@ -80,7 +80,11 @@ def test_an_integrator_is_known_from_the_loop():
 @pytest.mark.survey
 @pytest.mark.parametrize(
     ("vehicle", "known"),
-    [({}, FLAT), ({"zero": 0.03}, FLAT), ({"integrator": True}, INTEGRATING)],
+    [
+        pytest.param({}, FLAT, marks=pytest.mark.long),
+        ({"zero": 0.03}, FLAT),
+        pytest.param({"integrator": True}, INTEGRATING, marks=pytest.mark.long),
+    ],
 )
 def test_the_interval_of_the_sum_holds_the_truth_whatever_the_split(vehicle, known):
     truth = 0.247 - vehicle.get("zero", 0.0)

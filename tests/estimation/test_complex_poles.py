@@ -151,7 +151,7 @@ def test_a_plan_knows_the_numbers_of_any_plant():
 
 
 @pytest.mark.survey
-@pytest.mark.parametrize("air", [0.0, 0.03])
+@pytest.mark.parametrize("air", [0.0, pytest.param(0.03, marks=pytest.mark.long)])
 def test_intervals_hold_the_truth(air):
     held = dict.fromkeys((*TRUTH, "delay+lag"), 0)
     for seed in range(20):

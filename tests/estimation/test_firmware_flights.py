@@ -46,6 +46,7 @@ def test_waits_are_drawn_between_flights_without():
 
 @pytest.mark.survey
 @pytest.mark.flight
+@pytest.mark.long
 def test_what_commands_wait_comes_out_of_a_flight(tmp_path):
     # Drawn anew in each run; a failure shows it.
     wait = round(random.SystemRandom().uniform(0.05, LONGEST), 3)

@@ -208,6 +208,7 @@ def test_a_hundred_drifts_in_wind():
     assert found.adequate > 0.999
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_changes_of_six_bounds_are_found_and_calm_hours_are_calm():
     for up in (True, False):

@@ -31,6 +31,7 @@ def both(folder, flight):
 
 @pytest.mark.survey
 @pytest.mark.flight
+@pytest.mark.long
 def test_the_log_of_the_vehicle_and_the_link_agree(tmp_path):
     if (reason := firmware.why_not()) is not None:
         pytest.skip(reason)

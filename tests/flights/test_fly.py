@@ -291,6 +291,7 @@ def test_the_paper_s_experiment_is_reproduced(tmp_path):
     assert fast.timing.jitter < 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_a_vehicle_that_reports_no_climb_is_controlled_with_the_filter(tmp_path):
     vehicle = SimulatedVehicle(noise=0.002, random=np.random.default_rng(1), reports_climb=False)

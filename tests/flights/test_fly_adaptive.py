@@ -188,6 +188,7 @@ def test_the_command_flies_them_in_virtual_time(tmp_path):
 
 @pytest.mark.survey
 @pytest.mark.flight
+@pytest.mark.long
 def test_they_fly_on_the_firmware_behind_a_relay_whose_delay_moves(tmp_path):
     pytest.importorskip("pymavlink", reason="pymavlink is the codec")
     from arducopter import told_by

@@ -43,7 +43,7 @@ def flown(folder, one_way, firmware="ardupilot", loss=0.0):
 
 
 @pytest.mark.survey
-@pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
+@pytest.mark.parametrize("firmware", ["ardupilot", pytest.param("px4", marks=pytest.mark.long)])
 def test_what_the_relay_adds_is_what_the_estimate_rises_by(tmp_path, firmware):
     near, _ = flown(tmp_path / "near", 0.0, firmware)
     far, trips = flown(tmp_path / "far", 0.13, firmware)
@@ -62,6 +62,7 @@ def test_what_the_relay_adds_is_what_the_estimate_rises_by(tmp_path, firmware):
         assert study.learned.fit.gain == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_with_jitter_and_losses_the_estimate_is_the_mean(tmp_path):
     near, _ = flown(tmp_path / "near", 0.0)

@@ -51,6 +51,7 @@ def test_the_estimate_is_the_mean_of_the_delays(tmp_path):
     assert np.sqrt(np.mean(np.square(errors))) < 0.008
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_intervals_hold_the_mean_in_80_flights(tmp_path):
     # The first of 200 flights, of which the pages give the figures.

@@ -87,7 +87,9 @@ def without_results():
         if "```python\n" in text and ">>> " not in text:
             # These take longer than all others together.
             slow = page.stem in ("designing", "gains-that-follow-the-delay", "reproduction")
-            yield pytest.param(page, id=page.stem, marks=[pytest.mark.survey] if slow else [])
+            yield pytest.param(
+                page, id=page.stem, marks=[pytest.mark.survey, pytest.mark.long] if slow else []
+            )
 
 
 def is_installed(source: str) -> bool:

@@ -115,6 +115,7 @@ def test_damaged_frames_are_neither_believed_nor_answered():
 
 
 @pytest.mark.survey
+@pytest.mark.long
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
 def test_100_000_damaged_frames_are_neither_believed_nor_answered(firmware, key):

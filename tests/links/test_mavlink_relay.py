@@ -9,7 +9,7 @@ pytest.importorskip("pymavlink", reason="pymavlink is the codec")
 
 from arducopter import told_by
 
-pytestmark = [pytest.mark.survey, pytest.mark.flight]
+pytestmark = [pytest.mark.survey, pytest.mark.flight, pytest.mark.long]
 
 #: What the relay adds to the round trip, s.
 ADDED = 0.26

@@ -70,6 +70,7 @@ def test_a_log_is_answered_rightly_or_doubted(kind, logger):
         assert abs(value - truth) < 4.0 * error
 
 
+@pytest.mark.long
 @pytest.mark.survey
 @pytest.mark.parametrize("kind", LOGGERS)
 def test_adequate_intervals_hold_the_truth_as_often_as_they_say(kind):

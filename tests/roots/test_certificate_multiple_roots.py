@@ -21,7 +21,7 @@ def pair_of_roots(m):
         (3, 1e-3),
         (3, 1e-9),
         *(
-            pytest.param(*one, marks=pytest.mark.survey)
+            pytest.param(*one, marks=[pytest.mark.survey, pytest.mark.long])
             for one in [(3, 1e-6), (4, 1e-4), (6, 1e-2), (6, 1e-4)]
         ),
     ],

@@ -93,9 +93,10 @@ def test_small_systems_have_the_roots_of_their_expansion(n):
 
 
 @pytest.mark.survey
-def test_many_random_systems_are_never_wrong():
+@pytest.mark.parametrize("count", [40, pytest.param(250, marks=pytest.mark.long)])
+def test_many_random_systems_are_never_wrong(count):
     proved = 0
-    for seed in range(250):
+    for seed in range(count):
         rng = np.random.default_rng(seed)
         n, delays = int(rng.integers(2, 7)), int(rng.integers(1, 4))
         system = random_system(seed, n, delays, size=float(rng.uniform(0.1, 4)))
@@ -106,7 +107,7 @@ def test_many_random_systems_are_never_wrong():
         top = found.roots[0]
         values = collocated(system, 30)
         assert abs(values.real.max() - top.real) < 1e-6 * (1 + abs(top)), seed
-    assert proved > 220
+    assert proved > 0.88 * count
 
 
 # Structure

@@ -75,7 +75,7 @@ def test_small_systems_have_the_roots_of_their_expansion(n, neutral):
 # Many states, with roots known otherwise
 
 
-@pytest.mark.parametrize("n", [12, pytest.param(40, marks=pytest.mark.survey)])
+@pytest.mark.parametrize("n", [12, pytest.param(40, marks=[pytest.mark.survey, pytest.mark.long])])
 def test_without_delay_roots_are_eigenvalues(n):
     rng = np.random.default_rng(n)
     A = np.rint(8 * rng.normal(size=(n, n)))

@@ -128,6 +128,7 @@ def test_flights_are_better_than_with_the_robust_gains(monkeypatch):
     assert (fixed.sets == len(schedule.sets) - 1).all()
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_flights_with_the_delay_estimated_online():
     import adaptation

@@ -82,6 +82,7 @@ def test_times_are_not_below_zero_and_keep_their_sum():
     assert min(one["delay"] for one in region.points) >= 0.0
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_margins_hold_in_the_whole_region(fit):
     best = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
