@@ -19,12 +19,27 @@ from deadtime._cli.watch_page import WatchPage
 from deadtime.estimation import online
 from deadtime.links.mavlink import LinkAddress, heard_rows
 from deadtime.links.mavlink.codec import Codec, dialect
-from deadtime.recordings import Row, Sent, growing_rows
+from deadtime.recordings import Row, Sent, _growing, growing_rows
 
 COLUMNS = ("time", "output", "command")
 
 
-def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path):
+class Clock:
+    """The time of a reader that waits for what is written when it first waits."""
+
+    def __init__(self, write):
+        self.now, self.write = 0.0, write
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        if self.now == 0.0:
+            self.write()
+        self.now += seconds
+
+
+def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path, monkeypatch):
     values = np.random.default_rng(1).normal(size=(20, 2))
     lines = [f"{0.1 * k!r},{y!r},{u!r}\n" for k, (y, u) in enumerate(values.tolist())]
     whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
@@ -32,14 +47,13 @@ def test_a_growing_table_gives_the_rows_of_the_whole(tmp_path):
     part.write_text("time,output,command\n" + "".join(lines[:10]) + lines[10][:7])
 
     def write():
-        time.sleep(0.3)
         with part.open("a") as file:
             file.write(lines[10][7:] + "".join(lines[11:]))
 
-    writer = threading.Thread(target=write)
-    writer.start()
-    found = list(growing_rows(part, COLUMNS, silence=1.0))
-    writer.join()
+    clock = Clock(write)
+    monkeypatch.setattr(_growing, "time", clock)
+    found = list(growing_rows(part, COLUMNS, silence=5.0))
+    assert clock.now > 5.0
     assert found == list(recorded_rows(whole, COLUMNS))
 
 
@@ -63,6 +77,15 @@ def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
         list(growing_rows(path, COLUMNS, 0.1))
 
 
+def is_free(port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        try:
+            line.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+        return True
+
+
 def test_a_link_is_listened_to_and_never_answered():
     messages, codec = dialect(), Codec(1, 1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
@@ -70,13 +93,14 @@ def test_a_link_is_listened_to_and_never_answered():
         port = free.getsockname()[1]
     found = []
     listener = threading.Thread(
-        target=lambda: found.extend(heard_rows(LinkAddress("udp", "127.0.0.1", port), "z", 0.5))
+        target=lambda: found.extend(heard_rows(LinkAddress("udp", "127.0.0.1", port), "z", 2.0))
     )
     listener.start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.bind(("127.0.0.1", 0))
         vehicle.settimeout(0.1)
-        time.sleep(0.2)
+        while is_free(port):
+            time.sleep(0.005)
         target = (1, 1, messages.MAV_FRAME_LOCAL_NED)
         sent = [
             messages.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3),

@@ -47,6 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 LOOP = ("step.csv", "--kp", 2.4, "--sample-time", 0.065)
 STEP = ("estimate", *LOOP)
+CONTINUOUS = ("estimate", "step.csv", "--kp", 2.4)
 
 
 @pytest.mark.parametrize(
@@ -59,9 +60,9 @@ STEP = ("estimate", *LOOP)
         ("explore", ("explore", "--out", "page.html")),
         ("watch", ("watch", "moved.csv", "--noise", 0.005)),
         ("report", ("report", *LOOP, "--out", "pages/report.html")),
-        ("estimate", ("estimate", "step.csv", "--kp", 2.4, "--method", "auto")),
+        ("estimate", (*CONTINUOUS, "--method", "auto")),
         ("comparison", (*STEP, "--method", "all")),
-        ("plant-choice", (*STEP, "--plant", "auto/s")),
+        ("plant-choice", (*CONTINUOUS, "--plant", "auto/s")),
         ("check", (*STEP, "--check")),
         ("log", ("inspect", "flight.bin")),
         ("log-loop", ("inspect", "flight.bin", "--loop", "roll")),
