@@ -272,12 +272,12 @@ def test_thrust_plant_does_not_depend_on_when_it_is_read():
         ({"plant": "kite"}, "none of kit, paper, real, thrust"),
         ({"delay": -0.1}, "delay"),
         ({"jitter": float("nan")}, "jitter"),
-        ({"delay": 101.0}, "no more than 100"),
-        ({"downlink": 21.0}, "no more than 20"),
-        ({"noise": 1e9}, "no more than 10"),
-        ({"battery": 101.0}, "percentage"),
+        ({"delay": 101.0}, "from 0 to 100"),
+        ({"downlink": 21.0}, "from 0 to 20"),
+        ({"noise": 1e9}, "from 0 to 10"),
+        ({"battery": 101.0}, "from 0 to 100"),
         ({"seed": -1}, "seed"),
-        ({"navdata_port": 70000}, "no port"),
+        ({"navdata_port": 70000}, "from 0 to 65535"),
     ],
 )
 def test_invalid_options_are_refused_with_the_reason(given, message):

@@ -13,7 +13,11 @@ from deadtime.recordings._first_bytes import (
     opened as opened,
     whole as whole,
 )
-from deadtime.recordings._growing import Row, Sent, growing_rows
+from deadtime.recordings._growing import (
+    Row as Row,
+    Sent as Sent,
+    growing_rows as growing_rows,
+)
 from deadtime.recordings._recording import (
     LARGEST as LARGEST,
     MINIMUM_SAMPLES as MINIMUM_SAMPLES,
@@ -28,10 +32,7 @@ __all__ = [
     "Hole",
     "Recording",
     "RecordingCheck",
-    "Row",
-    "Sent",
     "SentCommands",
     "Step",
-    "growing_rows",
     "read_recording",
 ]
