@@ -129,6 +129,7 @@ def test_a_link_that_would_be_sent_to_is_refused():
         list(heard_rows(LinkAddress.of("tcp:127.0.0.1:5760"), "z", 0.1))
 
 
+@pytest.mark.survey
 def test_labels_are_as_large_on_a_phone_and_nothing_is_missing():
     rows = 0.065 * np.arange(200)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))

@@ -112,6 +112,7 @@ def test_a_slider_moves_everything(page: Page) -> None:
     assert np.array_equal(are_stable(page.tab, (20, 75)), chart.stable)
 
 
+@pytest.mark.survey
 def test_the_point_is_dragged_and_moved_by_keys(page: Page) -> None:
     box = page.tab.locator("#map .frame").bounding_box()
     page.tab.mouse.move(box["x"] + 5, box["y"] + box["height"] / 2)
@@ -127,6 +128,7 @@ def test_the_point_is_dragged_and_moved_by_keys(page: Page) -> None:
     assert page.drawn["state"]["Kp"] == pytest.approx(state["Kp"] - 0.06)
 
 
+@pytest.mark.survey
 def test_a_copied_address_shows_the_same_view(page: Page, browser: Any) -> None:
     page.choose("#controller", "PI")
     page.tab.fill("#number-gain", "0.7")
@@ -139,6 +141,7 @@ def test_a_copied_address_shows_the_same_view(page: Page, browser: Any) -> None:
     other.close()
 
 
+@pytest.mark.survey
 @pytest.mark.parametrize("broken", ["#delay=%7B", "#delay=-1e999&Kp", "#x=%22nothing%22&num=3"])
 def test_a_broken_address_is_left_out(browser: Any, address: str, broken: str) -> None:
     opened = Page(browser, address + broken)
@@ -147,6 +150,8 @@ def test_a_broken_address_is_left_out(browser: Any, address: str, broken: str) -
     opened.close()
 
 
+@pytest.mark.survey
+@pytest.mark.long
 def test_every_plant_controller_and_axis_can_be_shown(page: Page) -> None:
     for plant in ("integrator", "first_order", "rational"):
         page.tab.select_option("#plant", plant)
@@ -161,6 +166,7 @@ def test_every_plant_controller_and_axis_can_be_shown(page: Page) -> None:
                 assert page.tab.inner_text("#problem") == "", page.drawn["state"]
 
 
+@pytest.mark.survey
 def test_a_plant_becomes_its_polynomials(page: Page) -> None:
     page.tab.fill("#number-lag", "0.2")
     page.tab.keyboard.press("Enter")
@@ -171,6 +177,7 @@ def test_a_plant_becomes_its_polynomials(page: Page) -> None:
     assert drawn["numbers"]["abscissa"] == pytest.approx(before, rel=1e-12)
 
 
+@pytest.mark.survey
 def test_what_is_saved_can_be_read(page: Page, tmp_path: Path) -> None:
     saved = {}
     for name in ("json", "svg", "png"):
@@ -188,8 +195,17 @@ def test_what_is_saved_can_be_read(page: Page, tmp_path: Path) -> None:
     assert saved["png"].read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 900, 1300])
+@pytest.mark.parametrize(
+    ("width", "scheme"),
+    [
+        (360, "dark"),
+        *(
+            pytest.param(*one, marks=[pytest.mark.survey, pytest.mark.long])
+            for one in [(360, "light"), (900, "light"), (900, "dark"), (1300, "dark")]
+        ),
+        pytest.param(1300, "light", marks=pytest.mark.survey),
+    ],
+)
 def test_no_serious_finding_of_axe_and_nothing_cut_off(
     browser: Any, address: str, scheme: str, width: int
 ) -> None:
@@ -199,6 +215,7 @@ def test_no_serious_finding_of_axe_and_nothing_cut_off(
     opened.close()
 
 
+@pytest.mark.survey
 def test_a_page_in_a_frame_works(browser: Any, tmp_path: Path) -> None:
     place = tmp_path / "report.html"
     text = (
@@ -226,7 +243,10 @@ CSV = {
 }
 
 
-@pytest.mark.parametrize("form", CSV)
+@pytest.mark.parametrize(
+    "form",
+    [form if form == "comma" else pytest.param(form, marks=pytest.mark.survey) for form in CSV],
+)
 def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, form: str) -> None:
     recording, loop, delay = recorded_step(2, 0.0, 0.0)
     columns = (recording.time, recording.reference, recording.output)
@@ -261,6 +281,7 @@ def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, f
     assert page.tab.locator("#map .end").count() == 2
 
 
+@pytest.mark.survey
 def test_a_fit_that_is_not_adequate_is_not_taken_over(page: Page, tmp_path: Path) -> None:
     recording, _, _ = recorded_step(0, 0.15, 0.0)
     columns = (recording.time, recording.reference, recording.output, recording.command)
@@ -277,6 +298,7 @@ def test_a_fit_that_is_not_adequate_is_not_taken_over(page: Page, tmp_path: Path
     assert page.drawn["state"]["interval"] is not None
 
 
+@pytest.mark.survey
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -296,6 +318,7 @@ def test_a_file_without_sense_is_refused_in_words(
     assert said in page.tab.inner_text("#estimate")
 
 
+@pytest.mark.survey
 def test_an_interval_of_the_delay_is_a_band(browser: Any, tmp_path: Path) -> None:
     from deadtime.loops._explored import explorer_of
 

@@ -141,6 +141,7 @@ def test_names_from_a_log_are_text_in_the_page(found, tmp_path):
     assert page.count("&lt;script&gt;") == 7 + len(stages[bad])
 
 
+@pytest.mark.survey
 def test_the_page_in_a_browser(found, tmp_path):
     check_page(found.report(tmp_path / "page.html"))
 

@@ -386,6 +386,7 @@ def test_the_page_is_valid_and_fetches_nothing(found):
     assert found.summary() in page
 
 
+@pytest.mark.survey
 def test_the_page_in_a_browser(found, tmp_path):
     some = replace(found, parts={name: found.parts[name] for name in ("table1", "gap")})
     check_page(write_reproduction(some, tmp_path / "paper.html", {}))
