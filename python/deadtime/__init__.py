@@ -12,62 +12,76 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from deadtime._base.errors import (
-        CertificateError,
-        ContourError,
-        ConvergenceError,
-        CountMismatchError,
-        DeadtimeError,
-        FlightAbortedError,
-        LinkError,
-        MissingExtraError,
-        NotIdentifiableError,
-        NotProvedError,
-        PacketError,
-        RecordingError,
-        WorkerError,
+        CertificateError as CertificateError,
+        ContourError as ContourError,
+        ConvergenceError as ConvergenceError,
+        CountMismatchError as CountMismatchError,
+        DeadtimeError as DeadtimeError,
+        FlightAbortedError as FlightAbortedError,
+        LinkError as LinkError,
+        MissingExtraError as MissingExtraError,
+        NotIdentifiableError as NotIdentifiableError,
+        NotProvedError as NotProvedError,
+        PacketError as PacketError,
+        RecordingError as RecordingError,
+        WorkerError as WorkerError,
     )
-    from deadtime.dde import solve_dde
-    from deadtime.estimation import damping_ratio, estimate_delay, identifiability
-    from deadtime.experiments import Experiment
-    from deadtime.logs import latency, open_log
+    from deadtime.dde import solve_dde as solve_dde
+    from deadtime.estimation import (
+        damping_ratio as damping_ratio,
+        estimate_delay as estimate_delay,
+        identifiability as identifiability,
+    )
+    from deadtime.experiments import Experiment as Experiment
+    from deadtime.logs import latency as latency, open_log as open_log
     from deadtime.loops import (
-        PD,
-        PI,
-        PID,
-        PV,
-        ControlLoop,
-        DerivativeFilter,
-        FactoredPlant,
-        FirstOrder,
-        Integrator,
-        P,
-        ParametricPlant,
-        RateLimited,
-        RationalPlant,
-        kit_plant,
-        simulate_fixed_step,
-        sweep,
+        PD as PD,
+        PI as PI,
+        PID as PID,
+        PV as PV,
+        ControlLoop as ControlLoop,
+        DerivativeFilter as DerivativeFilter,
+        FactoredPlant as FactoredPlant,
+        FirstOrder as FirstOrder,
+        Integrator as Integrator,
+        P as P,
+        ParametricPlant as ParametricPlant,
+        RateLimited as RateLimited,
+        RationalPlant as RationalPlant,
+        kit_plant as kit_plant,
+        simulate_fixed_step as simulate_fixed_step,
+        sweep as sweep,
     )
-    from deadtime.recordings import Recording, read_recording
+    from deadtime.recordings import Recording as Recording, read_recording as read_recording
     from deadtime.roots import (
-        QuasiPolynomial,
-        crossings,
-        dde_roots,
-        delay,
-        delay_margin,
-        parameters,
-        s,
+        QuasiPolynomial as QuasiPolynomial,
+        crossings as crossings,
+        dde_roots as dde_roots,
+        delay as delay,
+        delay_margin as delay_margin,
+        parameters as parameters,
+        s as s,
     )
-    from deadtime.special import lambertw, lambertw0, lambertwm1, wrightomega
+    from deadtime.special import (
+        lambertw as lambertw,
+        lambertw0 as lambertw0,
+        lambertwm1 as lambertwm1,
+        wrightomega as wrightomega,
+    )
     from deadtime.stability import (
-        largest_stable_box,
-        proved_boxes,
-        robust_map,
-        stability_map,
-        stability_radius,
+        largest_stable_box as largest_stable_box,
+        proved_boxes as proved_boxes,
+        robust_map as robust_map,
+        stability_map as stability_map,
+        stability_radius as stability_radius,
     )
-    from deadtime.systems import DelaySystem, TransferFunction, feedback
-    from deadtime.tuning import design, design_filter
+    from deadtime.systems import (
+        DelaySystem as DelaySystem,
+        TransferFunction as TransferFunction,
+        feedback as feedback,
+    )
+    from deadtime.tuning import design as design, design_filter as design_filter
+
 
 #: The names of each package that are here too.
 _PACKAGES = {
@@ -102,67 +116,7 @@ __version__: str
 
 _PACKAGE_OF = {name: package for package, names in _PACKAGES.items() for name in names.split()}
 
-__all__ = [
-    "PD",
-    "PI",
-    "PID",
-    "PV",
-    "CertificateError",
-    "ContourError",
-    "ControlLoop",
-    "ConvergenceError",
-    "CountMismatchError",
-    "DeadtimeError",
-    "DelaySystem",
-    "DerivativeFilter",
-    "Experiment",
-    "FactoredPlant",
-    "FirstOrder",
-    "FlightAbortedError",
-    "Integrator",
-    "LinkError",
-    "MissingExtraError",
-    "NotIdentifiableError",
-    "NotProvedError",
-    "P",
-    "PacketError",
-    "ParametricPlant",
-    "QuasiPolynomial",
-    "RateLimited",
-    "RationalPlant",
-    "Recording",
-    "RecordingError",
-    "TransferFunction",
-    "WorkerError",
-    "crossings",
-    "damping_ratio",
-    "dde_roots",
-    "delay",
-    "delay_margin",
-    "design",
-    "design_filter",
-    "estimate_delay",
-    "feedback",
-    "identifiability",
-    "kit_plant",
-    "lambertw",
-    "lambertw0",
-    "lambertwm1",
-    "largest_stable_box",
-    "latency",
-    "open_log",
-    "parameters",
-    "proved_boxes",
-    "read_recording",
-    "robust_map",
-    "s",
-    "simulate_fixed_step",
-    "solve_dde",
-    "stability_map",
-    "stability_radius",
-    "sweep",
-    "wrightomega",
-]
+__all__ = sorted(_PACKAGE_OF)
 
 if not TYPE_CHECKING:  # A type checker reads the imports above.
 
