@@ -364,7 +364,7 @@ def test_a_window_that_contradicts_the_estimate_makes_it_doubtful():
     used, alike, later = (window_from(20.0 * k, (0.03, 0.03, 0.04)[k], k) for k in range(3))
 
     def estimate(*others):
-        found = relation_of("roll", "roll", "attitude", "setpoint", False, [used], others=others)
+        found = relation_of("roll", "roll", "attitude", "setpoint", [used], others=others)
         return found.estimate
 
     assert estimate(alike).adequate

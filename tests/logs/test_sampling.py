@@ -168,7 +168,7 @@ def growths(logger, seeds):
         flight, log = made("long height", logger, seed)
         loop = log.loop(flight.kind.loop)
         between = between_rows(log, "position", loop.actuator)
-        seen = seen_windows(loop, "actuator", integrates=True, between=between)
+        seen = seen_windows(loop, "actuator", between=between)
         vehicle = dtm.FactoredPlant([flight.lag], gain=flight.gain, integrator=True)
         truth = SimpleNamespace(
             delay=flight.delay,

@@ -20,6 +20,11 @@ def json_text(schema: str, found: Mapping[str, Any]) -> str:
     return json.dumps(plain(named), indent=2, ensure_ascii=False, allow_nan=False)
 
 
+def plain_fields(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Convert the fields of a result, by their names, to types of JSON."""
+    return {name: plain(one) for name, one in fields.items()}
+
+
 def plain(value: Any) -> Any:
     """Convert to types of JSON; numbers that are not finite become None."""
     if isinstance(value, Mapping):

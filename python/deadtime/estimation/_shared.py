@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from deadtime._base.digits import between, stated
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
@@ -85,8 +85,7 @@ class SharedNumber:
 
     def to_dict(self) -> dict[str, Any]:
         """The number as plain values for JSON."""
-        found: dict[str, Any] = plain({**vars(self), "agree": self.agree})
-        return found
+        return plain_fields({**vars(self), "agree": self.agree})
 
 
 def shared_number(

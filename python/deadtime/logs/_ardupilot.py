@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from deadtime.logs._ardupilot_modes import HORIZONTAL, UNCONTROLLED, VERTICAL
-from deadtime.logs._conditions import in_modes, in_the_air, not_in_modes, state
+from deadtime.logs._conditions import closed_where, in_modes, in_the_air, not_in_modes, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, LoopNames, Signal
-from deadtime.logs._rotations import unwrapped
+from deadtime.logs._rotations import heading
 
 DEGREE = np.pi / 180.0
 
@@ -17,9 +17,9 @@ IN_THE_AIR = Condition(
     in_the_air("landed", "state", lambda values: values == 0),
     "the vehicle is on the ground or touches down",
 )
-CONTROLLED = Condition(not_in_modes(UNCONTROLLED), "the mode does not close it")
-HELD_HEIGHT = Condition(in_modes(VERTICAL), "the mode does not close it")
-HELD_PLACE = Condition(in_modes(HORIZONTAL), "the mode does not close it")
+CONTROLLED = closed_where(not_in_modes(UNCONTROLLED))
+HELD_HEIGHT = closed_where(in_modes(VERTICAL))
+HELD_PLACE = closed_where(in_modes(HORIZONTAL))
 
 #: Firmware of 2014 logs 0 for a height that it does not hold, as in the descent of RTL.
 SET_HEIGHT = Condition(
@@ -47,7 +47,10 @@ def _inner_loops(rate: str) -> list[LoopNames]:
                 conditions=(ARMED, IN_THE_AIR, CONTROLLED),
             )
         )  # fmt: skip
-        desired, found = (_angle(axis, name) for name in (f"Des{column}", column))
+        desired, found = (
+            heading("ATT", name) if axis == "yaw" else Signal("ATT", (name,), "deg")
+            for name in (f"Des{column}", column)
+        )
         angles.append(
             LoopNames(
                 axis, axis, "attitude", (desired,), (found,), (asked,),
@@ -57,55 +60,30 @@ def _inner_loops(rate: str) -> list[LoopNames]:
     return [*rates, *angles]
 
 
-def _angle(axis: str, column: str) -> Signal:
-    if axis != "yaw":
-        return Signal("ATT", (column,), "deg")
-    return Signal(
-        "ATT", (column,), "rad",
-        derive=lambda degrees: unwrapped(degrees * DEGREE),
-        rule="[deg] to rad without jumps of a turn",
-    )  # fmt: skip
-
-
 def _horizontal(axis: str, k: int) -> list[LoopNames]:
     """Velocity and position towards north or east, in messages of three generations."""
     letter, old = "NE"[k], "XY"[k]
-    new = f"PSC{letter}"
-    asked = (
-        Signal(new, (f"TV{letter}",), "m/s"),
-        Signal("PSC", (f"TV{old}",), "m/s"),
-        Signal("NTUN", (f"DVel{old}",), "cm/s"),
-    )
-    velocity = LoopNames(
-        f"{axis} velocity", axis, "velocity", asked,
-        response=(
-            Signal(new, (f"V{letter}",), "m/s"),
-            Signal("PSC", (f"V{old}",), "m/s"),
-            Signal("NTUN", (f"Vel{old}",), "cm/s"),
+
+    def told(name: str, first_name: str, unit: str) -> tuple[Signal, ...]:
+        return (
+            Signal(f"PSC{letter}", (f"{name}{letter}",), unit),
+            Signal("PSC", (f"{name}{old}",), unit),
+            Signal("NTUN", (f"{first_name}{old}",), f"c{unit}"),
+        )
+
+    asked = told("TV", "DVel", "m/s")
+    return [
+        LoopNames(
+            f"{axis} velocity", axis, "velocity", asked,
+            response=told("V", "Vel", "m/s"), actuator=told("TA", "DAcc", "m/s/s"),
+            conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
         ),
-        actuator=(
-            Signal(new, (f"TA{letter}",), "m/s/s"),
-            Signal("PSC", (f"TA{old}",), "m/s/s"),
-            Signal("NTUN", (f"DAcc{old}",), "cm/s/s"),
+        LoopNames(
+            f"{axis} position", axis, "position", told("TP", "DPos", "m"),
+            response=told("P", "Pos", "m"), actuator=asked,
+            conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
         ),
-        conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
-    )  # fmt: skip
-    position = LoopNames(
-        f"{axis} position", axis, "position",
-        setpoint=(
-            Signal(new, (f"TP{letter}",), "m"),
-            Signal("PSC", (f"TP{old}",), "m"),
-            Signal("NTUN", (f"DPos{old}",), "cm"),
-        ),
-        response=(
-            Signal(new, (f"P{letter}",), "m"),
-            Signal("PSC", (f"P{old}",), "m"),
-            Signal("NTUN", (f"Pos{old}",), "cm"),
-        ),
-        actuator=asked,
-        conditions=(ARMED, IN_THE_AIR, HELD_PLACE),
-    )  # fmt: skip
-    return [velocity, position]
+    ]  # fmt: skip
 
 
 def _vertical() -> list[LoopNames]:

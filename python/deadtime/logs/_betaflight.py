@@ -8,7 +8,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._blackbox_modes import INAV
-from deadtime.logs._conditions import state
+from deadtime.logs._conditions import closed_where, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
 
@@ -22,24 +22,18 @@ def _has_bit(*bits: int) -> Callable[[Array], Mask]:
 def _in_modes(*modes: str) -> Condition:
     """In one of these modes of INAV; several can be active at once."""
     bits = [bit for bit, name in INAV.items() if name in modes]
-    return Condition(
-        state("slow", "flightModeFlags", _has_bit(*bits)), "the mode does not close it"
-    )
+    return closed_where(state("slow", "flightModeFlags", _has_bit(*bits)))
 
 
 ARMED = Condition(state("slow", "flightModeFlags", _has_bit(0)), "the vehicle is disarmed")
 #: In passthrough the sticks move the servos.
-CONTROLLED = Condition(
-    state("slow", "flightModeFlags", lambda flags: ~_has_bit(10)(flags)),
-    "the mode does not close it",
-)
+CONTROLLED = closed_where(state("slow", "flightModeFlags", lambda flags: ~_has_bit(10)(flags)))
 HELD_PLACE = _in_modes("NAV POSHOLD", "NAV RTH", "NAV WP")
 HELD_HEIGHT = _in_modes("NAV ALTHOLD", "NAV POSHOLD", "NAV RTH", "NAV WP")
 
 
 def _sum(*terms: Array) -> Array:
-    total: Array = np.sum(terms, axis=0)
-    return total
+    return np.asarray(np.sum(terms, axis=0))
 
 
 def _controller(axis: int) -> tuple[Signal, ...]:

@@ -1,10 +1,23 @@
-"""Columns that are made when they are asked for."""
+"""Columns that are made when they are asked for, and the bytes that they are made of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
 from deadtime._base.arrays import Array
+
+
+def gathered(
+    content: NDArray[np.uint8], places: NDArray[np.int64], count: int
+) -> NDArray[np.uint8]:
+    """So many bytes from each of these places, shape (places, count)."""
+    found = np.empty((places.size, count), dtype=np.uint8)
+    for k in range(count):
+        np.take(content, places + k, out=found[:, k])
+    return found
 
 
 class Columns(Mapping[str, Array]):
@@ -19,6 +32,9 @@ class Columns(Mapping[str, Array]):
 
     def __getitem__(self, name: str) -> Array:
         return self._makers[name]()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._makers
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._makers)

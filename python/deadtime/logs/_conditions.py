@@ -8,7 +8,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._contents import LogContents
-from deadtime.logs._names import Windows
+from deadtime.logs._names import Condition, Told, Windows
 from deadtime.logs._series import increasing
 from deadtime.logs._windows import outside, windows_of
 
@@ -17,9 +17,7 @@ from deadtime.logs._windows import outside, windows_of
 NOTICED = 2.5
 
 
-def state(
-    topic: str, column: str, holds: Callable[[Array], Mask]
-) -> Callable[[LogContents], Windows | None]:
+def state(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
     """Where a logged column passes a test; None if it is not in the log."""
 
     def windows(contents: LogContents) -> Windows | None:
@@ -34,9 +32,7 @@ def state(
     return windows
 
 
-def in_the_air(
-    topic: str, column: str, holds: Callable[[Array], Mask]
-) -> Callable[[LogContents], Windows | None]:
+def in_the_air(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
     """Where a vehicle says that it flies, without the time in which its landing goes unnoticed."""
     told = state(topic, column, holds)
 
@@ -49,9 +45,7 @@ def in_the_air(
     return windows
 
 
-def first_told(
-    *ways: Callable[[LogContents], Windows | None],
-) -> Callable[[LogContents], Windows | None]:
+def first_told(*ways: Told) -> Told:
     """The answer of the first of these that the log tells about."""
 
     def windows(contents: LogContents) -> Windows | None:
@@ -64,7 +58,7 @@ def first_told(
     return windows
 
 
-def in_modes(modes: Collection[str]) -> Callable[[LogContents], Windows | None]:
+def in_modes(modes: Collection[str]) -> Told:
     """Where one of these flight modes is active; None if the log tells no mode."""
 
     def windows(contents: LogContents) -> Windows | None:
@@ -78,7 +72,7 @@ def in_modes(modes: Collection[str]) -> Callable[[LogContents], Windows | None]:
     return windows
 
 
-def not_in_modes(modes: Collection[str]) -> Callable[[LogContents], Windows | None]:
+def not_in_modes(modes: Collection[str]) -> Told:
     """Where none of these flight modes is active; None if the log tells no mode."""
     inside = in_modes(modes)
 
@@ -87,3 +81,8 @@ def not_in_modes(modes: Collection[str]) -> Callable[[LogContents], Windows | No
         return None if found is None else outside(found)
 
     return windows
+
+
+def closed_where(told: Told) -> Condition:
+    """The condition that the flight mode closes a loop."""
+    return Condition(told, "the mode does not close it")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
-from deadtime.logs._columns import Columns
+from deadtime.logs._columns import Columns, gathered
 from deadtime.logs._contents import LogContents, Topic
 
 #: The first byte of a log.
@@ -91,10 +91,10 @@ def read_crazyflie(data: bytes, source: str) -> LogContents:
         if not places[number]:
             continue
         at = np.frombuffer(places[number], dtype=np.int64)
-        time = _values(raw, at + 2, np.dtype(clock)) * unit
-        body = at + 2 + np.dtype(clock).itemsize
+        time = _values(raw, at, 2, np.dtype(clock)) * unit
+        head = 2 + np.dtype(clock).itemsize
         makers: dict[str, Callable[[], Array]] = {
-            name: partial(_at_offset, raw, body, offset, kind)
+            name: partial(_values, raw, at, head + offset, kind)
             for name, kind, offset in event.variables
         }
         topics[_unused(event.name, topics)] = Topic(time, Columns(makers))
@@ -189,17 +189,11 @@ def _next(data: bytes, at: int, stop: int, sizes: Mapping[int, int]) -> int | No
     return None
 
 
-def _at_offset(
-    raw: NDArray[np.uint8], body: NDArray[np.int64], offset: int, kind: np.dtype[np.generic]
+def _values(
+    raw: NDArray[np.uint8], at: NDArray[np.int64], offset: int, kind: np.dtype[np.generic]
 ) -> Array:
-    return _values(raw, body + offset, kind)
-
-
-def _values(raw: NDArray[np.uint8], at: NDArray[np.int64], kind: np.dtype[np.generic]) -> Array:
-    """The numbers that begin at these offsets."""
-    parts = np.empty((at.size, kind.itemsize), dtype=np.uint8)
-    for k in range(kind.itemsize):
-        parts[:, k] = raw[at + k]
+    """The numbers that begin so far behind these places."""
+    parts = gathered(raw, at + offset, kind.itemsize)
     # NumPy warns of a NaN whose bits signal one, as damage can make it.
     with np.errstate(invalid="ignore"):
         return parts.view(kind)[:, 0].astype(np.float64)

@@ -15,7 +15,7 @@ from deadtime._base.arrays import Array
 from deadtime.logs._conditions import first_told, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
-from deadtime.logs._rotations import unwrapped
+from deadtime.logs._rotations import heading
 
 #: The event that is logged at a fixed rate.
 TOPIC = "fixedFrequency"
@@ -83,13 +83,7 @@ def _rate(axis: str, gyro: str, estimate: str) -> LoopNames:
 
 
 def _angle(column: str, axis: str) -> Signal:
-    if axis != "yaw":
-        return _signal(column, "deg")
-    return Signal(
-        TOPIC, (column,), "rad",
-        derive=lambda degrees: unwrapped(degrees * (np.pi / 180.0)),
-        rule="[deg] to rad without jumps of a turn",
-    )  # fmt: skip
+    return heading(TOPIC, column) if axis == "yaw" else _signal(column, "deg")
 
 
 def _attitude(axis: str) -> LoopNames:

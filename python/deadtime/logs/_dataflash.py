@@ -8,14 +8,15 @@ a damaged FMT of length 0, and stops at the first message of an unknown type.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array
-from deadtime._base.errors import RecordingError
+from deadtime.logs._columns import Columns, gathered
 from deadtime.logs._contents import LogContents
 from deadtime.logs._dataflash_contents import contents_of
 from deadtime.logs._dataflash_messages import DIVISORS, TYPES, Layout, Messages
@@ -39,16 +40,12 @@ def read_dataflash(data: bytes, source: str) -> LogContents:
     """
     index = _walk(data)
     messages = _BinaryMessages(data, index)
-    if set(messages) <= {"FMT"}:
-        raise RecordingError(
-            f"{source} begins as a DataFlash log, but holds no message whose format it tells"
-        )
     remarks = []
     if index.skipped:
         remarks.append(f"{index.skipped} bytes of the file are no message and are left out")
     if index.cut:
         remarks.append("the file is cut off in a message")
-    return contents_of("DataFlash", messages, tuple(remarks))
+    return contents_of("DataFlash", source, messages, remarks)
 
 
 @dataclass
@@ -123,44 +120,31 @@ class _BinaryMessages(Messages):
         super().__init__(layouts, places)
 
     def columns(self, layout: Layout, places: NDArray[np.int64]) -> Mapping[str, Array]:
-        return _Columns(self._records(layout, places), layout)
+        records = self._records(layout, places)
+        pairs = zip(layout.columns, layout.form, strict=True)
+        return Columns(
+            {
+                name: partial(_numbers, records, name, DIVISORS[letter])
+                for name, letter in pairs
+                if letter in DIVISORS
+            }
+        )
 
-    def texts(self, name: str, column: str) -> list[str]:
-        layout = self._layouts.get(name)
-        if layout is None or column not in layout.columns:
-            return []
-        field = self._records(layout, self._places[name])[column]
+    def column_as_texts(self, layout: Layout, column: str) -> list[str]:
+        field = self._records(layout, self._places[layout.name])[column]
         if field.dtype.kind != "S":
             return [str(value) for value in field.tolist()]
         return [text.split(b"\0")[0].decode("utf-8", "replace") for text in field.tolist()]
 
     def _records(self, layout: Layout, places: NDArray[np.int64]) -> NDArray[np.void]:
         """The messages at these places as rows of a structured array."""
-        rows = np.empty((places.size, layout.length), dtype=np.uint8)
-        for k in range(layout.length):
-            np.take(self._bytes, places + k, out=rows[:, k])
+        rows = gathered(self._bytes, places, layout.length)
         found: NDArray[np.void] = rows.view(_dtype(layout))[:, 0]
         return found
 
 
-class _Columns(Mapping[str, Array]):
-    """The numbers of the messages of a type, as floats when they are asked for."""
-
-    def __init__(self, records: NDArray[np.void], layout: Layout) -> None:
-        self._records = records
-        pairs = zip(layout.columns, layout.form, strict=True)
-        self._divisors = {name: DIVISORS[letter] for name, letter in pairs if letter in DIVISORS}
-
-    def __getitem__(self, name: str) -> Array:
-        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
-            values: Array = self._records[name].astype(float) / self._divisors[name]
-        return values
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._divisors
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._divisors)
-
-    def __len__(self) -> int:
-        return len(self._divisors)
+def _numbers(records: NDArray[np.void], name: str, divisor: float) -> Array:
+    """A column of the messages of a type as floats."""
+    with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+        values: Array = records[name].astype(float) / divisor
+    return values

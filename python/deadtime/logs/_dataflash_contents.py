@@ -8,6 +8,7 @@ from collections import ChainMap
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
+from deadtime._base.errors import RecordingError
 from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
 from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._dataflash_messages import Messages
@@ -21,8 +22,18 @@ FIRMWARE = re.compile(r"(?:APM:|Ardu)?(?P<vehicle>Copter|Plane|Rover|Sub|Blimp\w
 MODES = {"Copter": COPTER, "Plane": PLANE, "Rover": ROVER}
 
 
-def contents_of(form: str, messages: Messages, remarks: tuple[str, ...]) -> LogContents:
-    """The log's contents."""
+def contents_of(form: str, source: str, messages: Messages, remarks: list[str]) -> LogContents:
+    """The log's contents.
+
+    Raises
+    ------
+    RecordingError
+        When the file tells no format of a message that is in it.
+    """
+    if set(messages) <= {"FMT"}:
+        raise RecordingError(
+            f"{source} begins as a DataFlash log, but holds no message whose format it tells"
+        )
     texts = messages.texts("MSG", "Message")
     firmware = next(filter(None, map(FIRMWARE.fullmatch, texts)), None)
     vehicle = firmware["vehicle"] if firmware else ""
@@ -35,7 +46,7 @@ def contents_of(form: str, messages: Messages, remarks: tuple[str, ...]) -> LogC
         topics=ChainMap(_events(messages), messages),  # type: ignore[arg-type]
         parameters=_parameters(messages),
         modes=_modes(messages, vehicle),
-        remarks=remarks,
+        remarks=tuple(remarks),
     )
 
 

@@ -91,8 +91,15 @@ class Messages(Mapping[str, Topic], ABC):
         """The numbers in the messages at these places."""
 
     @abstractmethod
+    def column_as_texts(self, layout: Layout, column: str) -> list[str]:
+        """A column of all messages of a type, which has it, as texts."""
+
     def texts(self, name: str, column: str) -> list[str]:
         """A column of a type as texts; empty if the log has none."""
+        layout = self._layouts.get(name)
+        if layout is None or column not in layout.columns:
+            return []
+        return self.column_as_texts(layout, column)
 
     def __getitem__(self, name: str) -> Topic:
         if name not in self._decoded:
@@ -123,13 +130,9 @@ class Messages(Mapping[str, Topic], ABC):
             return columns[name] * unit
         if self._densest is None:
             return np.full(places.size, np.nan)
-        densest = self._densest
-        time = self._time(
-            self._layouts[densest],
-            self._places[densest],
-            self.columns(self._layouts[densest], self._places[densest]),
-        )
-        return time[np.minimum(np.searchsorted(self._places[densest], places), time.size - 1)]
+        timed, at = self._layouts[self._densest], self._places[self._densest]
+        time = self._time(timed, at, self.columns(timed, at))
+        return time[np.minimum(np.searchsorted(at, places), time.size - 1)]
 
     def _instances(self) -> dict[str, tuple[Layout, NDArray[np.int64]]]:
         """Topics with their messages: a type with several sensors is one topic for each of them."""
@@ -155,15 +158,8 @@ class _Units:
         texts = messages.texts
         self._labels = _by_letter(texts("UNIT", "Id"), texts("UNIT", "Label"))
         self._factors = _by_letter(texts("MULT", "Id"), texts("MULT", "Mult"))
-        self._letters = {
-            kind: (units, factors)
-            for kind, units, factors in zip(
-                texts("FMTU", "FmtType"),
-                texts("FMTU", "UnitIds"),
-                texts("FMTU", "MultIds"),
-                strict=False,
-            )
-        }
+        letters = zip(texts("FMTU", "UnitIds"), texts("FMTU", "MultIds"), strict=False)
+        self._letters = dict(zip(texts("FMTU", "FmtType"), letters, strict=False))
 
     def of(self, layout: Layout, k: int) -> str:
         """Unit of column k; empty if the log does not tell it.
@@ -194,8 +190,8 @@ class _Units:
 
 def _by_letter(letters: list[str], values: list[str]) -> dict[str, str]:
     """Values by letters, which are logged as numbers of characters."""
-    found = {}
-    for letter, value in zip(letters, values, strict=False):
-        if letter.isdigit() and int(letter) < 128:
-            found[chr(int(letter))] = value
-    return found
+    return {
+        chr(int(letter)): value
+        for letter, value in zip(letters, values, strict=False)
+        if letter.isdigit() and int(letter) < 128
+    }

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array
-from deadtime._base.errors import RecordingError
 from deadtime.logs._contents import LogContents
 from deadtime.logs._dataflash_contents import contents_of
 from deadtime.logs._dataflash_messages import Layout, Messages
@@ -24,14 +23,10 @@ def read_dataflash_text(data: bytes, source: str) -> LogContents:
     """
     lines = data.decode("utf-8", "replace").splitlines()
     messages = _TextMessages(lines)
-    if set(messages) <= {"FMT"}:
-        raise RecordingError(
-            f"{source} begins as a DataFlash log, but holds no message whose format it tells"
-        )
     remarks = []
     if messages.unread:
         remarks.append(f"{messages.unread} lines of the file are no message and are left out")
-    return contents_of("DataFlash text", messages, tuple(remarks))
+    return contents_of("DataFlash text", source, messages, remarks)
 
 
 class _TextMessages(Messages):
@@ -65,12 +60,9 @@ class _TextMessages(Messages):
             if name in layout.numbers
         }
 
-    def texts(self, name: str, column: str) -> list[str]:
-        layout = self._layouts.get(name)
-        if layout is None or column not in layout.columns:
-            return []
+    def column_as_texts(self, layout: Layout, column: str) -> list[str]:
         k = layout.columns.index(column)
-        return [self._cells(layout, place)[k] for place in self._places[name].tolist()]
+        return [self._cells(layout, place)[k] for place in self._places[layout.name].tolist()]
 
     def _cells(self, layout: Layout, place: int) -> list[str]:
         """Values of a line; the last may contain commas if it is text. Missing ones are empty."""

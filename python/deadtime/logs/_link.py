@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 
 #: Fewest messages with both stamps, and the least time that they span, s.
 FEWEST, SHORTEST = 50, 2.0
@@ -90,8 +90,7 @@ class Link:
 
     def to_dict(self) -> dict[str, Any]:
         """The link as plain values for JSON."""
-        found: dict[str, Any] = plain({**vars(self), "loss": self.loss})
-        return found
+        return plain_fields({**vars(self), "loss": self.loss})
 
 
 def transport_of(vehicle: Array, ground: Array) -> tuple[Array, float] | None:

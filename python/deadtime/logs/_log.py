@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from deadtime._base.errors import RecordingError, printable
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime.logs._contents import LogContents
 from deadtime.logs._link import Link
 from deadtime.logs._names import AutopilotNames, Kind, LoopNames
@@ -157,7 +157,7 @@ class LogLoop(ReadOnlyArrays):
             }
             for name, series in self.signals.items()
         }
-        found: dict[str, Any] = plain(
+        return plain_fields(
             {
                 "name": self.name,
                 "axis": self.axis,
@@ -168,7 +168,6 @@ class LogLoop(ReadOnlyArrays):
                 "why_left_out": self.why_left_out,
             }
         )
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,8 +272,7 @@ class Log(ReadOnlyArrays):
         loops = [loop.to_dict() for loop in self.loops.values()]
         link = None if self.link is None else self.link.to_dict()
         rest = {"modes": modes, "loops": loops, "gaps": self.gaps, "remarks": self.remarks}
-        shown: dict[str, Any] = plain({**found, **rest, "link": link})
-        return shown
+        return plain_fields({**found, **rest, "link": link})
 
 
 def log_of(contents: LogContents, names: AutopilotNames, source: str) -> Log:

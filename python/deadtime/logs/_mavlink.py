@@ -10,7 +10,7 @@ from deadtime.logs._ardupilot_modes import (
     UNCONTROLLED,
     VERTICAL as ARDUPILOT_VERTICAL,
 )
-from deadtime.logs._conditions import in_modes, in_the_air, not_in_modes, state
+from deadtime.logs._conditions import closed_where, in_modes, in_the_air, not_in_modes, state
 from deadtime.logs._names import Condition, LoopNames, Signal
 from deadtime.logs._px4_modes import HORIZONTAL as PX4_HORIZONTAL, VERTICAL as PX4_VERTICAL
 from deadtime.logs._rotations import pitch_of, roll_of, unwrapped, yaw_of
@@ -31,15 +31,9 @@ FLYING = (
         "the vehicle is on the ground or touches down",
     ),
 )
-ATTITUDE = (*FLYING, Condition(not_in_modes(UNCONTROLLED), "the mode does not close it"))
-HORIZONTAL = (
-    *FLYING,
-    Condition(in_modes(ARDUPILOT_HORIZONTAL | PX4_HORIZONTAL), "the mode does not close it"),
-)
-VERTICAL = (
-    *FLYING,
-    Condition(in_modes(ARDUPILOT_VERTICAL | PX4_VERTICAL), "the mode does not close it"),
-)
+ATTITUDE = (*FLYING, closed_where(not_in_modes(UNCONTROLLED)))
+HORIZONTAL = (*FLYING, closed_where(in_modes(ARDUPILOT_HORIZONTAL | PX4_HORIZONTAL)))
+VERTICAL = (*FLYING, closed_where(in_modes(ARDUPILOT_VERTICAL | PX4_VERTICAL)))
 
 QUATERNION = ("q[0]", "q[1]", "q[2]", "q[3]")
 DOWN = "downwards to upwards"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array, Mask
+from deadtime.logs._columns import gathered
 
 #: Bytes of the time before a packet.
 STAMP = 8
@@ -148,7 +149,7 @@ def _batch(
     for shape in np.unique(shapes):
         rows = np.flatnonzero(shapes == shape)
         head, length = FIRST[int(shape) >> 8], int(shape) & 0xFF
-        whole = _gathered(content, starts[rows] + 1, head - 1 + length + CHECKSUM)
+        whole = gathered(content, starts[rows] + 1, head - 1 + length + CHECKSUM)
         checked = np.concatenate(
             (
                 whole[:, : head - 1 + length],
@@ -161,7 +162,7 @@ def _batch(
         used = min(length, size)
         payload[rows, :used] = whole[:, head - 1 : head - 1 + used]
     number, system, component = numbers_and_senders(content, places)
-    stamps = _gathered(content, places, STAMP).view(">u8")[:, 0]
+    stamps = gathered(content, places, STAMP).view(">u8")[:, 0]
     batch = Batch(
         name=definition.msgname,
         records=payload.view(dtype)[:, 0],
@@ -182,16 +183,6 @@ def numbers_and_senders(
     at = places + STAMP
     at += np.where(content[at] == 0xFD, 4, 2)
     return content[at], content[at + 1], content[at + 2]
-
-
-def _gathered(
-    content: NDArray[np.uint8], places: NDArray[np.int64], count: int
-) -> NDArray[np.uint8]:
-    """So many bytes from each of these places."""
-    found = np.empty((places.size, count), dtype=np.uint8)
-    for k in range(count):
-        np.take(content, places + k, out=found[:, k])
-    return found
 
 
 def _dtype(definition: Any) -> np.dtype[np.void]:

@@ -16,6 +16,9 @@ Kind = Literal["rate", "attitude", "velocity", "position"]
 #: Start and stop of each window, s, on the clock of the log; an end may be infinite.
 Windows = list[tuple[float, float]]
 
+#: What finds such windows in a log; None where the log does not tell.
+Told = Callable[[LogContents], Windows | None]
+
 #: Units of logs: the unit here, and the factor to it.
 UNITS: dict[str, tuple[str, float]] = {
     "rad": ("rad", 1.0),
@@ -80,7 +83,7 @@ class Condition:
         The state where it does not hold, as ``"the vehicle is disarmed"``.
     """
 
-    windows: Callable[[LogContents], Windows | None]
+    windows: Told
     otherwise: str
 
 

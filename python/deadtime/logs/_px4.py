@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._conditions import (
+    closed_where,
     first_told,
     in_modes,
     in_the_air,
@@ -53,7 +54,7 @@ FLYING = (
 def _closed(flag: str, modes: frozenset[str]) -> tuple[Condition, ...]:
     """Conditions of a loop that some modes close: the flag of the version, else the mode."""
     flagged = state("vehicle_control_mode", f"flag_control_{flag}_enabled", _is_set)
-    return (*FLYING, Condition(first_told(flagged, in_modes(modes)), "the mode does not close it"))
+    return (*FLYING, closed_where(first_told(flagged, in_modes(modes))))
 
 
 def _rate(axis: str, k: int) -> LoopNames:
@@ -71,7 +72,7 @@ def _rate(axis: str, k: int) -> LoopNames:
             Signal("vehicle_torque_setpoint", (f"xyz[{k}]",)),
             Signal("actuator_controls_0", (f"control[{k}]",)),
         ),
-        conditions=(*FLYING, Condition(flagged, "the mode does not close it")),
+        conditions=(*FLYING, closed_where(flagged)),
     )
 
 
@@ -91,10 +92,7 @@ def _attitude(axis: str) -> LoopNames:
         ),
         response=(Signal("vehicle_attitude", QUATERNION, "rad", derive=derive, rule=rule),),
         actuator=(Signal("vehicle_rates_setpoint", (axis,), "rad/s"),),
-        conditions=(
-            *FLYING,
-            Condition(first_told(flagged, not_in_modes({"Acro"})), "the mode does not close it"),
-        ),
+        conditions=(*FLYING, closed_where(first_told(flagged, not_in_modes({"Acro"})))),
     )  # fmt: skip
 
 

@@ -24,3 +24,8 @@ VEHICLES = {
     19: "VTOL tail-sitter", 20: "VTOL tail-sitter", 21: "VTOL tiltrotor", 22: "VTOL",
     23: "VTOL tail-sitter", 29: "dodecarotor",
 }  # fmt: skip
+
+
+def version_of(number: int) -> str:
+    """A version such as ``"v1.14.3"``; the last byte of its number is the kind of release."""
+    return "v" + ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import Condition, Windows
 from deadtime.logs._series import Series
-from deadtime.logs._windows import held_rows, length, outside, shared
+from deadtime.logs._windows import held_rows, length, outside, runs, shared
 
 #: Fewest rows of setpoint and response in a segment.
 FEWEST = 8
@@ -79,14 +78,8 @@ def _copies(setpoint: Series, response: Series) -> Windows:
     copied = np.zeros(values.size, dtype=bool)
     for shift in (-3, -2, -1, 0, 1):
         found = response.values[np.clip(nearest + shift, 0, len(response) - 1)]
-        for first, stop in _runs(np.abs(values - found) <= 1e-6 * np.abs(values)):
+        for first, stop in runs(np.abs(values - found) <= 1e-6 * np.abs(values)):
             lasts = setpoint.time[stop - 1] - setpoint.time[first] >= COPY_LASTS
             if lasts and np.unique(values[first:stop]).size >= COPIED:
                 copied[first:stop] = True
     return held_rows(setpoint.time, copied)
-
-
-def _runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First row and the row after the last one of each run."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -7,12 +7,14 @@ definitions of pymavlink: one by one they would take a minute for a flight.
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array
-from deadtime._base.errors import MissingExtraError, RecordingError
+from deadtime._base.errors import RecordingError
+from deadtime._base.extras import library
 from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
 from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._link import Link, half_round_trip, lost_packets, transport_of
@@ -24,7 +26,8 @@ from deadtime.logs._mavlink_packets import (
     numbers_and_senders,
 )
 from deadtime.logs._names import UNITS
-from deadtime.logs._px4_modes import MODES, VEHICLES
+from deadtime.logs._px4_modes import MODES, VEHICLES, version_of
+from deadtime.logs._windows import changes_of
 
 #: ``MAV_AUTOPILOT`` of a heartbeat.
 AUTOPILOTS = {3: "ArduPilot", 12: "PX4"}
@@ -60,15 +63,9 @@ def read_tlog(data: bytes, source: str) -> LogContents:
     RecordingError
         When no autopilot sends in it.
     """
-    try:
-        from pymavlink.dialects.v20 import (  # type: ignore[import, unused-ignore]
-            ardupilotmega as dialect,
-        )
-    except ImportError as error:
-        raise MissingExtraError(
-            "tlog files are read with pymavlink, which is not installed; this line installs it: "
-            "pip install 'deadtime[logs]'"
-        ) from error
+    dialect = library(
+        "pymavlink.dialects.v20.ardupilotmega", "reading tlog files", "'deadtime[logs]'"
+    )
     packets = find_packets(data)
     found, damaged = batches(data, packets, dialect.mavlink_map)
     vehicle = _vehicle(found)
@@ -260,21 +257,23 @@ def _topic(batch: Batch, rows: NDArray[np.int64], own: bool, clock: Clock) -> To
     return Topic(seconds, columns, units)
 
 
-def _texts(found: list[Batch], name: str, column: str, vehicle: Sender) -> list[str]:
-    """A column of texts of the vehicle."""
+def _values(found: list[Batch], name: str, column: str, vehicle: Sender) -> NDArray[Any]:
+    """A column of the vehicle's messages of one type; empty if there are none."""
     for batch in found:
         if batch.name == name and vehicle in batch.senders():
-            texts = batch.records[column][batch.senders()[vehicle]].tolist()
-            return [text.split(b"\0")[0].decode("utf-8", "replace") for text in texts]
-    return []
+            return np.asarray(batch.records[column][batch.senders()[vehicle]])
+    return np.empty(0)
+
+
+def _texts(found: list[Batch], name: str, column: str, vehicle: Sender) -> list[str]:
+    """A column of texts of the vehicle."""
+    texts = _values(found, name, column, vehicle).tolist()
+    return [text.split(b"\0")[0].decode("utf-8", "replace") for text in texts]
 
 
 def _parameters(found: list[Batch], vehicle: Sender) -> dict[str, float]:
     names = _texts(found, "PARAM_VALUE", "param_id", vehicle)
-    if not names:
-        return {}
-    batch = next(one for one in found if one.name == "PARAM_VALUE")
-    values = batch.records["param_value"][batch.senders()[vehicle]].astype(float).tolist()
+    values = _values(found, "PARAM_VALUE", "param_value", vehicle).astype(float).tolist()
     return {name: value for name, value in zip(names, values, strict=True) if name}
 
 
@@ -283,17 +282,14 @@ def _firmware(found: list[Batch], vehicle: Sender) -> str:
     for text in _texts(found, "STATUSTEXT", "text", vehicle):
         if " V" in text and text.startswith(("Ardu", "APM", "Rover", "Blimp")):
             return text
-    for batch in found:
-        if batch.name == "AUTOPILOT_VERSION" and vehicle in batch.senders():
-            version = int(batch.records["flight_sw_version"][batch.senders()[vehicle]][-1])
-            return "v" + ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
-    return ""
+    versions = _values(found, "AUTOPILOT_VERSION", "flight_sw_version", vehicle)
+    return version_of(int(versions[-1])) if versions.size else ""
 
 
 def _modes(heartbeat: Topic, autopilot: str, kind: int) -> tuple[tuple[float, str], ...]:
     numbers = heartbeat.columns["custom_mode"].astype(np.int64)
-    rows = np.concatenate(([0], np.flatnonzero(np.diff(numbers)) + 1))
-    return tuple((float(heartbeat.time[k]), _mode(int(numbers[k]), autopilot, kind)) for k in rows)
+    changes = changes_of(heartbeat.time, numbers)
+    return tuple((at, _mode(number, autopilot, kind)) for at, number in changes)
 
 
 def _mode(number: int, autopilot: str, kind: int) -> str:

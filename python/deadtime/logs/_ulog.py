@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from deadtime._base.errors import MissingExtraError, RecordingError
+from deadtime._base.errors import RecordingError
+from deadtime._base.extras import library
 from deadtime.logs._contents import LogContents, Topic
-from deadtime.logs._px4_modes import MODES, VEHICLES
+from deadtime.logs._px4_modes import MODES, VEHICLES, version_of
 from deadtime.logs._series import DAY
+from deadtime.logs._windows import changes_of
 
 #: Seconds of one count of the clock.
 MICROSECOND = 1e-6
@@ -34,17 +36,11 @@ def read_ulog(data: bytes, source: str) -> LogContents:
     RecordingError
         When not even the header can be read.
     """
-    try:
-        from pyulog.core import ULog, ULogException  # type: ignore[import, unused-ignore]
-    except ImportError as error:
-        raise MissingExtraError(
-            "ULog files are read by pyulog, which is not installed; this line installs it: "
-            "pip install 'deadtime[logs]'"
-        ) from error
+    pyulog = library("pyulog.core", "reading ULog files", "'deadtime[logs]'")
     with contextlib.redirect_stdout(io.StringIO()):  # the library prints what it finds damaged
         try:
-            log = ULog(_Endless(data))
-        except ULogException as error:
+            log = pyulog.ULog(_Endless(data))
+        except pyulog.ULogException as error:
             raise RecordingError(f"{source} is a damaged ULog file: {error}") from None
     topics: dict[str, Topic] = {}
     for found in log.data_list:
@@ -111,7 +107,7 @@ def _firmware(information: dict[str, Any]) -> str:
     release = information.get("ver_sw_release")
     parts = []
     if isinstance(release, int) and release >> 8:
-        parts.append("v" + ".".join(str(release >> shift & 0xFF) for shift in (24, 16, 8)))
+        parts.append(version_of(release))
     if information.get("ver_sw"):
         parts.append(str(information["ver_sw"])[:10])
     return " ".join(parts)
@@ -121,11 +117,9 @@ def _modes(topics: dict[str, Topic]) -> tuple[tuple[float, str], ...]:
     status = topics.get("vehicle_status")
     if status is None or "nav_state" not in status.columns:
         return ()
-    state = np.asarray(status.columns["nav_state"])
-    rows = np.concatenate(([0], np.flatnonzero(np.diff(state.astype(float))) + 1))
-    return tuple(
-        (float(status.time[k]), MODES.get(int(state[k]), f"mode {int(state[k])}")) for k in rows
-    )
+    state = np.asarray(status.columns["nav_state"]).astype(np.int64)
+    changes = changes_of(status.time, state)
+    return tuple((at, MODES.get(number, f"mode {number}")) for at, number in changes)
 
 
 def _remarks(log: Any) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._names import Windows
@@ -28,10 +29,21 @@ def windows_of(time: Array, holds: Mask) -> Windows:
     ]
 
 
+def changes_of(time: Array, numbers: NDArray[np.int64]) -> list[tuple[float, int]]:
+    """Each number with the time of the first row from which it stays."""
+    rows = np.concatenate(([0], np.flatnonzero(np.diff(numbers)) + 1))
+    return [(float(time[k]), int(numbers[k])) for k in rows]
+
+
+def runs(holds: Mask) -> list[tuple[int, int]]:
+    """First row, and the row after the last one, of each run in which a state holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
 def held_rows(time: Array, holds: Mask) -> Windows:
     """First and last time of each run of rows in which a state holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
-    return [(float(time[a]), float(time[b - 1])) for a, b in edges.reshape(-1, 2)]
+    return [(float(time[a]), float(time[b - 1])) for a, b in runs(holds)]
 
 
 def shared(some: Windows, others: Windows) -> Windows:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from deadtime._base.digits import stated
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime.logs._log import Log
 from deadtime.logs.latencies._filters import FilterDelay
 from deadtime.logs.latencies._relation import LoopLatency
@@ -48,8 +48,7 @@ class Stage:
 
     def to_dict(self) -> dict[str, Any]:
         """The stage as plain values for JSON."""
-        found: dict[str, Any] = plain(vars(self))
-        return found
+        return plain_fields(vars(self))
 
 
 def stages_of(

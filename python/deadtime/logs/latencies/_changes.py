@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime.logs.latencies._elsewhere import TWO_SIDED
 from deadtime.logs.latencies._latency import Latency
 
@@ -70,8 +70,7 @@ class LatencyChange:
     def to_dict(self) -> dict[str, Any]:
         """The change as plain values for JSON."""
         own = {"change": self.change, "interval_95": self.ci, "verdict": self.verdict}
-        found: dict[str, Any] = plain({**vars(self), **own})
-        return found
+        return plain_fields({**vars(self), **own})
 
 
 def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, ...]:

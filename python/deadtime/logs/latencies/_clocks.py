@@ -20,7 +20,7 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
 from deadtime.estimation import DelayEstimate, path_of
-from deadtime.logs.latencies._windows import Window, trend_of, variance_of
+from deadtime.logs.latencies._windows import Window, told_by, trend_of, variance_of
 
 #: Largest whole number of rows of one signal in a whole number of the other's, and the largest
 #: difference of two clocks that run on quartz.
@@ -192,7 +192,7 @@ def apart_from_each_other(windows: Sequence[Window]) -> list[Window]:
     """Windows that do not overlap, those that promise more first."""
     chosen: list[Window] = []
     for one in windows:
-        if all(one.stop <= other.start or one.start >= other.stop for other in chosen):
+        if one.is_apart(chosen):
             chosen.append(one)
     return chosen
 
@@ -204,7 +204,7 @@ def time_in(window: Window, fit: DelayEstimate) -> tuple[float, float, float] | 
     and trend; None where it does not end.
     """
     part, plant = window.recording, fit.loop.plant
-    sent = part.sent or (part.time, part.reference if part.command is None else part.command)
+    sent = part.sent or (part.time, told_by(part))
     path = path_of(plant, *sent)
     values = plant.parameters
     basis = trend_of(part.time)

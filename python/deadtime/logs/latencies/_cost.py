@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime.estimation import DelayEstimate
 from deadtime.loops import ControlLoop, FactoredPlant, P
 from deadtime.recordings import Recording
@@ -63,8 +63,7 @@ class GainCost:
 
     def to_dict(self) -> dict[str, Any]:
         """The gains as plain values for JSON."""
-        found: dict[str, Any] = plain(vars(self))
-        return found
+        return plain_fields(vars(self))
 
 
 def cost_of(fit: DelayEstimate, recording: Recording) -> GainCost | None:

@@ -80,23 +80,15 @@ def _px4(told: Mapping[str, float]) -> list[FilterDelay]:
     found += _low_pass(told, "low-pass of the derivative", "D", "IMU_DGYRO_CUTOFF", two_poles)
     found += _low_pass(told, "low-pass of the derivative", "D", "MC_DTERM_CUTOFF", two_poles)
     for k in (0, 1):
-        centre, width = (told.get(f"IMU_GYRO_NF{k}_{end}", 0.0) for end in ("FRQ", "BW"))
-        if centre > 0.0 and width > 0.0:
-            source = f"IMU_GYRO_NF{k}_FRQ {centre:g}, IMU_GYRO_NF{k}_BW {width:g}"
-            found.append(
-                FilterDelay(f"notch {k + 1}", "response", notch(centre, centre / width), source)
-            )
+        found += _notch(told, f"notch {k + 1}", f"IMU_GYRO_NF{k}_FRQ", f"IMU_GYRO_NF{k}_BW")
     return found
 
 
 def _ardupilot(told: Mapping[str, float]) -> list[FilterDelay]:
     """INS_GYRO_FILTER has two poles, the filters of the rate controller have one each."""
     found = _low_pass(told, "gyro low-pass", "response", "INS_GYRO_FILTER", two_poles)
-    centre, width = told.get("INS_HNTCH_FREQ", 0.0), told.get("INS_HNTCH_BW", 0.0)
-    if told.get("INS_HNTCH_ENABLE", 0.0) > 0.0 and centre > 0.0 and width > 0.0:
-        source = f"INS_HNTCH_FREQ {centre:g}, INS_HNTCH_BW {width:g}"
-        delay = notch(centre, centre / width)
-        found.append(FilterDelay("harmonic notch", "response", delay, source))
+    if told.get("INS_HNTCH_ENABLE", 0.0) > 0.0:
+        found += _notch(told, "harmonic notch", "INS_HNTCH_FREQ", "INS_HNTCH_BW")
     for axis, name in (("RLL", "roll"), ("PIT", "pitch"), ("YAW", "yaw")):
         for letter, what, path in (("D", "derivative", "D"), ("E", "error", f"{name} error")):
             parameter = f"ATC_RAT_{axis}_FLT{letter}"
@@ -130,10 +122,7 @@ def _betaflight(told: Mapping[str, float]) -> list[FilterDelay]:
         found += _low_pass(told, name, path, f"{prefix}_hz", delay_of)
         found += _low_pass(told, name, path, f"{prefix}_static_hz", delay_of)
     for k in (0, 1):
-        centre, cutoff = (
-            told.get(f"gyro_notch_hz[{k}]", 0.0),
-            told.get(f"gyro_notch_cutoff[{k}]", 0.0),
-        )
+        centre, cutoff = (told.get(f"gyro_notch_{end}[{k}]", 0.0) for end in ("hz", "cutoff"))
         if centre > cutoff > 0.0:
             quality = centre * cutoff / (centre**2 - cutoff**2)
             source = f"gyro_notch_hz {centre:g}, gyro_notch_cutoff {cutoff:g}"
@@ -147,6 +136,14 @@ def _betaflight(told: Mapping[str, float]) -> list[FilterDelay]:
         delay = count * notch(lowest, quality)
         found.append(FilterDelay("dynamic notch, at most", "response", delay, source))
     return found
+
+
+def _notch(told: Mapping[str, float], name: str, centre: str, width: str) -> list[FilterDelay]:
+    at, wide = told.get(centre, 0.0), told.get(width, 0.0)
+    if not (at > 0.0 and wide > 0.0):
+        return []
+    source = f"{centre} {at:g}, {width} {wide:g}"
+    return [FilterDelay(name, "response", notch(at, at / wide), source)]
 
 
 def _low_pass(

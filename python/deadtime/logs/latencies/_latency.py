@@ -14,7 +14,7 @@ from deadtime._base.digits import stated
 from deadtime._base.drawing import Figure
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime._base.progress import Stages, stage_report
 from deadtime.estimation import SharedNumber, shared_number
 from deadtime.logs._link import Link
@@ -41,7 +41,7 @@ from deadtime.logs.latencies._windows import (
     seen_windows,
     window_of,
 )
-from deadtime.logs.latencies._words import cost_in_words, numbers_of, why_inadequate
+from deadtime.logs.latencies._words import said_of
 from deadtime.recordings import Recording
 
 
@@ -147,14 +147,8 @@ class Latency(ReadOnlyArrays, Pictured):
         return "\n".join([*lines, *self.remarks])
 
     def _lines(self, one: LoopLatency) -> list[str]:
-        fit = one.estimate
-        assert fit is not None
-        lines = [one.headline()]
-        lines.append(f"  {', '.join(numbers_of(fit))}")
-        if not fit.adequate:
-            lines.append(f"  not adequate: {why_inadequate(fit)}")
-        if one.cost is not None:
-            lines.append(f"  {cost_in_words(one)}")
+        first, *others = said_of(one)
+        lines = [first, *(f"  {words}" for words in others)]
         if one.command == "actuator" or (one.loop, "actuator") not in {
             (other.loop, other.command) for other in self.estimated
         }:
@@ -163,7 +157,7 @@ class Latency(ReadOnlyArrays, Pictured):
 
     def to_dict(self) -> dict[str, Any]:
         """All results as plain values for JSON."""
-        found: dict[str, Any] = plain(
+        return plain_fields(
             {
                 "source": self.source,
                 "vehicle": self.vehicle,
@@ -176,7 +170,6 @@ class Latency(ReadOnlyArrays, Pictured):
                 "link": None if self.link is None else self.link.to_dict(),
             }
         )
-        return found
 
     def plot(self) -> Figure:
         """Draw delay and lag of each loop with their intervals. Needs matplotlib."""
@@ -195,11 +188,7 @@ class Latency(ReadOnlyArrays, Pictured):
         from deadtime._base.page import write_page
         from deadtime.logs.latencies._page import render
 
-        text = render(
-            self.source, self.vehicle, self.headline(), self.loops, self.stages, self.filters,
-            self.remarks, self.link,
-        )  # fmt: skip
-        return write_page(text, Path(path))
+        return write_page(render(self), Path(path))
 
     def __repr__(self) -> str:
         return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops told>"
@@ -369,7 +358,6 @@ def _commands(loop: LogLoop) -> Iterator[Command]:
 
 
 def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
-    integrates = command == "actuator"
     if not loop.segments:
         why = "; ".join(loop.why_left_out) or "it is never followed"
         return LoopLatency(loop.name, loop.axis, loop.kind, command, (), math.inf, None, why)
@@ -377,7 +365,7 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     between = between_rows(log, loop.kind, told)
     loop = known_commands(log, loop, command, between)
     told = loop.signals[command]
-    seen = seen_windows(loop, command, integrates, between)
+    seen = seen_windows(loop, command, between)
     windows = best_of(seen)
 
     def held(window: Window) -> Recording:
@@ -391,7 +379,7 @@ def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
         if between == "lines":
             unsure = math.hypot(unsure, smeared(log, loop.kind, told, *first))
     found = relation_of(
-        loop.name, loop.axis, loop.kind, command, integrates, windows, between,
+        loop.name, loop.axis, loop.kind, command, windows, between,
         held if between is None else None, hidden, unsure, others_of(seen, windows),
     )  # fmt: skip
     named = ((one.source, one.time) for one in (told, loop.response))
@@ -409,7 +397,7 @@ def _of_recording(recording: Recording) -> Latency:
             command=recording.reference, units=recording.units, source=recording.source,
         )  # fmt: skip
     window = window_of(told, not follows)
-    one = relation_of(recording.source or "recording", "", "", command, not follows, [window])
+    one = relation_of(recording.source or "recording", "", "", command, [window])
     if recording.sent is not None:
         one = doubted_by_clocks(
             one, parts_of(told, not follows),

@@ -6,41 +6,32 @@ from collections.abc import Mapping, Sequence
 
 from deadtime._base.digits import between, stated
 from deadtime._base.page import page
-from deadtime.logs._link import Link
 from deadtime.logs.latencies._budget import Stage
-from deadtime.logs.latencies._filters import FilterDelay
+from deadtime.logs.latencies._latency import Latency
 from deadtime.logs.latencies._live import around_the_vehicle
-from deadtime.logs.latencies._plots import plot_fit, plot_latency
+from deadtime.logs.latencies._plots import plot_fit
 from deadtime.logs.latencies._relation import LoopLatency
-from deadtime.logs.latencies._words import cost_in_words, numbers_of, why_inadequate
+from deadtime.logs.latencies._words import said_of
 
 
-def render(
-    source: str,
-    vehicle: str,
-    headline: str,
-    loops: Sequence[LoopLatency],
-    stages: Mapping[str, Sequence[Stage]],
-    filters: Sequence[FilterDelay],
-    remarks: Sequence[str],
-    link: Link | None,
-) -> str:
+def render(found: Latency) -> str:
     """The page as text."""
-    estimated = [one for one in loops if one.estimate is not None]
     return page(
         "logs/latencies/page.html",
-        title=f"Latencies in {source}",
-        described=vehicle,
-        verdict=headline,
-        rows=[_row(one) for one in estimated],
-        all=plot_latency(source, estimated) if estimated else None,
-        budget=_budget(stages),
-        filters=[(one.name, one.path, stated(one.delay, 0.0, "s"), one.source) for one in filters],
-        link="" if link is None else f"{_capital(link.summary())}.",
-        fits=[_fit(one) for one in estimated],
-        refused=[one for one in loops if one.estimate is None],
-        remarks=remarks,
-        around=around_the_vehicle(estimated),
+        title=f"Latencies in {found.source}",
+        described=found.vehicle,
+        verdict=found.headline(),
+        rows=[_row(one) for one in found.estimated],
+        all=found._picture(),
+        budget=_budget(found.stages),
+        filters=[
+            (one.name, one.path, stated(one.delay, 0.0, "s"), one.source) for one in found.filters
+        ],
+        link="" if found.link is None else f"{_capital(found.link.summary())}.",
+        fits=[_fit(one) for one in found.estimated],
+        refused=[one for one in found.loops if one.estimate is None],
+        remarks=found.remarks,
+        around=around_the_vehicle(found.estimated),
     )
 
 
@@ -66,19 +57,12 @@ def _budget(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:
 
 def _fit(one: LoopLatency) -> dict[str, object]:
     """A fit with its picture, its numbers and what they cost."""
-    fit = one.estimate
-    assert fit is not None
-    said = [one.headline(), ", ".join(numbers_of(fit))]
-    if not fit.adequate:
-        said.append(f"not adequate: {why_inadequate(fit)}")
-    if one.cost is not None:
-        said.append(cost_in_words(one))
     start, stop = one.windows[0]
     number = len(one.windows)
     more = f", the best of {number} that were fitted together" if number > 1 else ""
     return {
         "heading": _capital(one.name),
-        "sentences": [f"{_capital(words)}." for words in said],
+        "sentences": [f"{_capital(words)}." for words in said_of(one)],
         "figure": plot_fit(one),
         "caption": f"The window from {start:.1f} to {stop:.1f} s{more}.",
     }

@@ -11,7 +11,7 @@ import numpy as np
 from deadtime._base.digits import between, stated
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.plain import plain
+from deadtime._base.plain import plain_fields
 from deadtime.estimation import (
     DelayEstimate,
     OutputError,
@@ -115,20 +115,12 @@ class LoopLatency(ReadOnlyArrays):
         standard errors: `estimate` has the others, and some take long.
         """
         fit = self.estimate
-        found: dict[str, Any] = plain(
-            {
-                "loop": self.loop,
-                "axis": self.axis,
-                "kind": self.kind,
-                "command": self.command,
-                "windows": self.windows,
-                "promise": self.promise,
-                "refusal": self.refusal,
-                "estimate": None if fit is None else fit.to_dict(intervals=("delay+lag",)),
-                "cost": None if self.cost is None else self.cost.to_dict(),
-            }
-        )
-        return found
+        names = ("loop", "axis", "kind", "command", "windows", "promise", "refusal")
+        results = {
+            "estimate": None if fit is None else fit.to_dict(intervals=("delay+lag",)),
+            "cost": None if self.cost is None else self.cost.to_dict(),
+        }
+        return plain_fields({name: getattr(self, name) for name in names} | results)
 
 
 def relation_of(
@@ -136,7 +128,6 @@ def relation_of(
     axis: str,
     kind: str,
     command: Command,
-    integrates: bool,
     windows: list[Window],
     between: Between | None = None,
     held: Callable[[Window], Recording] | None = None,
@@ -163,7 +154,7 @@ def relation_of(
     if not told:
         return refused(_says_nothing(windows[0], command))
     try:
-        fit = _fitted(told, integrates, held, others)
+        fit = _fitted(told, command == "actuator", held, others)
     except DeadtimeError as error:
         return refused(str(error).partition("; check ")[0])
     if why := _no_answer(fit, told[0]):
@@ -181,9 +172,7 @@ def relation_of(
             "the log does not tell when commands changed between its rows, or how long each holds, "
             f"which is worth {stated(unsure, 0.0, 's')} more or less",
         )
-    cost = None
-    if command == "actuator":
-        cost = cost_of(fit, told[0].recording)
+    cost = cost_of(fit, told[0].recording) if command == "actuator" else None
     ends = _ends_of(told[: len(fit.runs)])
     return LoopLatency(loop, axis, kind, command, ends, promise, fit, "", cost, between)
 

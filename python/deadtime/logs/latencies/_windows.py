@@ -88,6 +88,10 @@ class Window(NamedTuple):
         row = self.recording.sample_time
         return self.explained > EXPLAINED and self.promise < max(SHARE * self.time, OF_A_ROW * row)
 
+    def is_apart(self, others: Sequence[Window]) -> bool:
+        """Whether the window shares no time with these."""
+        return all(self.stop <= other.start or self.start >= other.stop for other in others)
+
 
 class _Shape(NamedTuple):
     """The best of the tried responses: sum of squares left, time, gain, residuals, slope."""
@@ -99,12 +103,10 @@ class _Shape(NamedTuple):
     turn: Array
 
 
-def seen_windows(
-    loop: LogLoop, command: Command, integrates: bool, between: Between | None
-) -> list[Window]:
+def seen_windows(loop: LogLoop, command: Command, between: Between | None) -> list[Window]:
     """The windows with most movement, the one that promises most first; none without rows."""
     parts = sorted(_parts(loop, command, between), key=_movement, reverse=True)
-    found = [_seen(part, integrates) for part in parts[:LOOKED_AT]]
+    found = [window_of(part, command == "actuator") for part in parts[:LOOKED_AT]]
     return sorted(found, key=lambda one: one.promise if one.tells else np.inf)
 
 
@@ -112,8 +114,7 @@ def best_of(found: Sequence[Window]) -> list[Window]:
     """The windows to fit."""
     chosen = list(found[:1])
     for one in found[1:]:
-        apart = all(one.stop <= other.start or one.start >= other.stop for other in chosen)
-        if apart and one.tells and one.promise < LESS * chosen[0].promise:
+        if one.is_apart(chosen) and one.tells and one.promise < LESS * chosen[0].promise:
             chosen.append(one)
         if len(chosen) > FURTHER:
             break
@@ -124,14 +125,9 @@ def others_of(found: Sequence[Window], chosen: Sequence[Window]) -> list[Window]
     """The windows beside those to fit that promise the most, which are to agree with them."""
     apart: list[Window] = list(chosen)
     for one in found:
-        if one.tells and all(one.stop <= other.start or one.start >= other.stop for other in apart):
+        if one.tells and one.is_apart(apart):
             apart.append(one)
     return apart[len(chosen) :][:COMPARED]
-
-
-def window_of(recording: Recording, integrates: bool) -> Window:
-    """A whole recording as a window."""
-    return _seen(recording, integrates)
 
 
 def parts_of(recording: Recording, integrates: bool) -> list[Window]:
@@ -141,7 +137,7 @@ def parts_of(recording: Recording, integrates: bool) -> list[Window]:
     rows = np.searchsorted(recording.time, edges)
     if np.min(np.diff(rows)) < FEWEST:
         return []
-    found = [_seen(recording.window(*ends), integrates) for ends in pairwise(edges)]
+    found = [window_of(recording.window(*ends), integrates) for ends in pairwise(edges)]
     return [one for one in found if one.tells]
 
 
@@ -171,8 +167,12 @@ def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Rec
 
 def _movement(part: Recording) -> float:
     """Deviation of the command of a part from a straight line."""
-    told = part.reference if part.command is None else part.command
-    return float(np.std(_without(trend_of(part.time), told)))
+    return float(np.std(_without(trend_of(part.time), told_by(part))))
+
+
+def told_by(part: Recording) -> Array:
+    """What a recording was told on its rows: its command, or its reference where it has none."""
+    return part.reference if part.command is None else part.command
 
 
 def _without(basis: Array, values: Array) -> Array:
@@ -180,14 +180,10 @@ def _without(basis: Array, values: Array) -> Array:
     return np.asarray(values - (values @ basis) @ basis.T)
 
 
-def _seen(part: Recording, integrates: bool) -> Window:
-    """What a part says about the time from command to response."""
+def window_of(part: Recording, integrates: bool) -> Window:
+    """A recording as a window, with what it says about the time from command to response."""
     time, output = part.time, part.output
-    if part.sent is not None:
-        response = HeldResponse(*part.sent)
-    else:
-        told = part.reference if part.command is None else part.command
-        response = HeldResponse(time, told)
+    response = HeldResponse(*(part.sent or (time, told_by(part))))
     row = part.sample_time
     trend = trend_of(time)
     moved = _without(trend, output)

@@ -30,6 +30,18 @@ def why_inadequate(fit: DelayEstimate) -> str:
     return why.partition(" (try ")[0] or "the residuals are not white"
 
 
+def said_of(one: LoopLatency) -> list[str]:
+    """The time of a loop that was not refused, what it is made of, doubts, and what it costs."""
+    fit = one.estimate
+    assert fit is not None
+    said = [one.headline(), ", ".join(numbers_of(fit))]
+    if not fit.adequate:
+        said.append(f"not adequate: {why_inadequate(fit)}")
+    if one.cost is not None:
+        said.append(cost_in_words(one))
+    return said
+
+
 def cost_in_words(one: LoopLatency) -> str:
     """What delay and lag cost in gain, in a sentence."""
     cost = one.cost
