@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, one_dimensional
 from deadtime.loops._characteristic import closed_loop
-from deadtime.loops._model import LoopRun, reference_jumps
+from deadtime.loops._model import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._native import LoopResponse, on_samples
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
@@ -114,33 +114,25 @@ class LoopInTime:
         """
         loop = self.specification
         respond = loop.respond
-        if respond is None:
-            return simulate_with_delays(
-                loop,
-                time,
-                reference,
-                initial_output=initial_output,
-                reference_before=reference_before,
-                reference_time=reference_time,
-                command_history=command_history,
-                sample_phase=sample_phase,
-                sensitivities=sensitivities,
-            )
-        times = one_dimensional("time", time)
         run: LoopRun | float
         if (
-            isinstance(reference, float)
+            respond is not None
+            and isinstance(reference, float)
             and type(initial_output) is type(sample_phase) is float
             and initial_output == sample_phase == 0.0
             and reference_before is reference_time is None
             and command_history is _NONE
         ):
-            run, past = reference, 0.0
+            times, run, past = one_dimensional("time", time), reference, 0.0
         else:
-            run, past = _run_of(
-                loop, times, reference, initial_output, reference_before, reference_time,
-                command_history, sample_phase,
+            given = RunArguments(
+                time, reference, initial_output, reference_before, reference_time,
+                command_history, sample_phase, sensitivities,
             )  # fmt: skip
+            if respond is None:
+                return simulate_with_delays(loop, given)
+            times = one_dimensional("time", time)
+            run, past = _run_of(loop, times, given)
         response = response_of(_Again(loop, run, respond(times, run)))
         if not sensitivities:
             return response
@@ -226,34 +218,24 @@ class LoopInTime:
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
 
 
-def _run_of(
-    loop: LoopSpecification,
-    times: Array,
-    reference: ArrayLike,
-    initial_output: float,
-    reference_before: float | None,
-    reference_time: ArrayLike | None,
-    command_history: ArrayLike,
-    sample_phase: float,
-) -> tuple[LoopRun, float]:
+def _run_of(loop: LoopSpecification, times: Array, given: RunArguments) -> tuple[LoopRun, float]:
     """Check the arguments of `simulate`: the run, and the reference just before its start."""
-    initial = before = finite("initial_output", initial_output)
-    if reference_before is not None:
-        before = finite("reference_before", reference_before)
+    initial, before = given.rest()
+    reference = given.reference
     held: float | Array
     past, held_from = before, None
-    if type(reference) is float and reference_time is None:
+    if type(reference) is float and given.reference_time is None:
         held = finite("reference", reference)
     else:
-        jumps = reference_jumps(times, reference, reference_time, before)
+        jumps = reference_jumps(times, reference, given.reference_time, before)
         # The arrays belong to the caller; the response must not change with them.
         held, held_from = jumps.values.copy(), jumps.times.copy()
         if times.size and held_from[0] < times[0]:
             past = jumps.just_before(float(times[0]))
     history = None
-    if not isinstance(command_history, tuple) or command_history:
-        history = one_dimensional("command_history", command_history).copy()
-    phase = finite("sample_phase", sample_phase)
+    if not isinstance(given.command_history, tuple) or given.command_history:
+        history = one_dimensional("command_history", given.command_history).copy()
+    phase = finite("sample_phase", given.sample_phase)
     state, command = loop.rest_at(initial, past)
     return LoopRun(state, command, before, held, held_from, history, phase), past
 

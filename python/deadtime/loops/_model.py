@@ -6,7 +6,7 @@ come first in x, the controller's after them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.arrays import Array
-from deadtime._base.validation import increasing, real_array
+from deadtime._base.validation import finite, increasing, real_array
 from deadtime.loops._controllers import Controller, FilterUpdate
 from deadtime.loops._entries import Each, number, vector, zeros
 from deadtime.loops._native import LinearLoop
@@ -43,6 +43,26 @@ class LoopRun(NamedTuple):
     #: Commands at the samples before the start, the latest one last.
     command_history: Array | None = None
     sample_phase: float = 0.0
+
+
+class RunArguments(NamedTuple):
+    """The arguments of `ControlLoop.simulate`, as they were given."""
+
+    time: ArrayLike
+    reference: ArrayLike
+    initial_output: float = 0.0
+    reference_before: float | None = None
+    reference_time: ArrayLike | None = None
+    command_history: ArrayLike = ()
+    sample_phase: float = 0.0
+    sensitivities: Sequence[str] = ()
+
+    def rest(self) -> tuple[float, float]:
+        """Output and reference before the start."""
+        initial = finite("initial_output", self.initial_output)
+        if self.reference_before is None:
+            return initial, initial
+        return initial, finite("reference_before", self.reference_before)
 
 
 class ReferenceJumps(NamedTuple):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Collection, Mapping
 from typing import SupportsFloat, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.validation import OpenRange, Range
+from deadtime._base.validation import OpenRange, Range, whole_number
 from deadtime.loops._characteristic import family_of_loop
 from deadtime.loops._sampled_regions import sampled_poles_in
 from deadtime.loops._specification import LoopSpecification
@@ -176,9 +175,7 @@ class LoopPoles:
             If the delay is None or `n` is less than one.
         """
         period = self.specification.sample_time
-        number = operator.index(n)
-        if number < 1:
-            raise ValueError(f"n={n}: ask for one pole at least")
+        number = whole_number("n", n)
         if period is None:
             return self.characteristic().rightmost(number)
         return sampled_roots(self.specification.native.balanced_matrix(), period, number)

@@ -6,14 +6,11 @@ drives the output by b r e^(-s delay) / h and the command by a r / h, h = a g + 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import ArrayLike
 
-from deadtime._base.validation import finite, one_dimensional
+from deadtime._base.validation import one_dimensional
 from deadtime.loops._characteristic import closed_loop, reference_to_command
-from deadtime.loops._model import reference_jumps
+from deadtime.loops._model import RunArguments, reference_jumps
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, TransferFunction
 
@@ -21,23 +18,12 @@ from deadtime.systems import Response, TransferFunction
 _AT_REST = 1e-9
 
 
-def simulate_with_delays(
-    loop: LoopSpecification,
-    time: ArrayLike,
-    reference: ArrayLike,
-    *,
-    initial_output: float = 0.0,
-    reference_before: float | None = None,
-    reference_time: ArrayLike | None = None,
-    command_history: ArrayLike = (),
-    sample_phase: float = 0.0,
-    sensitivities: Sequence[str] = (),
-) -> Response:
+def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Response:
     """Check the arguments of `ControlLoop.simulate` and run the loop."""
     others = {
-        "command_history": np.size(command_history) > 0,
-        "sample_phase": sample_phase != 0.0,
-        "sensitivities": len(sensitivities) > 0,
+        "command_history": np.size(given.command_history) > 0,
+        "sample_phase": given.sample_phase != 0.0,
+        "sensitivities": len(given.sensitivities) > 0,
     }
     for name, is_given in others.items():
         if is_given:
@@ -45,12 +31,11 @@ def simulate_with_delays(
                 f"{name}: a loop whose plant has delays inside takes no such argument; it needs a "
                 "plant that is rational but for one delay in series"
             )
-    times = one_dimensional("time", time)
+    times = one_dimensional("time", given.time)
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
-    initial = finite("initial_output", initial_output)
-    before = initial if reference_before is None else finite("reference_before", reference_before)
-    jumps = reference_jumps(times, reference, reference_time, before)
+    initial, before = given.rest()
+    jumps = reference_jumps(times, given.reference, given.reference_time, before)
     start = float(times[0])
     past = jumps.just_before(start)
     output, command = _driven(loop)
@@ -84,7 +69,7 @@ def simulate_with_delays(
 def settled_step_with_delays(loop: LoopSpecification, amplitude: float) -> Response:
     """Step response up to where it has settled."""
     found = _driven(loop)[0].step_response(amplitude=amplitude)
-    return simulate_with_delays(loop, found.time, amplitude)
+    return simulate_with_delays(loop, RunArguments(found.time, amplitude))
 
 
 def _driven(loop: LoopSpecification) -> tuple[TransferFunction, TransferFunction]:

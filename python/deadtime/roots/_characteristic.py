@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import operator
 from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 import deadtime.roots._native as native
-from deadtime._base.validation import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval, whole_number
 from deadtime.roots._chains import Chain, chains_of
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots._sensitivity import RootSensitivity
@@ -174,10 +173,7 @@ class Characteristic:
         >>> [complex(round(root.real, 3), round(root.imag, 3)) for root in h.rightmost()]
         [(-0.926+7.713j), (-0.926-7.713j)]
         """
-        number = operator.index(n)
-        if number < 1:
-            raise ValueError(f"n={n}: ask for at least 1 rightmost root")
-        return root_set(self._native.rightmost(number))
+        return root_set(self._native.rightmost(whole_number("n", n)))
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.

@@ -8,14 +8,13 @@ size of coefficients.
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Mapping
 
 import numpy as np
 
 import deadtime.roots._native as native
 from deadtime._base.arrays import Array
-from deadtime._base.validation import OpenRange, open_interval
+from deadtime._base.validation import OpenRange, open_interval, whole_number
 from deadtime.roots._root_set import RootSet, root_set
 from deadtime.roots.certificate._certificate import Certificate
 
@@ -66,10 +65,7 @@ class MatrixDeterminant:
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots, right of the chains of a neutral system."""
-        number = operator.index(n)
-        if number < 1:
-            raise ValueError(f"n={n}: ask for at least 1 rightmost root")
-        return root_set(self._native.rightmost(number))
+        return root_set(self._native.rightmost(whole_number("n", n)))
 
     def rightmost_from_guesses(self, n: int) -> RootSet | None:
         """Locate simple rightmost roots where guesses lead to them, or give None."""

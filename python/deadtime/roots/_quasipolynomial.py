@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import deadtime.roots._native as native
 from deadtime._base.frozen import Immutable
-from deadtime._base.validation import Range, unmasked
+from deadtime._base.validation import Range, unmasked, whole_number
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
 from deadtime.roots._text import joined, latex, row_text
@@ -255,10 +255,7 @@ class QuasiPolynomial(Immutable, Characteristic):
         >>> (s**2 + s * delay(2.0)).derivative()
         2 s + (1 - 2 s) exp(-2 s)
         """
-        order = operator.index(n)
-        if not 0 <= order < 2**31:
-            raise ValueError(f"n={n}: the order of a derivative is a whole number from 0 up")
-        return self._wrap(self._native.derivative(order))
+        return self._wrap(self._native.derivative(whole_number("n", n, least=0, limit=2**31)))
 
     def logarithmic_derivative(self, s: ArrayLike) -> Any:
         r"""Logarithmic derivative :math:`h'(s)/h(s)`, which no exponential makes overflow.
@@ -378,9 +375,7 @@ class QuasiPolynomial(Immutable, Characteristic):
         >>> print(near.coefficients.real.round(12), near.errors[0] < 1e-29)
         [0.  0.  0.5] True
         """
-        place, highest = complex(s), operator.index(order)
-        if not 0 <= highest <= 60:
-            raise ValueError(f"order={order}: from 0 to 60")
+        place, highest = complex(s), whole_number("order", order, least=0, limit=61)
         if not cmath.isfinite(place):
             raise ValueError(f"s={place}: give a finite number")
         found = self._native.expansion(place, highest)

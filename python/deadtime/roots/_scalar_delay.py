@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import deadtime.roots._native as native
+from deadtime._base.validation import whole_number
 from deadtime.special import UfuncOptions, apply, branches, finite, foreign, refuse
 
 
@@ -129,8 +129,6 @@ def rightmost_branches(a1: float, n: int = 2) -> NDArray[np.int64]:
     """
     if not (np.isfinite(a1) and a1 != 0):
         raise ValueError(f"a1={a1}: without a delayed term there are no branches to choose from")
-    if operator.index(n) < 1:
-        raise ValueError(f"n={n}: give how many branches, at least 1")
-    k = np.arange(n, dtype=np.int64)
+    k = np.arange(whole_number("n", n), dtype=np.int64)
     half = (k + 1) // 2
     return np.where((k % 2 == 1) == (a1 > 0), half, -half)

@@ -12,13 +12,13 @@ which is all-pass, and whose phase is wrong from about omega T = 2n on.
 from __future__ import annotations
 
 import importlib
-import operator
 from math import factorial
 from typing import Any, cast
 
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime._base.validation import whole_number
 from deadtime.roots import QuasiPolynomial, expanded
 
 # Upper limit on the order of a Padé approximant: the coefficients of higher ones differ so much in
@@ -42,10 +42,7 @@ def polynomials_of_control(system: Any) -> tuple[Array, Array]:
             f"{type(system).__name__}: give a TransferFunction or StateSpace of python-control"
         )
     if system.dt not in (None, 0):
-        raise ValueError(
-            f"the system has the time step dt={system.dt}: only continuous systems are read, a "
-            "sampled loop is a ControlLoop with sample_time"
-        )
+        raise _is_sampled(system)
     if (system.ninputs, system.noutputs) != (1, 1):
         raise ValueError(
             f"the system has {system.ninputs} inputs and {system.noutputs} outputs: pick one of "
@@ -63,10 +60,7 @@ def polynomials_of_scipy(system: Any) -> tuple[Array, Array]:
     if isinstance(system, tuple):
         system = cast(Any, signal.lti)(*system)
     if isinstance(system, signal.dlti):
-        raise ValueError(
-            f"the system has the time step dt={system.dt}: only continuous systems are read, a "
-            "sampled loop is a ControlLoop with sample_time"
-        )
+        raise _is_sampled(system)
     if not isinstance(system, signal.lti):
         raise TypeError(
             f"{type(system).__name__}: give an lti system of scipy.signal, or a tuple as for lti"
@@ -82,6 +76,13 @@ def polynomials_of_scipy(system: Any) -> tuple[Array, Array]:
     if np.ndim(transfer.num) > 1 and len(transfer.num) > 1:
         raise ValueError(f"the system has {len(transfer.num)} outputs: pick one first")
     return _numbers(np.ravel(transfer.num)), _numbers(transfer.den)
+
+
+def _is_sampled(system: Any) -> ValueError:
+    return ValueError(
+        f"the system has the time step dt={system.dt}: only continuous systems are read, a sampled "
+        "loop is a ControlLoop with sample_time"
+    )
 
 
 def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Array, Array]:
@@ -116,12 +117,9 @@ def rational(num: QuasiPolynomial, den: QuasiPolynomial, order: int | None) -> t
             "none: pade=n replaces delays by Padé approximants of order n, wrong in phase from "
             f"about {2.0 / delays[-1]:.3g} n rad/s on"
         )
-    n = operator.index(order)
-    if not 1 <= n <= _HIGHEST_ORDER:
-        raise ValueError(
-            f"pade={n}: give an order from 1 to {_HIGHEST_ORDER}, higher ones cannot be written "
-            "as polynomials in double precision"
-        )
+    n = whole_number(
+        "pade", order, limit=_HIGHEST_ORDER + 1, otherwise=", as polynomials in double precision"
+    )
     size = np.array(
         [
             factorial(2 * n - k)
