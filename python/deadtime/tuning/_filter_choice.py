@@ -32,7 +32,7 @@ from deadtime.tuning._made import made
 from deadtime.tuning._margins import MarginEstimate, RequiredMargins
 from deadtime.tuning._objectives import Objective, objective_named
 from deadtime.tuning._problem import ObjectiveName, Problem, controller_template, pose
-from deadtime.tuning._result import Design, FilterChoice
+from deadtime.tuning._result import FilterChoice
 from deadtime.tuning._search import Search
 from deadtime.tuning._survey import Survey, surveyed
 
@@ -183,11 +183,18 @@ def filter_choice(
     if noise is not None and command_noise is not None:
         most = positive("command_noise", command_noise) / positive("noise", noise)
         rule = f"the fastest with a command noise of at most {command_noise:g}"
-        omega = _fastest(task, corners, tried, most)
+        omega = _last(task, corners, tried, 1, lambda one: one.noise_gain <= most)
+        if omega is None:
+            raise _too_noisy(corners, tried, most)
     else:
         loss = positive("loss", loss)
         rule = f"the slowest that loses at most {100 * loss:g} %"
-        omega = _slowest(task, corners, tried, ideal, loss)
+        lost = [objective.lost(one.value, ideal.value) for one in tried]
+        omega = _last(
+            task, corners, tried, -1, lambda one: objective.lost(one.value, ideal.value) <= loss
+        )
+        if omega is None:
+            raise _too_slow(corners, lost, loss)
     chosen = made(task.at(omega), objective, required, shape)
     return FilterChoice(
         omega=omega,
@@ -280,52 +287,45 @@ def _bandwidth(loop: ControlLoop, bandwidth: float | None, fastest: float) -> fl
     return float(white)
 
 
-def _slowest(
-    task: _Task, corners: Array, tried: Sequence[_Tried], ideal: Design, loss: float
-) -> float:
-    """The slowest corner that loses no more, between the corners tried too."""
-    lost = [task.objective.lost(one.value, ideal.value) for one in tried]
-    kept = [i for i, one in enumerate(lost) if one <= loss]
-    if not kept:
-        if not np.isfinite(lost).any():
-            raise ValueError("no corner has gains with the required margins: require less")
-        raise ValueError(
-            f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %: the "
-            f"least is {100 * np.nanmin(lost):.3g} %; allow for more loss, or give faster omegas"
-        )
-    return _towards(
-        corners,
-        kept[0],
-        -1,
-        lambda corner: (
-            task.objective.lost(task.tried(corner, tried[kept[0]].gains).value, ideal.value) <= loss
-        ),
+def _too_slow(corners: Array, lost: Sequence[float], loss: float) -> ValueError:
+    """Why every corner loses more."""
+    if not np.isfinite(lost).any():
+        return ValueError("no corner has gains with the required margins: require less")
+    return ValueError(
+        f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %: the "
+        f"least is {100 * np.nanmin(lost):.3g} %; allow for more loss, or give faster omegas"
     )
 
 
-def _fastest(task: _Task, corners: Array, tried: Sequence[_Tried], most: float) -> float:
-    """The fastest corner with no more noise, between the corners tried too."""
-    kept = [i for i, one in enumerate(tried) if one.noise_gain <= most]
-    if not kept:
-        raise ValueError(
-            f"no corner from {corners[0]:.4g} rad/s has a noise gain of {most:.4g} or less: the "
-            f"least is {np.nanmin([one.noise_gain for one in tried]):.4g}; allow for more noise, "
-            "give slower omegas, or smaller gains"
-        )
-    return _towards(
-        corners,
-        kept[-1],
-        1,
-        lambda corner: task.tried(corner, tried[kept[-1]].gains).noise_gain <= most,
+def _too_noisy(corners: Array, tried: Sequence[_Tried], most: float) -> ValueError:
+    """Why every corner makes more noise."""
+    return ValueError(
+        f"no corner from {corners[0]:.4g} rad/s has a noise gain of {most:.4g} or less: the "
+        f"least is {np.nanmin([one.noise_gain for one in tried]):.4g}; allow for more noise, "
+        "give slower omegas, or smaller gains"
     )
 
 
-def _towards(corners: Array, place: int, step: int, keeps: Callable[[float], bool]) -> float:
-    """The corner that still keeps to the rule, halving the way to the neighbour that does not."""
-    if not 0 <= place + step < len(corners):
-        return float(corners[place])
-    kept, other = float(corners[place]), float(corners[place + step])
-    for _ in range(_HALVINGS):
-        middle = math.sqrt(kept * other)
-        kept, other = (middle, other) if keeps(middle) else (kept, middle)
+def _last(
+    task: _Task,
+    corners: Array,
+    tried: Sequence[_Tried],
+    step: int,
+    keeps: Callable[[_Tried], bool],
+) -> float | None:
+    """The last corner in this direction that keeps to the rule; None where none does.
+
+    It halves the way to the neighbour that does not.
+    """
+    places = [place for place, one in enumerate(tried) if keeps(one)]
+    if not places:
+        return None
+    place = max(places, key=lambda one: step * one)
+    kept = float(corners[place])
+    if 0 <= place + step < len(corners):
+        other = float(corners[place + step])
+        for _ in range(_HALVINGS):
+            middle = math.sqrt(kept * other)
+            is_kept = keeps(task.tried(middle, tried[place].gains))
+            kept, other = (middle, other) if is_kept else (kept, middle)
     return kept
