@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar, cast
 
 import numpy as np
+
+_Value = TypeVar("_Value")
 
 
 class FrozenDict(dict[Any, Any]):
@@ -41,7 +43,7 @@ class PickledByFields:
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
 
-def read_only(value: Any) -> Any:
+def read_only(value: _Value) -> _Value:
     """Return an array that cannot be written to, or a dict that cannot, with such values.
 
     An array is made read-only itself, a dict is copied.
@@ -49,12 +51,13 @@ def read_only(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
     elif isinstance(value, dict):
-        return FrozenDict({name: read_only(part) for name, part in value.items()})
+        frozen = FrozenDict({name: read_only(part) for name, part in value.items()})
+        return cast(_Value, frozen)
     elif isinstance(value, Mapping):
         for part in value.values():
             read_only(part)
     elif type(value) in (list, tuple):
-        for part in value:
+        for part in cast("list[Any]", value):
             read_only(part)
     return value
 

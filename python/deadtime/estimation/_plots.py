@@ -56,12 +56,8 @@ def estimate_axes(fit: DelayEstimate, figure: Figure | None = None) -> list[Axes
 
 def plot_estimate(fit: DelayEstimate, axes: Sequence[Axes] | None = None) -> list[Axes]:
     """Draw the fit over the data and the residuals of each run, then the profile of the delay."""
-    count = 2 * len(fit.runs) + _has_profile(fit)
     axes = estimate_axes(fit) if axes is None else list(axes)
-    if len(axes) != count:
-        raise ValueError(f"ax holds {len(axes)} axes: give {count}")
-    for one in axes:
-        bare_axes(one)
+    _check_axes(axes, 2 * len(fit.runs) + _has_profile(fit))
     for column, run in enumerate(fit.runs):
         upper, lower = axes[2 * column : 2 * column + 2]
         _plot_run(upper, lower, run, f"{fit.method}, delay {fit.delay:.3f} s")
@@ -73,6 +69,14 @@ def plot_estimate(fit: DelayEstimate, axes: Sequence[Axes] | None = None) -> lis
     if _has_profile(fit):
         _plot_profile(axes[-1], fit)
     return axes
+
+
+def _check_axes(axes: Sequence[Axes], count: int) -> None:
+    """Refuse another number of axes, and bare those of the right one."""
+    if len(axes) != count:
+        raise ValueError(f"ax holds {len(axes)} axes: give {count}")
+    for one in axes:
+        bare_axes(one)
 
 
 def shown_figure(width: float, height: float) -> Figure:
@@ -118,10 +122,7 @@ def plot_identifiability(plan: Identifiability, axes: Sequence[Axes] | None = No
     """The expected recording, its sensitivities; delay against lag where both are free."""
     both = plan.correlation is not None
     axes = planned_axes(plan) if axes is None else list(axes)
-    if len(axes) != 2 + both:
-        raise ValueError(f"ax holds {len(axes)} axes: give {2 + both}")
-    for one in axes:
-        bare_axes(one)
+    _check_axes(axes, 2 + both)
     _draw_recording(axes[0], plan)
     _draw_slopes(axes[1], plan)
     if both:

@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 import deadtime as dtm
+from deadtime._base.validation import non_negative, positive
 
 #: Rest before the step, s, from which the estimators read the initial output.
 REST = 1.0
@@ -74,11 +75,9 @@ def internet_loop(
     0.1
     """
     for name, value in {"gain": gain, "delay": delay, "jitter": jitter, "loss": loss}.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise ValueError(f"{name}={value}: give a finite number, zero or more")
+        non_negative(name, value)
     for name, value in {"sample_time": sample_time, "duration": duration}.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name}={value}: give a finite number above zero")
+        positive(name, value)
     if loss >= 1.0:
         raise ValueError(f"loss={loss}: give a number below 1, so that answers arrive")
     before, after = math.ceil(REST / sample_time), math.ceil(duration / sample_time)

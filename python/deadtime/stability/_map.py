@@ -124,8 +124,7 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         """
         if self.family is None:
             raise ValueError("the map of a sampled loop has no chains: its poles are finitely many")
-        found: Array = read_only(self.family._family.chains(self.axes))
-        return found
+        return read_only(self.family._family.chains(self.axes))
 
     @cached_property
     def strongly_stable(self) -> Mask:
@@ -144,8 +143,7 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         >>> chart.strongly_stable.tolist()
         [[False, True, True, False]]
         """
-        strong: Mask = read_only(self.chain_abscissa < -self.decay)
-        return strong
+        return read_only(self.chain_abscissa < -self.decay)
 
     @cached_property
     def stable(self) -> Mask:
@@ -153,8 +151,7 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         known = (self.status == MapStatus.OK) | (self.status == MapStatus.CHAIN)
         stable: Mask = known & (self.unstable == 0)
         stable &= (self.status != MapStatus.CHAIN) | (self.abscissa < -self.decay)
-        stable.flags.writeable = False
-        return stable
+        return read_only(stable)
 
     def best(self) -> tuple[dict[str, float], float]:
         """Return the stable cell with the smallest spectral abscissa.

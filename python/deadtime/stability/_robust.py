@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import deadtime.stability._native as native
 from deadtime._base.arrays import Array, Mask
 from deadtime._base.drawing import Axes, shown_axes
-from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, Range, thread_number
@@ -56,9 +56,7 @@ class RobustMap(ReadOnlyArrays, Pictured):
     @cached_property
     def stable(self) -> Mask:
         """Where all members are proved stable, shape (n0, n1)."""
-        stable: Mask = self.unstable == 0
-        stable.flags.writeable = False
-        return stable
+        return read_only(self.unstable == 0)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw where all members are stable, some are not, and nothing is proved.

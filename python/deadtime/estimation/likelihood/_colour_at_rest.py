@@ -29,6 +29,7 @@ from deadtime._base.arrays import Array, Mask
 from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._air_at_rest import RESTS, SHOWS, rows_since_motion
+from deadtime.estimation.likelihood._free_numbers import numbers_of, plant_at
 from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air
 from deadtime.estimation.likelihood._search import ROUGH, NoiseFit, PlantModel
 
@@ -166,25 +167,15 @@ def _columns(fit: NoiseFit, run: int) -> Array:
     names = tuple(name for name in fit.model.names if name != "gain")
     model: PlantModel = replace(fit.model, names=names)
     likelihood = model.likelihood(fit.runs, fit.trim)
-    one, step = fit.with_gain, TIME_STEP * fit.runs[run].row_time
+    now, step = numbers_of(fit), TIME_STEP * fit.runs[run].row_time
 
-    def at(kernel: str, move: float) -> Array:
-        lags = list(one.lags)
-        delay, gain, zero = one.delay, one.gain or 0.0, one.zero
-        if kernel == "gain":
-            gain += move
-        elif kernel == "delay":
-            delay += move
-        elif kernel == "zero":
-            zero += move
-        else:
-            lags[int(kernel.split()[1])] += move
-        part = likelihood.at(run, PlantNumbers(delay, lags, one.noise, gain, zero))
+    def at(kernel: str, value: float) -> Array:
+        part = likelihood.at(run, plant_at(fit, {kernel: value}))
         return np.asarray(part.whitened * np.sqrt(part.variance))
 
     found = []
-    for _, kernel in fit.model.order:
+    for name, kernel in fit.model.order:
         move = GAIN_STEP * abs(fit.gain) if kernel == "gain" else step
         # Times below zero are none.
-        found.append((at(kernel, 2.0 * move) - at(kernel, 0.0)) / (2.0 * move))
+        found.append((at(kernel, now[name] + 2.0 * move) - at(kernel, now[name])) / (2.0 * move))
     return np.stack(found, axis=1)

@@ -21,6 +21,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._native import PlantNumbers
 from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, airs_of, with_noise
@@ -164,6 +165,14 @@ def numbers_of(fit: NoiseFit) -> dict[str, float]:
         "delay+lag": total,
         "delay+time_constant": total,
     }
+
+
+def plant_at(fit: NoiseFit, values: Mapping[str, float]) -> PlantNumbers:
+    """The numbers of a fit with other ones in the place of some, by the names of the kernel."""
+    one = fit.with_gain
+    lags = [values.get(f"lag {i}", lag) for i, lag in enumerate(one.lags)]
+    delay, gain, zero = (values.get(name, getattr(one, name)) for name in ("delay", "gain", "zero"))
+    return PlantNumbers(delay, lags, one.noise, gain, zero)
 
 
 def fit_numbers(

@@ -19,8 +19,7 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation._native import PlantNumbers
-from deadtime.estimation.likelihood._free_numbers import numbers_of
+from deadtime.estimation.likelihood._free_numbers import numbers_of, plant_at
 from deadtime.estimation.likelihood._profile import (
     LikelihoodProfile,
     common_covariance,
@@ -169,12 +168,9 @@ def _minus_log_likelihood(fit: NoiseFit, refilled: Refilled) -> float:
 
 def _with_common(fit: NoiseFit, values: Array) -> NoiseFit:
     """The fit with other common numbers."""
-    one = fit.numbers
-    kernel = dict(zip((kernel for _, kernel in fit.model.order), values.tolist(), strict=True))
-    lags = [kernel.get(f"lag {i}", lag) for i, lag in enumerate(one.lags)]
-    delay, zero = kernel.get("delay", one.delay), kernel.get("zero", one.zero)
-    gain = kernel.get("gain", fit.gain)
-    return replace(fit, numbers=PlantNumbers(delay, lags, one.noise, gain, zero), given_gain=gain)
+    kernel = (kernel for _, kernel in fit.model.order)
+    moved = plant_at(fit, dict(zip(kernel, values.tolist(), strict=True)))
+    return replace(fit, numbers=moved, given_gain=moved.gain)
 
 
 def _covariance(objective: Callable[[Array], float], point: Array) -> Array | None:
