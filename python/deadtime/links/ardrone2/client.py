@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-import warnings
 from collections.abc import Callable
-from typing import Self
 
 from deadtime._base.errors import FlightAbortedError, LinkError
 from deadtime._base.validation import finite
@@ -21,25 +19,17 @@ from deadtime.links.ardrone2.reader import (
     on_ground,
     phase_of,
 )
+from deadtime.links.ardrone2.sender import CommandSender
 from deadtime.links.clock import now
 from deadtime.links.safety import Limits, UnitCommand
-from deadtime.links.uninterrupted import note, uninterrupted
 from deadtime.links.vehicle import Motion, VehicleState
+from deadtime.links.vehicle_link import CHECK_EVERY, VehicleLink
 
 #: Longest wait for the first navdata, and for the end of bootstrap, s.
 FIRST_NAVDATA = 5.0
 
-#: Longest duration of a take-off until the drone holds its height, and of a landing, s.
-LONGEST_TAKE_OFF, LONGEST_LANDING = 15.0, 20.0
-
-#: Time between two checks of the link while nothing else is waited for, s.
-CHECK_EVERY = 0.1
-
 #: Time for the drone to calibrate its level, s.
 TRIM_TIME = 0.3
-
-#: Longest silence while landing, s: the watchdog of the drone lands it within this time.
-SILENT_LANDING = 3.0
 
 #: Navdata sent this long after a command show its effect, s.
 ANSWERED = 1.0
@@ -49,7 +39,7 @@ ANSWERED = 1.0
 TOGGLING, COPIES = 5.0, 3
 
 
-class ARDrone2:
+class ARDrone2(VehicleLink):
     """A link to an AR.Drone 2.0, or to an emulator of one.
 
     As an asynchronous context manager it connects on entry, and lands and closes on exit, also by
@@ -80,6 +70,9 @@ class ARDrone2:
     Traceback (most recent call last):
     deadtime._base.errors.LinkError: 192.168.1.1 is not in the air: take off before commanding it
     """
+
+    longest_take_off, longest_landing, longest_silence = 15.0, 20.0, 3.0
+    lands_unheard = "its own watchdog lands it 2 s after the last command it received"
 
     def __init__(
         self,
@@ -141,28 +134,55 @@ class ARDrone2:
             )
         return self._vz_max
 
+    # What a link is made of
+
+    @property
+    def _name(self) -> str:
+        return self.host
+
+    @property
+    def _is_open(self) -> bool:
+        return self._link.is_open
+
+    @property
+    def _newest(self) -> VehicleState | None:
+        return self._reader.newest
+
+    @property
+    def _listener_failure(self) -> Exception | None:
+        return self._link.failure
+
+    @property
+    def _silence(self) -> float:
+        return self._link.silent
+
+    @property
+    def _commanded(self) -> CommandSender:
+        return self._sender
+
+    def _age(self) -> None:
+        self._link.age()
+
+    def _send(self) -> None:
+        self._link.send()
+
+    async def _until(self, condition: Callable[[], bool], timeout: float) -> bool:
+        return await self._link.until(lambda navdata: condition(), timeout)
+
+    async def _put_back(self) -> str | None:
+        return await self._settings.put_back(self._link)
+
+    def _shut(self) -> None:
+        self._link.shut()
+        self._vz_max = None
+
     # Connecting
 
-    async def connect(self) -> None:
-        """Request navdata, set the limits of the drone and read them back.
-
-        Raises
-        ------
-        LinkError
-            If it does not answer, or does not keep a setting.
-        """
-        if self._link.is_open:
-            raise LinkError(f"{self.host} is connected already")
+    async def _open(self) -> None:
         if self._reader.heard is not None:
             listener, self._link = self._link.listener, self._new_link()
             self._link.listener = listener
         await self._link.open()
-        try:
-            await self._configure()
-        except BaseException as error:
-            note(error, await self._settings.put_back(self._link))
-            self._link.shut()
-            raise
 
     async def _configure(self) -> None:
         link, host = self._link, self.host
@@ -180,15 +200,7 @@ class ARDrone2:
 
     # Flying
 
-    async def take_off(self) -> None:
-        """Take off; returns when the drone holds its height.
-
-        Raises
-        ------
-        LinkError
-            If it is not connected, not on the ground, in an emergency, low on battery, sends
-            nothing, or is not up within 15 s; it is then commanded to land.
-        """
+    async def _prepare(self) -> None:
         speed = self.vz_max
         state = await self.state()
         if state.emergency:
@@ -214,62 +226,27 @@ class ARDrone2:
                 f"this program was paused for {late:.2f} s just before the take-off of "
                 f"{self.host}, so its last known state is old: take off again"
             )
+
+    async def _climb(self) -> None:
         self._take_off_sent = now()
         self._sender.fly()
-        try:
-            await self._rise()
-        except BaseException:
-            self._sender.land()
-            raise
-        self._sender.guard(now())
-
-    async def _rise(self) -> None:
-        deadline = now() + LONGEST_TAKE_OFF
-        while not await self._link.until(_is_up, CHECK_EVERY):
-            self._check_link()
-            if now() > deadline:
-                raise LinkError(f"{self.host} is not up {LONGEST_TAKE_OFF:g} s after the take-off")
-        navdata = self._link.reader.navdata
+        await self._wait_up(lambda: _is_up(self._reader.navdata))
+        navdata = self._reader.navdata
         if navdata is None or navdata.emergency:
             raise FlightAbortedError(f"{self.host} went into emergency while taking off")
+        self._sender.guard(now())
 
-    async def state(self) -> VehicleState:
-        """The newest state; waits for the first.
-
-        Raises
-        ------
-        LinkError
-            If the drone sends nothing or restarted its count, another client commands it, or the
-            flight has ended without `land`, as of `command`.
-        """
-        if not self._link.is_open:
-            raise LinkError(f"{self.host} is not connected")
-        if self._reader.newest is None and not await self._link.until(_has_state, FIRST_NAVDATA):
+    async def _first_state(self) -> None:
+        if not await self._until(lambda: self._newest is not None, FIRST_NAVDATA):
             raise LinkError(f"no state from {self.host} within {FIRST_NAVDATA:g} s")
-        self._check_link()
-        state = self._reader.newest
-        assert state is not None
-        return state
 
-    def _check_link(self) -> None:
-        if self._link.failure is not None:
-            raise LinkError(
-                f"the listener of {self.host} has failed: {self._link.failure}"
-            ) from self._link.failure
-        self._check_flight()
+    def _check_vehicle(self) -> None:
         if self._sender.rival is not None:
             raise LinkError(self._sender.rival)
         if self._link.silent > LOST:
             raise LinkError(self._link.unheard)
         if self._vz_max is not None and self._reader.restarts > self._restarts:
             raise LinkError(self._link.forgotten)
-
-    def _check_flight(self) -> None:
-        """Raise if the flight has ended without `land`."""
-        self._link.age()
-        if self._sender.expired is not None:
-            self._link.send()  # it says to land
-            raise FlightAbortedError(self._sender.expired)
 
     def command(self, climb: float) -> float:
         """Command a vertical speed; it is sent at once and repeated until it is too old.
@@ -294,9 +271,7 @@ class ARDrone2:
             commands, by a pause of this program, by a landing, or by another client.
         """
         requested = finite("climb", climb)
-        if self._sender.expired is None and not self._sender.guarded:
-            raise LinkError(f"{self.host} is not in the air: take off before commanding it")
-        self._check_flight()
+        self._check_in_air()
         most = min(self.limits.max_climb, self.vz_max)
         share = UnitCommand.saturated(max(-most, min(most, requested)) / self.vz_max)
         sent = self._sender.climb(share, now())
@@ -322,18 +297,6 @@ class ARDrone2:
             )
         return Motion(up=self.command(up))
 
-    def hover(self) -> None:
-        """Command no motion; like a command this is valid for a short time, then the drone lands.
-
-        Raises
-        ------
-        LinkError
-            If the flight has ended without `land`, as of `command`.
-        """
-        self._check_flight()
-        self._sender.hover(now())
-        self._link.send()
-
     def listen(self, listener: Callable[[VehicleState], None] | None) -> None:
         """Register `listener` for every state; None removes it.
 
@@ -343,63 +306,25 @@ class ARDrone2:
 
     # Landing
 
-    async def land(self) -> None:
-        """Land; returns when the drone is on the ground.
-
-        Raises
-        ------
-        LinkError
-            If it does not report this within 20 s, or sends nothing for 3 s, in which its own
-            watchdog lands it. It is commanded to land as long as the link is open.
-        """
+    def _stop(self) -> bool:
         self._sender.land()
         if not self._link.is_open or self._reader.newest is None:
-            return
+            return False
         self._link.send()
-        deadline = now() + LONGEST_LANDING
-        while not await self._link.until(self._is_down, CHECK_EVERY):
-            silent = self._link.silent
-            if silent > SILENT_LANDING:
-                raise LinkError(
-                    f"nothing received from {self.host} for {silent:.1f} s while landing: its own "
-                    "watchdog lands it 2 s after the last command it received"
-                )
-            if now() > deadline:
-                raise LinkError(f"{self.host} has not landed within {LONGEST_LANDING:g} s")
+        return True
 
-    def _is_down(self, navdata: Navdata) -> bool:
+    def _keep_landing(self, passed: float) -> None:
+        """The sender repeats the landing command by itself."""
+
+    def _landed(self) -> None:
+        """The sender commands to be on the ground until the next take-off."""
+
+    def _is_down(self) -> bool:
         """Whether a drone is down, by navdata new enough to show the beginning of a take-off."""
-        sent = self._link.newest_sent
-        return on_ground(navdata) and sent is not None and sent >= self._take_off_sent + ANSWERED
-
-    async def close(self) -> None:
-        """Land if in the air, restore the settings of the drone, and close the link.
-
-        Raises
-        ------
-        LinkError
-            As `land` does; the link is closed nevertheless.
-
-        Warns
-        -----
-        RuntimeWarning
-            If it has landed and its settings could not be restored.
-        """
-        try:
-            await uninterrupted(self._end())
-        finally:
-            self._link.shut()
-            self._vz_max = None
-
-    async def _end(self) -> None:
-        try:
-            await self.land()
-        except LinkError as error:
-            note(error, await self._settings.put_back(self._link))
-            raise
-        kept = await self._settings.put_back(self._link)
-        if kept is not None:
-            warnings.warn(kept, RuntimeWarning, stacklevel=2)
+        navdata, sent = self._reader.navdata, self._link.newest_sent
+        if navdata is None or sent is None:
+            return False
+        return on_ground(navdata) and sent >= self._take_off_sent + ANSWERED
 
     async def cut_motors(self) -> None:
         """Stop the motors at once, at any height: the drone falls.
@@ -452,22 +377,8 @@ class ARDrone2:
                     break
         return True
 
-    async def __aenter__(self) -> Self:
-        await self.connect()
-        return self
 
-    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        try:
-            await self.close()
-        except LinkError as problem:
-            if error is None:
-                raise
-            note(error, str(problem), *getattr(problem, "__notes__", ()))
-
-
-def _is_up(navdata: Navdata) -> bool:
+def _is_up(navdata: Navdata | None) -> bool:
+    if navdata is None:
+        return False
     return navdata.emergency or (navdata.flying and phase_of(navdata) in (FLYING, HOVERING))
-
-
-def _has_state(navdata: Navdata) -> bool:
-    return navdata.demo is not None

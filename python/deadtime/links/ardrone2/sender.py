@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from deadtime.links.ardrone2.commands import Command, Hover, Move, Ref, Watchdog, encode
 from deadtime.links.ardrone2.navdata import Navdata
 from deadtime.links.ardrone2.reader import on_ground, unasked_end
+from deadtime.links.expiry import ExpiringCommand
 from deadtime.links.safety import Limits, UnitCommand
 
 #: Time between two datagrams, s.
@@ -32,7 +33,7 @@ WATCHDOG = 2.0
 KEPT = 1024
 
 
-class CommandSender:
+class CommandSender(ExpiringCommand):
     """Makes the datagrams.
 
     Parameters
@@ -44,12 +45,8 @@ class CommandSender:
     ----------
     in_air : bool
         Whether the drone is commanded to be in the air.
-    guarded : bool
-        Whether missing commands land the drone: in flight, not while taking off.
     cut : bool
         Whether the next datagram toggles between emergency and normal.
-    expired : str or None
-        Why the drone was commanded to land without `land`.
     rival : str or None
         How another client was detected.
     resumed : float
@@ -57,15 +54,11 @@ class CommandSender:
     """
 
     def __init__(self, limits: Limits) -> None:
-        self.limits = limits
+        super().__init__(limits, Hover)
         self.in_air = False
-        self.guarded = False
         self.cut = False
-        self.expired: str | None = None
         self.rival: str | None = None
         self.resumed = -math.inf
-        self._move: Move = Hover
-        self._given = 0.0
         self._next = 1
         self._sent: float | None = None
         self._uncertain = False
@@ -75,7 +68,7 @@ class CommandSender:
 
     def fly(self) -> None:
         """Command take-off, then hovering."""
-        self.in_air, self.guarded, self.expired, self._move = True, False, None, Hover
+        self.in_air, self.guarded, self.expired, self._motion = True, False, None, Hover
         self._uncertain = self._left_ground = False
 
     def guard(self, now: float) -> None:
@@ -84,7 +77,7 @@ class CommandSender:
 
     def land(self) -> None:
         """Command landing."""
-        self.in_air, self.guarded, self._move, self._uncertain = False, False, Hover, False
+        self.in_air, self.guarded, self._motion, self._uncertain = False, False, Hover, False
 
     def give_up(self, reason: str) -> None:
         """Command landing without `land`; the first reason is kept."""
@@ -95,15 +88,9 @@ class CommandSender:
     def climb(self, share: UnitCommand, now: float) -> UnitCommand:
         """Command a share of the largest vertical speed; return what is sent, 0 while uncertain."""
         self.age(now)
-        self._given = now
-        moves = self.guarded and not self._uncertain
-        self._move = Move(gaz=share) if moves else Hover
-        return self._move.gaz
-
-    def hover(self, now: float) -> None:
-        """Command no motion."""
-        self.age(now)
-        self._move, self._given = Hover, now
+        move = Move(gaz=share) if self.guarded and not self._uncertain else Hover
+        self.command(move, now)
+        return move.gaz
 
     def datagram(self, now: float, alive: bool = False, more: Sequence[Command] = ()) -> bytes:
         """The next datagram.
@@ -126,7 +113,7 @@ class CommandSender:
             self.cut = False
         if alive:
             commands.append(Watchdog())
-        commands.append(self._move)
+        commands.append(self._motion)
         commands.extend(more)
         first, self._next = self._next, self._next + len(commands)
         return encode(commands, first)
@@ -142,11 +129,7 @@ class CommandSender:
                 f"no message sent after a pause of this program has been received for {most:g}"
                 " s: the vehicle was commanded to land"
             )
-        age = now - self._given
-        if self.guarded and age > self.limits.command_age:
-            self._move = Hover
-        if self.guarded and age > most:
-            self.give_up(f"no command for {age:.2f} s: the vehicle was commanded to land")
+        super().age(now)
 
     def _notice_pause(self, now: float) -> None:
         """Do not repeat a request from before a pause in which the vehicle may have landed."""
@@ -154,7 +137,7 @@ class CommandSender:
         if pause <= min(max(self.limits.command_age, 3.0 * CYCLE), WATCHDOG):
             return
         self.resumed = self._sent = now
-        self._move = Hover
+        self._motion = Hover
         if pause > WATCHDOG:
             self.give_up(
                 f"this program was paused for {pause:.2f} s, in which the vehicle's own watchdog "

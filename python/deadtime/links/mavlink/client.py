@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
-import warnings
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any
 
 from deadtime._base.errors import LinkError
 from deadtime._base.validation import positive
@@ -25,7 +24,6 @@ from deadtime.links.mavlink.states import ON_GROUND, StateReader, echo_of
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_over_all
 from deadtime.links.mavlink.time_sync import LinkTime
 from deadtime.links.safety import Limits
-from deadtime.links.uninterrupted import note, uninterrupted
 from deadtime.links.vehicle import Echo, VehicleState
 
 #: Longest wait for the first heartbeat, s.
@@ -33,12 +31,6 @@ FIRST_HEARTBEAT = 10.0
 
 #: Time in which every vehicle on the link has sent a heartbeat, s.
 HEARTBEATS = 1.5
-
-#: Longest duration of a landing, s.
-LONGEST_LANDING = 60.0
-
-#: Silence after which the link counts as lost while landing, s.
-LOST_LANDING = 5.0
 
 #: Time between two landing commands, and between landing and the command to disarm, s.
 AGAIN, DISARM_AFTER = 0.5, 3.0
@@ -87,6 +79,9 @@ class MAVLinkVehicle(Commanding):
     deadtime._base.errors.LinkError: tcp:127.0.0.1:5760 is not in the air: take off before \
 commanding it
     """
+
+    longest_take_off, longest_landing, longest_silence = 30.0, 60.0, 5.0
+    lands_unheard = "it lands by its own failsafe"
 
     def __init__(
         self,
@@ -157,28 +152,46 @@ commanding it
         """
         return self._known.name
 
+    # What a link is made of
+
+    @property
+    def _name(self) -> str:
+        return self.address
+
+    @property
+    def _is_open(self) -> bool:
+        return self._link.is_open
+
+    @property
+    def _newest(self) -> VehicleState | None:
+        return self._reader.newest
+
+    @property
+    def _listener_failure(self) -> Exception | None:
+        return self._link.failure
+
+    @property
+    def _silence(self) -> float:
+        return self._link.silent
+
+    @property
+    def _commanded(self) -> SetPoints:
+        return self._set_points
+
+    async def _until(self, condition: Callable[[], bool], timeout: float) -> bool:
+        return await self._link.until(condition, timeout)
+
+    def _said(self, since: float) -> str:
+        return self._link.said(since)
+
+    async def _put_back(self) -> str | None:
+        return None if self._parameters is None else await self._parameters.put_back()
+
     # Connecting
 
-    async def connect(self) -> None:
-        """Wait for the vehicle, set its limits, and ask for its messages.
-
-        Raises
-        ------
-        LinkError
-            If it does not answer, is armed already, is no simulator where `simulated` asks for
-            one, or does not keep a setting; if another one answers over another link.
-        """
-        if self._link.is_open:
-            raise LinkError(f"{self.address} is connected already")
+    async def _open(self) -> None:
         self._new_link()
         await self._link.open()
-        try:
-            await self._configure()
-        except BaseException as error:
-            if self._parameters is not None:
-                note(error, await self._parameters.put_back())
-            self._shut()
-            raise
 
     async def _configure(self) -> None:
         link = self._link
@@ -297,44 +310,23 @@ commanding it
 
     # Flying
 
-    async def take_off(self) -> None:
-        """Arm and take off; returns when the vehicle holds its height and accepts set points.
-
-        Waits for its position estimate, which takes up to a minute after power-up.
-
-        Raises
-        ------
-        LinkError
-            If it is not connected, not on the ground, armed or disarmed by somebody else, low on
-            battery, does not arm, or is not up in time; it is then commanded to land.
-        """
+    async def _prepare(self) -> None:
         self._set_points.expired = None  # that of an earlier flight
-        steps = TakeOff(self._link, self._known, self._reader, self._authority, self._check_link)
-        await steps.prepare(self.limits.min_battery)
-        try:
-            await steps.fly(self.take_off_height, self._set_points)
-            self._origin = await self.state()
-        except BaseException:
-            self._set_points.stop()
-            self._command_landing()
-            raise
+        await self._steps().prepare(self.limits.min_battery)
 
-    async def state(self) -> VehicleState:
-        """The newest state; waits for the first.
+    async def _climb(self) -> None:
+        await self._steps().fly(self.take_off_height, self._set_points, self._wait_up)
+        self._origin = await self.state()
 
-        Raises
-        ------
-        LinkError
-            If the vehicle sends nothing, or the flight has ended without `land`, as of `command`.
-        """
-        pilot, reader = self._known, self._reader
-        if not await self._link.until(lambda: reader.newest is not None, FIRST_HEARTBEAT):
+    def _steps(self) -> TakeOff:
+        return TakeOff(self._link, self._known, self._reader, self._authority, self._check_link)
+
+    async def _first_state(self) -> None:
+        if not await self._until(lambda: self._newest is not None, FIRST_HEARTBEAT):
             raise LinkError(
-                f"{self.address}: {pilot.name} sends no LOCAL_POSITION_NED: it has no position yet"
+                f"{self.address}: {self._known.name} sends no LOCAL_POSITION_NED: it has no "
+                "position yet"
             )
-        self._check_link()
-        assert reader.newest is not None
-        return reader.newest
 
     async def _keep_sending(self) -> None:
         """Repeat set points, and land a vehicle that was given up."""
@@ -342,7 +334,7 @@ commanding it
             while True:
                 self._age()
                 if self._set_points.due(now()):
-                    self._send_set_point()
+                    self._send()
                 if self._set_points.expired is not None:
                     self._command_landing()
                 await asyncio.sleep(CYCLE)
@@ -367,37 +359,27 @@ commanding it
             d.MAVLink_command_long_message(*self._link.target, d.MAV_CMD_DO_SET_MODE, 0, *values)
         )
 
-    async def land(self) -> None:
-        """Land; returns when the vehicle is on the ground and disarmed.
-
-        A vehicle that somebody else has taken over is not commanded: it is waited for if it lands.
-
-        Raises
-        ------
-        LinkError
-            If it does not report this in time, sends nothing, or is flown by somebody else.
-        """
+    def _stop(self) -> bool:
+        """Send no set points any more; a vehicle that somebody else flies is not commanded."""
         self._set_points.stop()
-        if not self._link.is_open or self._autopilot is None or not self._authority.armed_here:
-            return
-        begin, disarmed, link, d = now(), 0.0, self._link, dialect()
-        while not await link.until(self._is_down, 0.1):
-            self._command_landing()
-            time = now()
-            if link.silent > LOST_LANDING:
-                raise LinkError(f"{self._unheard} while landing: it lands by its own failsafe")
-            if not self._authority.holds and self._reader.mode != self._autopilot.landing:
-                raise LinkError(f"{self._authority.lost}: it was not commanded to land")
-            if time - begin > LONGEST_LANDING:
-                raise LinkError(f"{self.address} has not landed within {LONGEST_LANDING:g} s")
-            on_ground = self._reader.landed_state == ON_GROUND and self._authority.holds
-            if on_ground and time - begin > DISARM_AFTER and time - disarmed > AGAIN:
-                disarmed = time
-                link.send(
-                    d.MAVLink_command_long_message(
-                        *link.target, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, *[0.0] * 7
-                    )
+        self._command_landing()
+        self._disarming_sent = -math.inf
+        return self._link.is_open and self._autopilot is not None and self._authority.armed_here
+
+    def _keep_landing(self, passed: float) -> None:
+        self._command_landing()
+        if not self._authority.holds and self._reader.mode != self._known.landing:
+            raise LinkError(f"{self._authority.lost}: it was not commanded to land")
+        on_ground = self._reader.landed_state == ON_GROUND and self._authority.holds
+        if on_ground and passed > DISARM_AFTER and now() - self._disarming_sent > AGAIN:
+            self._disarming_sent, d = now(), dialect()
+            self._link.send(
+                d.MAVLink_command_long_message(
+                    *self._link.target, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, *[0.0] * 7
                 )
+            )
+
+    def _landed(self) -> None:
         self._authority.ended()
 
     def _is_down(self) -> bool:
@@ -405,38 +387,10 @@ commanding it
         state = self._reader.newest
         return state is not None and state.landed and state.time > self._authority.armed_at + SHOWN
 
-    async def close(self) -> None:
-        """Land if in the air, put the parameters back, and close the link.
-
-        Raises
-        ------
-        LinkError
-            As `land` does; the link is closed nevertheless.
-
-        Warns
-        -----
-        RuntimeWarning
-            If it has landed and a parameter could not be put back.
-        """
-        try:
-            await uninterrupted(self._end())
-        finally:
-            self._shut()
-            self._autopilot = self._parameters = None
-
-    async def _end(self) -> None:
-        kept = None
-        try:
-            await self.land()
-        except LinkError as error:
-            # The failsafes remain in a vehicle that this link has left in the air.
-            if not self._authority.holds and self._parameters is not None:
-                note(error, await self._parameters.put_back())
-            raise
-        if self._parameters is not None:
-            kept = await self._parameters.put_back()
-        if kept is not None:
-            warnings.warn(kept, RuntimeWarning, stacklevel=2)
+    @property
+    def _settings_may_go_back(self) -> bool:
+        """The failsafes remain in a vehicle that this link has left in the air."""
+        return not self._authority.holds
 
     def _shut(self) -> None:
         if self._cycle is not None:
@@ -444,15 +398,4 @@ commanding it
             self._command_landing()
         self._cycle = None
         self._link.shut()
-
-    async def __aenter__(self) -> Self:
-        await self.connect()
-        return self
-
-    async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        try:
-            await self.close()
-        except LinkError as problem:
-            if error is None:
-                raise
-            note(error, str(problem), *getattr(problem, "__notes__", ()))
+        self._autopilot = self._parameters = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from deadtime._base.errors import FlightAbortedError, LinkError
+from deadtime._base.errors import LinkError
 from deadtime.links.clock import now
 from deadtime.links.mavlink.autopilots import Autopilot
 from deadtime.links.mavlink.connection import Connection
@@ -19,21 +19,20 @@ from deadtime.links.mavlink.points import (
     place_within,
     rates_within,
 )
-from deadtime.links.mavlink.set_points import HOVER, SetPoints, within
+from deadtime.links.mavlink.set_points import SetPoints, within
 from deadtime.links.mavlink.states import StateReader
 from deadtime.links.mavlink.take_off import SHOWN
-from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Motion, VehicleState
+from deadtime.links.vehicle_link import VehicleLink
 
 #: Silence after which the link counts as lost in flight, s.
 LOST = 1.0
 
 
-class Commanding:
+class Commanding(VehicleLink):
     """The commands of a vehicle in the air; `MAVLinkVehicle` connects, takes off and lands."""
 
     address: str
-    limits: Limits
     _link: Connection
     _reader: StateReader
     _set_points: SetPoints
@@ -54,14 +53,13 @@ class Commanding:
             raise LinkError(f"{self.address} is not connected")
         return self._parameters
 
-    def _send_set_point(self) -> None:
-        message = self._set_points.message(self._link.target, now(), self._reader.ground)
-        self._link.send(message)
+    def _send(self) -> None:
+        """Send the set point, where set points are followed."""
+        if self._set_points.guarded:
+            message = self._set_points.message(self._link.target, now(), self._reader.ground)
+            self._link.send(message)
 
-    def _check_link(self) -> None:
-        if (failure := self._link.failure) is not None:
-            raise LinkError(f"the listener of {self.address} has failed: {failure}") from failure
-        self._check_flight()
+    def _check_vehicle(self) -> None:
         if self._link.silent > LOST + SHOWN or (self._set_points.guarded and self._silent):
             raise LinkError(self._unheard)
 
@@ -73,14 +71,8 @@ class Commanding:
     def _unheard(self) -> str:
         return f"nothing received from {self.address} for {self._link.silent:.1f} s"
 
-    def _check_flight(self) -> None:
-        """Raise if the flight has ended without `land`."""
-        self._age()
-        if self._set_points.expired is not None:
-            raise FlightAbortedError(self._set_points.expired)
-
     def _age(self) -> None:
-        self._set_points.age(now())
+        super()._age()
         if self._set_points.guarded and self._silent:
             self._set_points.give_up(self._unheard)
 
@@ -267,26 +259,8 @@ class Commanding:
             raise LinkError(f"{self.address}: the vehicle reports no heading: give one")
         return heading
 
-    def _check_in_air(self) -> None:
-        if self._set_points.expired is None and not self._set_points.guarded:
-            raise LinkError(f"{self.address} is not in the air: take off before commanding it")
-        self._check_flight()
-
     def _follow(self, point: Point) -> None:
         """Send a set point at once, and repeat it until it is too old."""
         self._check_in_air()
         self._set_points.command(point, now())
-        self._send_set_point()
-
-    def hover(self) -> None:
-        """Command no motion; like a command this is valid for a short time, then it lands.
-
-        Raises
-        ------
-        LinkError
-            If the flight has ended without `land`, as of `command`.
-        """
-        self._check_flight()
-        self._set_points.command(HOVER, now())
-        if self._set_points.guarded:
-            self._send_set_point()
+        self._send()

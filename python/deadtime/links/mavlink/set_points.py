@@ -11,8 +11,8 @@ import math
 from typing import Any
 
 from deadtime._base.validation import finite
+from deadtime.links.expiry import ExpiringCommand
 from deadtime.links.mavlink.point_messages import message_of
-from deadtime.links.mavlink.points import Point
 from deadtime.links.safety import Limits
 from deadtime.links.vehicle import Motion
 
@@ -44,28 +44,17 @@ def _bounded(value: float, most: float) -> float:
 HOVER = Motion()
 
 
-class SetPoints:
-    """The set point of one vehicle.
-
-    Attributes
-    ----------
-    guarded : bool
-        Whether set points are sent, and missing ones end the flight.
-    expired : str or None
-        Why the flight was given up.
-    """
+class SetPoints(ExpiringCommand):
+    """The set point of one vehicle, which is sent while it is guarded."""
 
     def __init__(self, limits: Limits) -> None:
-        self.limits = limits
-        self.guarded = False
-        self.expired: str | None = None
-        self._point: Point = HOVER
-        self._given = self._sent = 0.0
+        super().__init__(limits, HOVER)
+        self._sent = 0.0
 
     def begin(self, now: float) -> None:
         """Send set points from now on, hovering first."""
         self.guarded = self.expired is None
-        self._point, self._given = HOVER, now
+        self._motion, self._given = HOVER, now
 
     def stop(self) -> None:
         """Send none any more."""
@@ -76,19 +65,6 @@ class SetPoints:
         self.expired = self.expired or reason
         self.guarded = False
 
-    def command(self, point: Point, now: float) -> None:
-        """Take a new one."""
-        self.age(now)
-        self._point, self._given = point, now
-
-    def age(self, now: float) -> None:
-        """Let the set point expire."""
-        age = now - self._given
-        if self.guarded and age > self.limits.command_age:
-            self._point = HOVER
-        if self.guarded and age > self.limits.landing_after:
-            self.give_up(f"no command for {age:.2f} s: the vehicle was commanded to land")
-
     def due(self, now: float) -> bool:
         """Whether one is to be sent."""
         return self.guarded and now - self._sent > REPEAT - 0.5 * CYCLE
@@ -96,4 +72,4 @@ class SetPoints:
     def message(self, target: tuple[int, int], now: float, ground: float) -> Any:
         """The set point as a message; `ground` is the down coordinate that heights count from."""
         self._sent = now
-        return message_of(self._point, target, now, ground)
+        return message_of(self._motion, target, now, ground)

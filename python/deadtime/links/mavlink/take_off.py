@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 from deadtime._base.errors import LinkError
@@ -15,9 +15,8 @@ from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.set_points import HOVER, SetPoints
 from deadtime.links.mavlink.states import StateReader, wanted_messages
 
-#: Longest wait for a position estimate after power-up, for the consent of the vehicle to arm, and
-#: for its height, s.
-READY, ARMING, RISING = 120.0, 30.0, 30.0
+#: Longest wait for a position estimate after power-up, and for the vehicle to agree to arm, s.
+READY, ARMING = 120.0, 30.0
 
 #: Time in which an accepted command shows in a heartbeat, s.
 SHOWN = 1.0
@@ -112,8 +111,13 @@ class TakeOff:
         if state.battery is not None and state.battery < min_battery:
             raise self._failed(f"has {state.battery:g} % of battery, below {min_battery:g} %")
 
-    async def fly(self, height: float, set_points: SetPoints) -> None:
-        """Arm and take off.
+    async def fly(
+        self,
+        height: float,
+        set_points: SetPoints,
+        wait_up: Callable[[Callable[[], bool]], Awaitable[None]],
+    ) -> None:
+        """Arm and take off; `wait_up` waits until it holds its height.
 
         Raises
         ------
@@ -129,7 +133,7 @@ class TakeOff:
         result = await link.command(d.MAV_CMD_NAV_TAKEOFF, *pilot.take_off(height, position))
         if result != d.MAV_RESULT_ACCEPTED:
             raise self._failed("refuses to take off")
-        await self._rise(height)
+        await wait_up(lambda: self._is_up(height))
         set_points.begin(now())
         if pilot.arming != pilot.guided:
             await asyncio.sleep(SHOWN)  # PX4 wants set points before it follows them
@@ -164,21 +168,11 @@ class TakeOff:
             self._authority.arming = False
         self._authority.refuse_armed(self._reader)
 
-    async def _rise(self, height: float) -> None:
-        deadline = now() + RISING
-
-        def up() -> bool:
-            state = self._reader.newest
-            return (
-                state is not None
-                and state.flying
-                and abs(state.height - height) < NEAR
-                and abs(state.climb or 0.0) < SLOW
-            )
-
-        while not await self._link.until(up, 0.1):
-            self._check()
-            if not self._reader.armed:
-                raise self._failed("disarmed while taking off")
-            if now() > deadline:
-                raise self._failed(f"is not up {RISING:g} s after the take-off")
+    def _is_up(self, height: float) -> bool:
+        state = self._reader.newest
+        return (
+            state is not None
+            and state.flying
+            and abs(state.height - height) < NEAR
+            and abs(state.climb or 0.0) < SLOW
+        )
