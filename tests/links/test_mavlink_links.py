@@ -194,7 +194,7 @@ def test_slow_serial_links_are_asked_for_fewer_messages():
     ]
     assert rates[0] == rates[1]
     assert rates[2]["LOCAL_POSITION_NED"] == pytest.approx(28.8)
-    assert rates[2]["HEARTBEAT"] == 5.0
+    assert rates[2]["HEARTBEAT"] == 10.0
 
 
 @pytest.fixture

@@ -145,11 +145,6 @@ class VehicleLink(ABC):
         """Let commands expire."""
         self._commanded.age(now())
 
-    @property
-    def _settings_may_go_back(self) -> bool:
-        """Whether settings are put back although the landing was not confirmed."""
-        return True
-
     # Connecting
 
     async def connect(self) -> None:
@@ -292,8 +287,7 @@ class VehicleLink(ABC):
         try:
             await self.land()
         except LinkError as error:
-            if self._settings_may_go_back:
-                note(error, await self._put_back())
+            note(error, await self._put_back())
             raise
         kept = await self._put_back()
         if kept is not None:

@@ -2,7 +2,8 @@
 
 The vehicle reports its mode and whether it is armed. What this link did not command was done by
 somebody else, a pilot with a transmitter or another ground station, or by a failsafe of the
-vehicle. Neither is contradicted.
+vehicle. Neither is contradicted. Messages may be forged or late, so that a flight is given up when
+two agree; what was given up is this link's to land again when later ones contradict them.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ class Authority:
     armed_at : float
         When it was armed from here, s; infinite while it is not.
     lost : str or None
-        How somebody else took it over.
+        How somebody else took it over, by messages that agree. Later ones that contradict revise
+        it, until it is sure.
+    is_sure : bool
+        Whether it is sure that somebody else took it over.
     disarmed : str or None
         How somebody else disarmed it, so that it is not armed again.
     """
@@ -43,6 +47,7 @@ class Authority:
         self.arming = False
         self.armed_at = math.inf
         self.lost: str | None = None
+        self.is_sure = False
         self.disarmed: str | None = None
         self._modes: tuple[int, ...] = ()
         self._landing: int | None = None
@@ -79,29 +84,37 @@ class Authority:
         self.armed_at, self._modes, self._landing = math.inf, (), None
 
     def heard(self, reader: StateReader, pilot: Autopilot, link: Connection, time: float) -> None:
-        """Compare a heartbeat with what was commanded."""
-        if self._was_armed and not reader.armed and self._landing is None and not self.arming:
-            said = link.said(time - REASON)
-            self.disarmed = (
-                f"{self._name}: the vehicle was disarmed, and not from here{said}: it is not armed "
-                "again. Connect again when whoever did it agrees"
-            )
-            self.lost = self.lost or self.disarmed
-        self._was_armed = bool(reader.armed)
-        if not self._modes or self.lost is not None or not reader.armed:
+        """Compare what heartbeats say with what was commanded."""
+        armed, mode = reader.armed, reader.mode
+        if armed is None or mode is None or self.is_sure:
             return
-        if self._landing is not None and reader.mode == self._landing:
+        if self._landing is not None and armed and mode == self._landing:
             self._modes = (self._landing,)  # it obeys, and has to stay in this mode
-        elif reader.mode not in self._modes:
-            self.take_over(reader, pilot, link)
+        if armed:
+            self.disarmed = None
+        elif self._was_armed and self._landing is None and not self.arming:
+            self.disarmed = self._was_disarmed(link, time)
+        left = armed and self._modes and mode not in (*self._modes, self._landing)
+        if left:
+            self.lost = self.lost or self._was_taken(mode, pilot, link, time)
+            self.is_sure = reader.modes.is_sure(mode)
+        elif self.disarmed is not None:
+            self.lost = self.lost or self.disarmed
+            self.is_sure = reader.arming.is_sure(False)
+        else:
+            self.lost = None
+        # What it did before it was disarmed from elsewhere counts until that is revised.
+        self._was_armed = armed or self.disarmed is not None
 
-    def take_over(self, reader: StateReader, pilot: Autopilot, link: Connection) -> None:
-        """Note that the mode was changed, and by whom as far as it is known."""
-        heartbeat = link.latest.get("HEARTBEAT")
-        time = heartbeat[0] if heartbeat is not None else 0.0
+    def _was_disarmed(self, link: Connection, time: float) -> str:
+        return (
+            f"{self._name}: the vehicle was disarmed, and not from here{link.said(time - REASON)}: "
+            "it is not armed again. Connect again when whoever did it agrees"
+        )
+
+    def _was_taken(self, mode: int, pilot: Autopilot, link: Connection, time: float) -> str:
         others = "".join(f"; on the link is {one}" for one in link.senders.ground_stations)
-        name = pilot.mode_name(-1 if reader.mode is None else reader.mode)
-        self.lost = self.lost or (
-            f"{self._name}: the vehicle went to {name}, which was not commanded from here{others}"
-            f"{link.said(time - REASON)}: no set points are sent any more"
+        return (
+            f"{self._name}: the vehicle went to {pilot.mode_name(mode)}, which was not commanded "
+            f"from here{others}{link.said(time - REASON)}: no set points are sent any more"
         )

@@ -20,7 +20,7 @@ from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
 from deadtime.links.mavlink.set_points import CYCLE, SetPoints
-from deadtime.links.mavlink.states import ON_GROUND, StateReader, echo_of
+from deadtime.links.mavlink.states import ON_GROUND, UNKNOWN, StateReader, echo_of
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_over_all
 from deadtime.links.mavlink.time_sync import LinkTime
 from deadtime.links.safety import Limits
@@ -31,6 +31,9 @@ FIRST_HEARTBEAT = 10.0
 
 #: Time in which every vehicle on the link has sent a heartbeat, s.
 HEARTBEATS = 1.5
+
+#: Longest wait for news that make sure that it is on the ground, s: 5 heartbeats of one a second.
+GROUND_KNOWN = 5.0
 
 #: Time between two landing commands, and between landing and the command to disarm, s.
 AGAIN, DISARM_AFTER = 0.5, 3.0
@@ -185,7 +188,18 @@ commanding it
         return self._link.said(since)
 
     async def _put_back(self) -> str | None:
-        return None if self._parameters is None else await self._parameters.put_back()
+        """Put the parameters back, where the newest news make sure that it is on the ground."""
+        held, reader = self._parameters, self._reader
+        if held is None or not held.before:
+            return None
+
+        def may() -> bool:
+            # Who has armed it otherwise flies it, with the failsafes that it had.
+            return reader.is_on_ground if not self._authority.armed_here else reader.is_down
+
+        if not self._silent:
+            await self._until(may, GROUND_KNOWN)
+        return await held.put_back(may)
 
     # Connecting
 
@@ -196,6 +210,7 @@ commanding it
     async def _configure(self) -> None:
         link = self._link
         heartbeat = await link.next(is_autopilot, FIRST_HEARTBEAT)
+        await link.until(lambda: self._reader.armed is not None, FIRST_HEARTBEAT)
         if heartbeat is None:
             heard = f"; others send: {', '.join(self.foreign)}" if self.foreign else ""
             raise LinkError(
@@ -224,8 +239,9 @@ commanding it
                 "there may lead to a vehicle. If nobody and nothing can be hurt by its flight, "
                 "take simulated=False, or --i-have-a-safe-area on the command line"
             )
-        await pilot.set_limits(self._parameters, self.limits, self._ids[0])
         await ask_over_all(link, pilot)
+        await link.until(lambda: self._reader.landed_state != UNKNOWN, SHOWN)
+        await pilot.set_limits(self._parameters, self.limits, self._ids[0])
         self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
 
     async def _is_simulator(self, pilot: Autopilot) -> bool:
@@ -368,7 +384,8 @@ commanding it
 
     def _keep_landing(self, passed: float) -> None:
         self._command_landing()
-        if not self._authority.holds and self._reader.mode != self._known.landing:
+        lands = self._reader.mode == self._known.landing or self._reader.landed_state == ON_GROUND
+        if self._authority.is_sure and not lands:
             raise LinkError(f"{self._authority.lost}: it was not commanded to land")
         on_ground = self._reader.landed_state == ON_GROUND and self._authority.holds
         if on_ground and passed > DISARM_AFTER and now() - self._disarming_sent > AGAIN:
@@ -383,14 +400,9 @@ commanding it
         self._authority.ended()
 
     def _is_down(self) -> bool:
-        """Whether it is down, by a state that is new enough to show that it was armed."""
-        state = self._reader.newest
-        return state is not None and state.landed and state.time > self._authority.armed_at + SHOWN
-
-    @property
-    def _settings_may_go_back(self) -> bool:
-        """The failsafes remain in a vehicle that this link has left in the air."""
-        return not self._authority.holds
+        """Whether it is down for sure, by news from when it must have been armed."""
+        heard = min(self._reader.arming.heard, self._reader.landing.heard)
+        return self._reader.is_down and heard > self._authority.armed_at + SHOWN
 
     def _shut(self) -> None:
         if self._cycle is not None:

@@ -23,7 +23,7 @@ HEARTBEAT = 0.5
 LOOK = 0.05
 
 #: Time for an answer before a request is repeated, s, and number of requests.
-ANSWER, TRIES = 0.7, 6
+ANSWER, TRIES = 0.7, 8
 
 #: Of two heartbeats that come within this time, s, the one that was sent later counts: a link that
 #: scatters delivers them in another order, and the mode would seem to go back.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -98,15 +99,28 @@ class Parameters:
             f"keep {name} = {value:g}",
         )
 
-    async def put_back(self) -> str | None:
-        """Put the changed parameters back; a sentence about those for which this failed."""
+    async def put_back(self, may: Callable[[], bool]) -> str | None:
+        """Put the changed parameters back as long as this may be done.
+
+        Returns
+        -------
+        str or None
+            A sentence about those that remain changed.
+        """
         for name, value in reversed(list(self.before.items())):  # the fence is off first
+            if not may():
+                break
             try:
                 await self._write(name, value)
                 del self.before[name]
             except LinkError:
                 if self._link.silent > ANSWER:
                     break  # the others would fail as well, each after seconds
+        return self.left
+
+    @property
+    def left(self) -> str | None:
+        """A sentence about the parameters that are changed in the vehicle; None without any."""
         if not self.before:
             return None
         left = ", ".join(f"{name} = {value:g}" for name, value in self.before.items())

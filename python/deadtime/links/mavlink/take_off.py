@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
@@ -10,9 +11,10 @@ from deadtime._base.errors import LinkError
 from deadtime.links.clock import now
 from deadtime.links.mavlink.authority import Authority
 from deadtime.links.mavlink.autopilots import Autopilot
+from deadtime.links.mavlink.belief import AGREEING
 from deadtime.links.mavlink.codec import dialect
 from deadtime.links.mavlink.connection import Connection
-from deadtime.links.mavlink.set_points import HOVER, SetPoints
+from deadtime.links.mavlink.set_points import SetPoints
 from deadtime.links.mavlink.states import StateReader, wanted_messages
 
 #: Longest wait for a position estimate after power-up, and for the vehicle to agree to arm, s.
@@ -96,7 +98,8 @@ class TakeOff:
             await ask_for_messages(self._link, self._pilot)
             await self._link.until(lambda: reader.newest is not None, 0.5)
         # Whether it is armed now, not as of a second ago.
-        await self._link.next(lambda message: message.get_type() == "HEARTBEAT", MISSING)
+        for _ in range(AGREEING):
+            await self._link.next(lambda message: message.get_type() == "HEARTBEAT", MISSING)
         if (reason := self._authority.disarmed or self._authority.lost) is not None:
             raise LinkError(reason)
         self._check()
@@ -136,12 +139,13 @@ class TakeOff:
         await wait_up(lambda: self._is_up(height))
         set_points.begin(now())
         if pilot.arming != pilot.guided:
-            await asyncio.sleep(SHOWN)  # PX4 wants set points before it follows them
-            set_points.command(HOVER, now())
+            for _ in range(4):  # PX4 wants set points before it follows them
+                await asyncio.sleep(0.25 * SHOWN)
+                set_points.hover(now())
             self._check()
             self._authority.fly(*pilot.rising, pilot.guided)
             await self._set_mode(pilot.guided)
-            set_points.command(HOVER, now())
+            set_points.hover(now())
         self._authority.fly(pilot.guided)
 
     async def _set_mode(self, custom: int) -> None:
@@ -157,15 +161,22 @@ class TakeOff:
         self._authority.arming = True
         try:
             while True:
+                # Ours as well where the answer is lost: then it is commanded to land.
+                self._authority.armed_at = now()
                 result = await self._link.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-                if result == d.MAV_RESULT_ACCEPTED:
-                    self._authority.armed_at = now()
+                if result != d.MAV_RESULT_ACCEPTED:
+                    self._authority.armed_at = math.inf
                 if await self._link.until(lambda: bool(self._reader.armed), SHOWN):
                     break
                 if now() - begin > ARMING:
                     raise self._failed("does not arm")
         finally:
             self._authority.arming = False
+        if not self._authority.armed_here:
+            # By this command, whose answer was wrong, or by somebody else at the same time. In the
+            # air no vehicle obeys this.
+            with suppress(LinkError):
+                await self._link.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         self._authority.refuse_armed(self._reader)
 
     def _is_up(self, height: float) -> bool:
