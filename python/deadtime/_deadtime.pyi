@@ -903,7 +903,8 @@ class NavdataLayout:
     tag: Final[int]
     length: Final[int]
     name: Final[str]
-    fields: Final[list[str]]
+    doc: Final[str]
+    fields: Final[list[tuple[str, str, float]]]
 
 def navdata_read(packet: bytes, verify: bool) -> Navdata: ...
 def navdata_write(

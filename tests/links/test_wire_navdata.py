@@ -44,7 +44,7 @@ def checked(packet):
 
 def test_the_classes_have_the_fields_of_the_native_tables():
     for layout in navdata_layouts():
-        tag, names = layout.tag, layout.fields
+        tag, names = layout.tag, [name for name, _, _ in layout.fields]
         name, kind = reader._FIELDS[tag]
         if name == "clock":
             assert names == ["time"]

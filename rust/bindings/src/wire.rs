@@ -194,13 +194,15 @@ pub(crate) struct NavdataOption {
     values: Option<Py<PyTuple>>,
 }
 
-/// An option whose fields are known; `length` is without tag and size.
+/// An option whose fields are known; `length` is without tag and size. Each field has its name,
+/// what it is, and the value of an option of zeros, which shows its type.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 pub(crate) struct NavdataLayout {
     tag: u16,
     length: usize,
     name: &'static str,
-    fields: Vec<&'static str>,
+    doc: &'static str,
+    fields: Vec<(&'static str, &'static str, Py<PyAny>)>,
 }
 
 /// Values of the fields of an option, as Python's numbers.
@@ -285,12 +287,20 @@ fn value(object: &Bound<'_, PyAny>) -> PyResult<Value> {
 
 /// Every option whose fields are known.
 #[pyfunction]
-pub(crate) fn navdata_layouts() -> Vec<NavdataLayout> {
-    let layouts = LAYOUTS.iter().map(|layout| NavdataLayout {
-        tag: layout.tag,
-        length: layout.length,
-        name: layout.name,
-        fields: layout.fields.to_vec(),
+pub(crate) fn navdata_layouts(py: Python<'_>) -> PyResult<Vec<NavdataLayout>> {
+    let layouts = LAYOUTS.iter().map(|layout| {
+        let zeros = layout.read(&vec![0; layout.length]).unwrap_or_default();
+        let zeros = numbers(py, &zeros)?;
+        let fields = layout.fields.iter().zip(&zeros);
+        Ok(NavdataLayout {
+            tag: layout.tag,
+            length: layout.length,
+            name: layout.name,
+            doc: layout.doc,
+            fields: fields
+                .map(|(&(name, doc), zero)| (name, doc, zero.unbind()))
+                .collect(),
+        })
     });
     layouts.collect()
 }

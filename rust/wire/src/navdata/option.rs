@@ -83,8 +83,10 @@ pub struct Layout {
     pub length: usize,
     /// The name of the type.
     pub name: &'static str,
-    /// The names of the fields, in the order of the values.
-    pub fields: &'static [&'static str],
+    /// What the option is.
+    pub doc: &'static str,
+    /// The names of the fields and what they are, in the order of the values.
+    pub fields: &'static [(&'static str, &'static str)],
     pub(super) read: fn(&[u8]) -> Option<Vec<Value>>,
     pub(super) write: fn(&mut [u8], &[Value]) -> Result<(), Error>,
 }
@@ -150,14 +152,14 @@ fn out_of_range(value: Value, name: &'static str) -> Fault {
 /// Declares options: a type with its tag, its size on the wire (tag and size included) and its
 /// fields with their kinds and offsets, counted from the tag as the drone's headers count.
 macro_rules! options {
-    ($($(#[$doc:meta])* $name:ident: tag $tag:literal, size $size:literal {
-        $($(#[$field_doc:meta])* $field:ident: $value:ident as $kind:ty = $at:literal,)*
+    ($($(#[doc = $doc:literal])* $name:ident: tag $tag:literal, size $size:literal {
+        $($(#[doc = $field_doc:literal])* $field:ident: $value:ident as $kind:ty = $at:literal,)*
     })*) => {
         $(
-            $(#[$doc])*
+            $(#[doc = $doc])*
             #[derive(Debug, Clone, Copy, PartialEq, Default)]
             pub struct $name {
-                $($(#[$field_doc])* pub $field: $value,)*
+                $($(#[doc = $field_doc])* pub $field: $value,)*
             }
 
             impl Known for $name {
@@ -165,7 +167,8 @@ macro_rules! options {
                     tag: $tag,
                     length: $size - 4,
                     name: stringify!($name),
-                    fields: &[$(stringify!($field)),*],
+                    doc: concat!($($doc),*),
+                    fields: &[$((stringify!($field), concat!($($field_doc),*))),*],
                     read: |option| {
                         let known = <$name as Known>::read(option)?;
                         Some(vec![$(known.$field.into()),*])
