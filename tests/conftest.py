@@ -37,3 +37,10 @@ def listens_to_ctrl_c():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(autouse=True)
+def own_folder(request, tmp_path, monkeypatch):
+    """Links to vehicles keep the old values of parameters in the working directory."""
+    if request.node.path.parent.name in ("links", "flights"):
+        monkeypatch.chdir(tmp_path)

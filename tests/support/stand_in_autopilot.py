@@ -85,7 +85,7 @@ class StandIn:
         self.drop = lambda message: False
         self.commands, self.set_points = [], []
         self.places, self.attitudes, self.goal = [], [], None
-        self.battery = 90
+        self.battery, self.board = 90, 17
         self.origin = -3.0  # z of the ground
         self.status = None
         self._mav = d.MAVLink(None, system, 1)
@@ -308,6 +308,9 @@ class StandIn:
         result = 0
         if message.command == d.MAV_CMD_SET_MESSAGE_INTERVAL:
             self._intervals[int(values[0])] = 1e-6 * values[1]
+        elif message.command == d.MAV_CMD_REQUEST_MESSAGE and values[0] == 148:
+            version = [0, 0, 0, 0, 0, *[[0] * 8] * 3, 0, 0, self.board]
+            self.send(d.MAVLink_autopilot_version_message(*version))
         elif message.command == d.MAV_CMD_DO_SET_MODE:
             px4 = self.firmware == "px4"
             mode = int(values[1]) << 16 | int(values[2]) << 24 if px4 else int(values[1])

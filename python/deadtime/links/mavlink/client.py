@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
+import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from deadtime._base.errors import LinkError
@@ -14,6 +16,7 @@ from deadtime.links.clock import now
 from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.authority import Authority
 from deadtime.links.mavlink.autopilots import Autopilot, autopilot_of
+from deadtime.links.mavlink.changed_parameters import ChangedParameters, VehicleId
 from deadtime.links.mavlink.codec import dialect
 from deadtime.links.mavlink.commanding import Commanding
 from deadtime.links.mavlink.connection import Connection
@@ -66,6 +69,10 @@ class MAVLinkVehicle(Commanding):
         Signing key, 32 bytes: unsigned frames are refused then.
     simulated : bool
         Refuse a vehicle that does not say that it is a simulator, before anything is set in it.
+    folder : Path, optional
+        Where the old values of parameters are kept in a file while they are changed; the working
+        directory if not given. What an earlier run has left is looked for there, and beside a
+        folder that was given.
 
     Raises
     ------
@@ -97,6 +104,7 @@ commanding it
         vehicle: int | None = None,
         key: bytes | None = None,
         simulated: bool = False,
+        folder: Path | None = None,
     ) -> None:
         self.addresses = LinkAddress.all_of(address)
         self.address = ",".join(map(str, self.addresses))
@@ -112,6 +120,7 @@ commanding it
                 raise ValueError(f"{name}={number}: give a number from 1 to 255")
         self._ids = system, component
         self._vehicle, self._key, self._simulated = vehicle, key, simulated
+        self._folder = folder
         self._listener: Callable[[VehicleState], None] | None = None
         self._echo_listener: Callable[[Echo], None] | None = None
         self._parameters: Parameters | None = None
@@ -187,19 +196,19 @@ commanding it
     def _said(self, since: float) -> str:
         return self._link.said(since)
 
+    def _may_put_back(self) -> bool:
+        """Whether the newest news make sure that it is on the ground."""
+        # Who has armed it otherwise flies it, with the failsafes that it had.
+        armed_here = self._authority.armed_here
+        return self._reader.is_down if armed_here else self._reader.is_on_ground
+
     async def _put_back(self) -> str | None:
-        """Put the parameters back, where the newest news make sure that it is on the ground."""
-        held, reader = self._parameters, self._reader
-        if held is None or not held.before:
+        held = self._parameters
+        if held is None or not held.changed.changes:
             return None
-
-        def may() -> bool:
-            # Who has armed it otherwise flies it, with the failsafes that it had.
-            return reader.is_on_ground if not self._authority.armed_here else reader.is_down
-
         if not self._silent:
-            await self._until(may, GROUND_KNOWN)
-        return await held.put_back(may)
+            await self._until(self._may_put_back, GROUND_KNOWN)
+        return await held.put_back(self._may_put_back)
 
     # Connecting
 
@@ -208,6 +217,13 @@ commanding it
         await self._link.open()
 
     async def _configure(self) -> None:
+        pilot = await self._meet()
+        await self._recover(lambda what: warnings.warn(what, RuntimeWarning, stacklevel=5))
+        await pilot.set_limits(self._held, self.limits, self._ids[0])
+        self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
+
+    async def _meet(self) -> Autopilot:
+        """Wait for the vehicle, and refuse one that must not be flown; nothing is set in it."""
         link = self._link
         heartbeat = await link.next(is_autopilot, FIRST_HEARTBEAT)
         await link.until(lambda: self._reader.armed is not None, FIRST_HEARTBEAT)
@@ -232,7 +248,9 @@ commanding it
                 "vehicle"
             )
         self._authority.refuse_armed(self._reader)
-        self._parameters = Parameters(link, pilot.integers_as_bits)
+        vehicle = VehicleId(pilot.name, link.target[0], await link.board())
+        changed = ChangedParameters.new(vehicle, self._folder or Path())
+        self._parameters = Parameters(link, pilot.integers_as_bits, changed)
         if self._simulated and not await self._is_simulator(pilot):
             raise LinkError(
                 f"what answers at {self.address} does not say that it is a simulator: a router "
@@ -241,8 +259,47 @@ commanding it
             )
         await ask_over_all(link, pilot)
         await link.until(lambda: self._reader.landed_state != UNKNOWN, SHOWN)
-        await pilot.set_limits(self._parameters, self.limits, self._ids[0])
-        self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
+        return pilot
+
+    async def _recover(self, tell: Callable[[str], None]) -> None:
+        """Put back what earlier runs have left changed, and tell it."""
+        for left in ChangedParameters.left(self._held.changed.vehicle, self._folder):
+            tell(
+                f"{self.address}: the run of {left.written} was killed or lost its link, and has "
+                f"left parameters changed in the vehicle. It had {left.words()}: these are put "
+                "back before anything is set"
+            )
+            await self._until(self._may_put_back, GROUND_KNOWN)
+            if since := await self._held.restore(left, self._may_put_back):
+                tell(
+                    f"{self.address}: somebody has changed these since, and they are left alone: "
+                    f"{', '.join(since)}"
+                )
+
+    async def restore(self) -> list[str]:
+        """Put back what earlier runs have left changed in the vehicle, which is not flown.
+
+        Returns
+        -------
+        list of str
+            What was done, in sentences; empty where nothing was left.
+
+        Raises
+        ------
+        LinkError
+            If it is connected, the vehicle does not answer, is not on the ground, or does not keep
+            a value.
+        """
+        if self._is_open:
+            raise LinkError(f"{self.address} is connected already")
+        await self._open()
+        try:
+            await self._meet()
+            said: list[str] = []
+            await self._recover(said.append)
+            return said
+        finally:
+            self._shut()
 
     async def _is_simulator(self, pilot: Autopilot) -> bool:
         name = pilot.simulated

@@ -6,15 +6,18 @@ import asyncio
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from deadtime._base.errors import LinkError
 from deadtime.links.mavlink.addresses import LinkAddress
+from deadtime.links.mavlink.belief import SURE
 from deadtime.links.mavlink.carrier import Carrier
 from deadtime.links.mavlink.carriers import Carriers
 from deadtime.links.mavlink.codec import Codec, dialect
 from deadtime.links.mavlink.senders import Senders
 from deadtime.links.mavlink.time_sync import EVERY, LinkTime
+
+T = TypeVar("T")
 
 #: Time between two heartbeats, s: a vehicle that lands without them for 2 s may miss three.
 HEARTBEAT = 0.5
@@ -222,6 +225,38 @@ class Connection:
                 return answer
         raise LinkError(f"{self.address}: the vehicle does not {what}")
 
+    async def agreed(
+        self, request: Callable[[], Any], value_of: Callable[[Any], T | None], tries: int = TRIES
+    ) -> T | None:
+        """Ask until `SURE` answers in a row have the same value; None if they do not.
+
+        Parameters
+        ----------
+        request : callable
+            Makes a request.
+        value_of : callable
+            The value in a message, or None if it is no answer.
+        tries : int
+            Number of times that missing answers are asked for.
+        """
+        answers: list[T] = []
+
+        def agree(message: Any) -> bool:
+            value = value_of(message)
+            if value is None:
+                return False
+            if answers and answers[-1] != value:
+                answers.clear()
+            answers.append(value)
+            return len(answers) >= SURE
+
+        for _ in range(tries):
+            for _ in range(SURE - len(answers)):
+                self.send(request())
+            if await self.next(agree, ANSWER) is not None:
+                return answers[-1]
+        return None
+
     async def command(self, number: int, *values: float) -> int:
         """Send a command until it is acknowledged; return the MAV_RESULT.
 
@@ -248,6 +283,24 @@ class Connection:
         name = d.enums["MAV_CMD"][number].name
         reply = await self.ask(message, answers, f"acknowledge {name}")
         return int(reply.result)
+
+    async def board(self) -> str:
+        """The number of the vehicle's board; empty where it does not say one."""
+        d = dialect()
+        values = [float(d.MAVLINK_MSG_ID_AUTOPILOT_VERSION), *[0.0] * 6]
+
+        def request() -> Any:
+            return d.MAVLink_command_long_message(
+                *self.target, d.MAV_CMD_REQUEST_MESSAGE, 0, *values
+            )
+
+        def number(message: Any) -> str | None:
+            if message.get_type() != "AUTOPILOT_VERSION":
+                return None
+            return bytes(message.uid2).hex() if any(message.uid2) else f"{message.uid:x}"
+
+        found = await self.agreed(request, number, tries=2)
+        return "" if found in (None, "0") else found
 
     def said(self, since: float) -> str:
         """The newest warnings of the vehicle after a time, as a clause, or nothing."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import struct
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 from deadtime._base.errors import LinkError
+from deadtime.links.mavlink.changed_parameters import Change, ChangedParameters
 from deadtime.links.mavlink.codec import dialect
-from deadtime.links.mavlink.connection import ANSWER, Connection
+from deadtime.links.mavlink.connection import ANSWER, TRIES, Connection
+from deadtime.links.virtual_time import VirtualTimeLoop
 
 #: Difference of a value that counts as the same: parameters are single precision.
 SAME = 1e-6
@@ -39,44 +41,48 @@ def from_bits(value: float, kind: int) -> float:
 class Parameters:
     """The parameters of one vehicle.
 
+    Any three messages may be forged, late or sent twice, so that a value counts when four answers
+    in a row agree.
+
     Parameters
     ----------
     link : Connection
     integers_as_bits : bool
         Whether messages carry the bits of an integer in their float, as PX4 has it.
+    changed : ChangedParameters
+        What is changed in the vehicle until it is put back, and its file.
 
     Attributes
     ----------
-    before : dict
-        Values before they were changed, until they are put back.
+    kept : dict of str to float
+        What was set, or found as it has to be.
     """
 
-    def __init__(self, link: Connection, integers_as_bits: bool) -> None:
-        self._link, self._bits = link, integers_as_bits
-        self.before: dict[str, float] = {}
+    def __init__(
+        self, link: Connection, integers_as_bits: bool, changed: ChangedParameters
+    ) -> None:
+        self._link, self._bits, self.changed = link, integers_as_bits, changed
+        self.kept: dict[str, float] = {}
         self._kinds: dict[str, int] = {}
 
     async def read(self, name: str) -> float | None:
         """The value of a parameter; None if the vehicle does not answer for it."""
-        link, d = self._link, dialect()
-        with suppress(LinkError):
-            answer = await link.ask(
-                lambda attempt: d.MAVLink_param_request_read_message(
-                    *link.target, name.encode(), -1
-                ),
-                lambda message: _is_value(message, name),
-                f"answer for its {name}",
-            )
-            return self._value(answer, name)
-        return None
+        message = dialect().MAVLink_param_request_read_message
+        target = self._link.target
 
-    def _value(self, answer: Any, name: str) -> float:
-        self._kinds[name] = int(answer.param_type)
+        def value(answer: Any) -> float | None:
+            return self.value_of(answer) if _is_value(answer, name) else None
+
+        return await self._link.agreed(lambda: message(*target, name.encode(), -1), value)
+
+    def value_of(self, answer: Any) -> float:
+        """The value in a PARAM_VALUE."""
         value, kind = float(answer.param_value), int(answer.param_type)
+        self._kinds[answer.param_id] = kind
         return from_bits(value, kind) if self._bits else value
 
     async def set(self, name: str, value: float) -> None:
-        """Set a parameter, and keep the value that it had.
+        """Set a parameter, after the value that it had is on disk.
 
         Raises
         ------
@@ -86,18 +92,37 @@ class Parameters:
         held = await self.read(name)
         if held is None:
             raise LinkError(f"{self._link.address}: the vehicle does not answer for its {name}")
-        if not _same(held, value):
-            self.before.setdefault(name, held)
+        if not same(held, value):
+            before = self.changed.changes.get(name, Change(held, value)).before
+            self.changed.changes[name] = Change(before, value)
+            await self._save()
             await self._write(name, value)
+        self.kept[name] = value
+
+    async def _save(self) -> None:
+        """Write the file of the changes; a disk that is slow delays nothing that is in the air."""
+        try:
+            if isinstance(asyncio.get_running_loop(), VirtualTimeLoop):
+                self.changed.save()
+            else:
+                await asyncio.to_thread(self.changed.save)
+        except OSError as error:
+            raise LinkError(
+                f"{self.changed.path}, which keeps the old parameters of the vehicle, cannot be "
+                f"written: {error}"
+            ) from error
 
     async def _write(self, name: str, value: float) -> None:
         link, d, kind = self._link, dialect(), self._kinds[name]
         sent = to_bits(value, kind) if self._bits else value
-        await link.ask(
-            lambda attempt: d.MAVLink_param_set_message(*link.target, name.encode(), sent, kind),
-            lambda message: _is_value(message, name) and _same(self._value(message, name), value),
-            f"keep {name} = {value:g}",
-        )
+        for _ in range(TRIES):
+            link.send(d.MAVLink_param_set_message(*link.target, name.encode(), sent, kind))
+            held = await self.read(name)
+            if held is None:
+                break
+            if same(held, value):
+                return
+        raise LinkError(f"{link.address}: the vehicle does not keep {name} = {value:g}")
 
     async def put_back(self, may: Callable[[], bool]) -> str | None:
         """Put the changed parameters back as long as this may be done.
@@ -107,29 +132,66 @@ class Parameters:
         str or None
             A sentence about those that remain changed.
         """
-        for name, value in reversed(list(self.before.items())):  # the fence is off first
+        changes = self.changed.changes
+        for name, change in reversed(list(changes.items())):  # the fence is off first
             if not may():
                 break
             try:
-                await self._write(name, value)
-                del self.before[name]
+                self.kept.pop(name, None)
+                await self._write(name, change.before)
+                del changes[name]
+                await self._save()
             except LinkError:
                 if self._link.silent > ANSWER:
                     break  # the others would fail as well, each after seconds
         return self.left
 
+    async def restore(self, left: ChangedParameters, may: Callable[[], bool]) -> list[str]:
+        """Put back what an earlier run has left; return what somebody has changed since.
+
+        Raises
+        ------
+        LinkError
+            If one cannot be put back.
+        """
+        since = []
+        try:
+            for name, change in reversed(list(left.changes.items())):
+                held = await self.read(name)
+                if held is None or not may():
+                    raise LinkError(
+                        f"{self._link.address}: the vehicle does not answer for its {name}, or is "
+                        "not on the ground"
+                    )
+                if same(held, change.set):
+                    await self._write(name, change.before)
+                elif not same(held, change.before):
+                    since.append(f"{name} = {held:g}")
+                del left.changes[name]
+                left.save()
+        except LinkError as error:
+            raise LinkError(
+                f"{error}. What an earlier run has changed remains so, the vehicle had "
+                f"{left.words()}: see {left.path}"
+            ) from error
+        return since
+
     @property
     def left(self) -> str | None:
         """A sentence about the parameters that are changed in the vehicle; None without any."""
-        if not self.before:
+        if not self.changed.changes:
             return None
-        left = ", ".join(f"{name} = {value:g}" for name, value in self.before.items())
-        return f"{self._link.address}: could not be put back in the vehicle: {left}"
+        return (
+            f"{self._link.address}: could not be put back in the vehicle: {self.changed.words()}. "
+            f"{self.changed.path} keeps them: the next connection puts them back, and so does "
+            f"`deadtime fly --link {self._link.address} --restore`"
+        )
 
 
 def _is_value(message: Any, name: str) -> bool:
     return bool(message.get_type() == "PARAM_VALUE" and message.param_id == name)
 
 
-def _same(a: float, b: float) -> bool:
+def same(a: float, b: float) -> bool:
+    """Whether two values are the same in single precision."""
     return math.isclose(a, b, rel_tol=SAME, abs_tol=SAME)
