@@ -89,6 +89,32 @@ def test_the_limits_of_a_vehicle_are_only_made_stricter(firmware):
     run(connected())
 
 
+@pytest.mark.parametrize(
+    ("firmware", "fence", "message"),
+    [
+        ("ardupilot", {"FENCE_ALT_MAX": 3.2}, r"3\.2 m \(FENCE_ALT_MAX\).*3\.5 m.*max_height"),
+        ("ardupilot", {"FENCE_RADIUS": 4.0}, r"4 m \(FENCE_RADIUS\).*max_distance"),
+        ("ardupilot", {"FENCE_ALT_MIN": 0.5, "FENCE_TYPE": 15.0}, r"0\.5 m \(FENCE_ALT_MIN\)"),
+        ("px4", {"GF_MAX_VER_DIST": 2.0}, r"2 m \(GF_MAX_VER_DIST\)"),
+        ("px4", {"GF_MAX_HOR_DIST": 2.0}, r"2 m \(GF_MAX_HOR_DIST\)"),
+    ],
+)
+def test_a_fence_of_the_vehicle_that_the_limits_reach_beyond_is_refused(firmware, fence, message):
+    """It was kept without a word, flown into, and its landing taken for another station's."""
+
+    async def connected():
+        async with StandIn(firmware) as vehicle:
+            if firmware == "ardupilot":
+                vehicle.parameters["FENCE_ENABLE"] = 1.0
+            vehicle.parameters |= fence
+            before = dict(vehicle.parameters)
+            with pytest.raises(LinkError, match=message):
+                await MAVLinkVehicle(ADDRESS, LIMITS).connect()
+            assert vehicle.parameters == before
+
+    run(connected())
+
+
 def test_commands_are_bounded_and_expire():
     async def flight():
         async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:

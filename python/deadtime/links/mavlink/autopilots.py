@@ -24,6 +24,9 @@ SILENCE = 0.5
 HEARTBEATS_LOST = 2.0
 
 
+#: Bits of FENCE_TYPE: a largest height, a circle, a least height.
+FENCE_TOP, FENCE_CIRCLE, FENCE_BOTTOM = 1, 2, 8
+
 #: The bit of GUID_OPTIONS by which ArduPilot takes a thrust for a thrust.
 THRUST_AS_THRUST = 8
 
@@ -189,19 +192,21 @@ class ArduPilot(Autopilot):
                 f"the vehicle watches the heartbeats of system {station:g} (SYSID_MYGCS), and "
                 f"this end is system {system}: connect as that, or change the parameter"
             )
+        kinds, fenced = await parameters.read("FENCE_TYPE"), await parameters.read("FENCE_ENABLE")
+        if kinds is None or fenced is None:
+            raise LinkError("the vehicle does not answer for its fence (FENCE_TYPE, FENCE_ENABLE)")
+        own = int(kinds) if fenced else 0
+        await self._check_fence(parameters, limits, own)
         silence = await _at_most(parameters, SILENCE, "GUID_TIMEOUT")
         await parameters.set("FS_GCS_TIMEOUT", HEARTBEATS_LOST)
         await parameters.set("FS_GCS_ENABLE", 5.0)  # always land
         margin = await parameters.read("FENCE_MARGIN") or 0.0
         top = limits.max_height + limits.max_climb * silence + margin
-        kinds, fenced = await parameters.read("FENCE_TYPE"), await parameters.read("FENCE_ENABLE")
-        if kinds is None or fenced is None:
-            raise LinkError("the vehicle does not answer for its fence (FENCE_TYPE, FENCE_ENABLE)")
-        if fenced:
-            held = await parameters.read("FENCE_ALT_MAX")
-            top = min(top, held) if held is not None and int(kinds) & 1 else top
-        await parameters.set("FENCE_ALT_MAX", top)
-        await parameters.set("FENCE_TYPE", float(int(kinds) | 1 if fenced else 1))
+        if own & FENCE_TOP:
+            await _at_most(parameters, top, "FENCE_ALT_MAX")
+        else:
+            await parameters.set("FENCE_ALT_MAX", top)
+        await parameters.set("FENCE_TYPE", float(own | FENCE_TOP))
         await parameters.set("FENCE_ACTION", 2.0)  # land; the default climbs and returns
         await parameters.set("FENCE_ENABLE", 1.0)
         degrees = max(10.0, math.degrees(limits.max_angle))
@@ -210,6 +215,20 @@ class ArduPilot(Autopilot):
         else:
             await _at_most(parameters, degrees, "ATC_ANGLE_MAX")  # its name since 4.7
         return silence
+
+    async def _check_fence(self, parameters: Parameters, limits: Limits, kinds: int) -> None:
+        """Refuse limits that reach beyond the vehicle's own fence: it would land in the middle."""
+        if kinds & FENCE_TOP:
+            await _reaches(parameters, "FENCE_ALT_MAX", "max_height", _highest(limits))
+        if kinds & FENCE_CIRCLE:
+            await _reaches(parameters, "FENCE_RADIUS", "max_distance", limits.max_distance)
+        if kinds & FENCE_BOTTOM:
+            low = await parameters.read("FENCE_ALT_MIN")
+            if low is not None and low > limits.min_height:
+                raise LinkError(
+                    f"the vehicle's own fence begins at {low:g} m (FENCE_ALT_MIN), above min_height"
+                    f" = {limits.min_height:g} m: give a larger min_height, or lower the fence"
+                )
 
 
 class PX4(Autopilot):
@@ -245,15 +264,34 @@ class PX4(Autopilot):
 
     async def set_limits(self, parameters: Parameters, limits: Limits, system: int) -> float:
         """Without set points it holds, without heartbeats it lands; the fence lands it too."""
+        await _reaches(parameters, "GF_MAX_VER_DIST", "max_height", _highest(limits))
+        await _reaches(parameters, "GF_MAX_HOR_DIST", "max_distance", limits.max_distance)
         silence = await _at_most(parameters, SILENCE, "COM_OF_LOSS_T")
         await parameters.set("COM_OBL_RC_ACT", 5.0)  # hold
         await parameters.set("COM_DL_LOSS_T", 5.0)  # s, the least that it accepts
         await parameters.set("NAV_DLL_ACT", 3.0)  # land
-        await parameters.set("GF_MAX_VER_DIST", limits.max_height + limits.max_climb * silence)
+        await _at_most(
+            parameters, limits.max_height + limits.max_climb * silence, "GF_MAX_VER_DIST"
+        )
         await parameters.set("GF_ACTION", 5.0)  # land
         degrees = max(20.0, math.degrees(limits.max_angle))
         await _at_most(parameters, degrees, "MPC_TILTMAX_AIR")
         return silence
+
+
+def _highest(limits: Limits) -> float:
+    """The height that a vehicle may reach, m: the largest, and what an old set point climbs."""
+    return limits.max_height + limits.max_climb * SILENCE
+
+
+async def _reaches(parameters: Parameters, name: str, limit: str, needed: float) -> None:
+    """Refuse a fence of the vehicle's own that is closer than a limit needs; 0 is none."""
+    held = await parameters.read(name)
+    if held is not None and 0.0 < held < needed:
+        raise LinkError(
+            f"the vehicle's own fence is at {held:g} m ({name}), and this flight may reach "
+            f"{needed:g} m: give a smaller {limit}, or a wider fence"
+        )
 
 
 async def _at_most(parameters: Parameters, most: float, name: str) -> float:
