@@ -462,3 +462,50 @@ def test_a_heading_is_continued_to_the_time_of_the_position():
     assert _heading(attitude, 1.04) == pytest.approx(3.15 - 2.0 * math.pi)
     assert _heading(attitude, 9.0) == pytest.approx(3.18 - 2.0 * math.pi)  # not for ever
     assert _heading(attitude, 0.9) == 3.13
+
+
+def loses_position(vehicle):
+    """As without GPS: no more positions, and a failsafe that says so."""
+    vehicle.ready = False
+    vehicle.drop = lambda m: m.get_type() in ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+
+
+def test_a_vehicle_without_a_position_is_seen_to_land():
+    """It was said not to have landed after 60 s, 50 s after it had disarmed on the ground."""
+
+    async def flight():
+        async with StandIn() as vehicle:
+            before = dict(vehicle.parameters)
+            link = MAVLinkVehicle(ADDRESS, LIMITS)
+            await link.connect()
+            await link.take_off()
+            await told(link, 0.1, 2.0)
+            loses_position(vehicle)
+            with pytest.raises(FlightAbortedError, match="lost its position estimate"):
+                await told(link, 0.1, 2.0)
+            begin = now()
+            await link.close()
+            assert now() - begin < 10.0
+            assert not vehicle.armed
+            assert vehicle.parameters == before
+
+    run(flight())
+
+
+def test_the_failsafe_of_the_position_estimate_is_named_however_a_flight_ends():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await link.take_off()
+            await told(link, 0.1, 2.0)
+            loses_position(vehicle)
+            await asyncio.sleep(0.3)
+            vehicle.say("EKF Failsafe: changed to LAND Mode")
+            vehicle.change_mode(vehicle.landing)
+            raise FlightAbortedError("the newest message is 0.31 s old")
+
+    with pytest.raises(FlightAbortedError, match=r"0\.31 s old") as ended:
+        run(flight())
+    assert (
+        'position estimate (EKF_STATUS_REPORT); the vehicle says "EKF Failsafe'
+        in (ended.value.__notes__[0])
+    )

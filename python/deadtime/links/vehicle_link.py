@@ -141,6 +141,11 @@ class VehicleLink(ABC):
         """What the vehicle has said since a time, s, as a clause."""
         return ""
 
+    @property
+    def _remark(self) -> str | None:
+        """What else is known of why the flight ended, as a sentence."""
+        return None
+
     def _age(self) -> None:
         """Let commands expire."""
         self._commanded.age(now())
@@ -278,9 +283,14 @@ class VehicleLink(ABC):
         RuntimeWarning
             If it has landed and a setting could not be put back.
         """
+        await self._close(None)
+
+    async def _close(self, reason: BaseException | None) -> None:
         try:
             await uninterrupted(self._end())
         finally:
+            if reason is not None:
+                note(reason, self._remark)
             self._shut()
 
     async def _end(self) -> None:
@@ -299,7 +309,7 @@ class VehicleLink(ABC):
 
     async def __aexit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
-            await self.close()
+            await self._close(error)
         except LinkError as problem:
             if error is None:
                 raise

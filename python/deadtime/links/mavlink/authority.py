@@ -97,6 +97,8 @@ class Authority:
         left = armed and self._modes and mode not in (*self._modes, self._landing)
         if left:
             self.lost = self.lost or self._was_taken(mode, pilot, link, time)
+            if reader.has_lost_position and "position estimate" not in self.lost:
+                self.lost += "; the vehicle has lost its position estimate"
             self.is_sure = reader.modes.is_sure(mode)
         elif self.disarmed is not None:
             self.lost = self.lost or self.disarmed

@@ -137,6 +137,7 @@ commanding it
         self._allowed = set()
         self._authority = Authority(self.address)
         self._landing_sent = -math.inf
+        self._failing: str | None = None
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -195,6 +196,10 @@ commanding it
 
     def _said(self, since: float) -> str:
         return self._link.said(since)
+
+    @property
+    def _remark(self) -> str | None:
+        return self._failing
 
     def _may_put_back(self) -> bool:
         """Whether the newest news make sure that it is on the ground."""
@@ -322,6 +327,8 @@ commanding it
             self._authority.heard(self._reader, self._autopilot, self._link, time)
             if self._authority.lost is not None:
                 self._set_points.give_up(self._authority.lost)
+        if self._reader.has_lost_position and self._authority.armed_here:
+            self._failing = f"{self.address}: the vehicle {self._lost_position}"
         try:
             if state is not None and self._listener is not None:
                 self._listener(state)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import get_args
 
-from deadtime._base.errors import LinkError
+from deadtime._base.errors import FlightAbortedError, LinkError
 from deadtime.links.clock import now
+from deadtime.links.mavlink.authority import Authority
 from deadtime.links.mavlink.autopilots import Autopilot
 from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
@@ -36,6 +37,7 @@ class Commanding(VehicleLink):
     _link: Connection
     _reader: StateReader
     _set_points: SetPoints
+    _authority: Authority
     _autopilot: Autopilot | None
     _parameters: Parameters | None
     _allowed: set[Kind]
@@ -62,6 +64,13 @@ class Commanding(VehicleLink):
     def _check_vehicle(self) -> None:
         if self._link.silent > LOST + SHOWN or (self._set_points.guarded and self._silent):
             raise LinkError(self._unheard)
+        if self._set_points.guarded and self._reader.has_lost_position:
+            raise FlightAbortedError(f"{self.address}: the vehicle {self._lost_position}")
+
+    @property
+    def _lost_position(self) -> str:
+        said = self._link.said(self._authority.armed_at)
+        return f"has lost its position estimate ({self._known.estimator}){said}"
 
     @property
     def _silent(self) -> bool:

@@ -251,7 +251,7 @@ class Connection:
             return len(answers) >= SURE
 
         for _ in range(tries):
-            for _ in range(SURE - len(answers)):
+            for _ in range(SURE):
                 self.send(request())
             if await self.next(agree, ANSWER) is not None:
                 return answers[-1]

@@ -211,9 +211,14 @@ class StateReader:
 
     @property
     def _fault(self) -> str | None:
-        if self._status.value == CRITICAL:
-            return "a failsafe of its own is active"
-        return None
+        if self.has_lost_position:
+            return "its position estimate is lost"
+        return "a failsafe of its own is active" if self._status.value == CRITICAL else None
+
+    @property
+    def has_lost_position(self) -> bool:
+        """Whether it has flown, and does not know its position any more."""
+        return self._flown and self.estimate.value is False
 
     @property
     def _emergency(self) -> bool:
@@ -259,6 +264,6 @@ def wanted_messages(estimator: str, baud: int | None = None) -> dict[str, tuple[
         "HEARTBEAT": 10.0,
         "SYS_STATUS": 2.0,
         "GLOBAL_POSITION_INT": 2.0,
-        estimator: 2.0,
+        estimator: 4.0,
     }
     return {name: (getattr(d, f"MAVLINK_MSG_ID_{name}"), rate) for name, rate in rates.items()}
