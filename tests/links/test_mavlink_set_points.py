@@ -4,6 +4,8 @@ import asyncio
 import itertools
 import math
 import random
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from deadtime.links.mavlink.points import (
     place_within,
     rates_within,
 )
+from deadtime.links.mavlink.states import _heading
 from pymavlink.dialects.v20 import ardupilotmega as d
 from scipy.spatial.transform import Rotation
 from stand_in_autopilot import StandIn
@@ -43,6 +46,54 @@ def drawn(count):
     special = [0.0, -0.0, 1e-300, 1e308, -1e308, 0.1, -0.1]
     for _ in range(count):
         yield [numbers.choice([*special, numbers.gauss(0.0, 3.0)]) for _ in range(6)]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_state_that_is_not_finite_becomes_no_set_point(value):
+    """A position at NaN was sent, and the largest roll rate for a roll of NaN."""
+    for place in ({"north": value}, {"east": value}):
+        with pytest.raises(ValueError, match="of the vehicle"):
+            place_within(Place(1.0, 2.0, 1.0, 0.0), replace(ORIGIN, **place), LIMITS)
+    for tilt in ({"roll": value}, {"pitch": value}):
+        with pytest.raises(ValueError, match="of the vehicle"):
+            rates_within(BodyRates(0.1, 0.1, 0.0, 0.4), state(**tilt), LIMITS)
+    attitude = SimpleNamespace(time_boot_ms=1000, yaw=value, yawspeed=0.1)
+    assert _heading(attitude, 1.04) is None
+    assert _heading(SimpleNamespace(time_boot_ms=1000, yaw=0.1, yawspeed=value), 1.04) is None
+
+
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_messages_that_are_not_finite_neither_move_the_vehicle_nor_break_the_link(value, count):
+    """A heading of infinity was a math domain error in the listener, and ended the link."""
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            for kind in ("position", "rates"):
+                await link.allow(kind)
+            await link.take_off()
+            before = await link.state()
+            ms = round(1e3 * vehicle.time) + 5
+            for number in range(count):
+                for place in range(6):
+                    numbers = [0.0] * 6
+                    numbers[place] = value
+                    vehicle.send(d.MAVLink_local_position_ned_message(ms + number, *numbers))
+                    vehicle.send(d.MAVLink_attitude_message(ms + number, *numbers))
+            await asyncio.sleep(0.0)
+            after = await link.state()
+            assert (after.north, after.height) == (before.north, before.height)
+            place = link.command_position(0.0, 0.0, 1.0, heading=0.0)
+            assert all(map(math.isfinite, place))
+            await asyncio.sleep(0.1)
+            link.command_rates(0.0, 0.0, 0.0, 0.5)
+            assert all(
+                math.isfinite(number)
+                for sent in vehicle.places
+                for number in (sent.x, sent.y, sent.z, sent.yaw)
+            )
+
+    run(flight())
 
 
 def test_any_finite_numbers_become_what_is_allowed():

@@ -54,6 +54,11 @@ def _checked(point: P) -> P:
     return point
 
 
+def _reported(name: str, value: float | None) -> float:
+    """A number of a state; 0 where the vehicle reports none."""
+    return 0.0 if value is None else finite(f"{name} of the vehicle", value)
+
+
 def _between(low: float, value: float, high: float) -> float:
     return max(low, min(high, value))
 
@@ -71,10 +76,10 @@ def place_within(place: Place, origin: VehicleState, limits: Limits) -> Place:
     Raises
     ------
     ValueError
-        If a number is not finite.
+        If a number is not finite, also of where it took off.
     """
     north, east, height, heading = _checked(place)
-    at = origin.north or 0.0, origin.east or 0.0
+    at = _reported("north", origin.north), _reported("east", origin.east)
     away = _shortened(north - at[0], east - at[1], limits.max_distance)
     return Place(
         at[0] + away[0],
@@ -109,13 +114,14 @@ def rates_within(rates: BodyRates, state: VehicleState, limits: Limits) -> BodyR
     Raises
     ------
     ValueError
-        If a number is not finite.
+        If a number is not finite, also of the tilt.
     """
     roll, pitch, turn, thrust = _checked(rates)
+    tilt = _reported("roll", state.roll), _reported("pitch", state.pitch)
     most, age = limits.max_body_rate, limits.command_age
     roll, pitch = _shortened(roll, pitch, most)
-    aim = _shortened(state.roll + age * roll, state.pitch + age * pitch, limits.max_angle)
-    roll, pitch = _shortened((aim[0] - state.roll) / age, (aim[1] - state.pitch) / age, most)
+    aim = _shortened(tilt[0] + age * roll, tilt[1] + age * pitch, limits.max_angle)
+    roll, pitch = _shortened((aim[0] - tilt[0]) / age, (aim[1] - tilt[1]) / age, most)
     return BodyRates(
         roll,
         pitch,
