@@ -240,3 +240,85 @@ def test_a_heartbeat_that_was_overtaken_on_the_way_tells_nothing():
     ]:
         connection._receive(carrier, heartbeat(number, mode), time)
     assert seen == [4, 9, 9, 4]
+
+
+def other_station(vehicle):
+    """Another ground station, system 254, on the same link and on one of its own."""
+    station = d.MAVLink(None, 254, 190)
+    hello = d.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station)
+    vehicle._transport.sendto(hello, vehicle.ground)
+    return station
+
+
+def test_set_points_of_another_station_are_seen_and_named():
+    """It sent 0.9 m/s in between ours, in the same mode, and nobody noticed."""
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await link.take_off()
+            await told(link, 0.1, 3.0)  # ours alone are no reason
+            await told(link, -0.1, 1.0)
+            other_station(vehicle)
+
+            async def meddle():
+                while True:
+                    vehicle.told = 0.9
+                    await asyncio.sleep(0.1)
+
+            task = asyncio.create_task(meddle())
+            with pytest.raises(FlightAbortedError, match=r"0\.9 m/s.*system 254"):
+                await told(link, 0.1, 3.0)
+            task.cancel()
+            await asyncio.sleep(0.2)
+            assert vehicle.mode == vehicle.landing
+
+    run(flight())
+
+
+def test_a_few_forged_echoes_are_no_set_points_of_another_station():
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await link.take_off()
+            await told(link, 0.1, 3.0)
+            for _ in range(3):
+                forged = [0.0] * 11
+                forged[5] = -0.9
+                vehicle.send(d.MAVLink_position_target_local_ned_message(10**6, 1, 0xDC7, *forged))
+            await told(link, 0.1, 2.0)
+
+    run(flight())
+
+
+def test_a_failsafe_that_another_station_switches_off_ends_the_flight():
+    """The vehicle announces each change of a parameter to everybody, and nobody listened."""
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await link.take_off()
+            await told(link, 0.1, 1.0)
+            other_station(vehicle)
+            vehicle.parameters["FS_GCS_ENABLE"] = 0.0
+            vehicle._send_parameter("FS_GCS_ENABLE")
+            with pytest.raises(
+                FlightAbortedError, match=r"FS_GCS_ENABLE was changed from 5 to 0.*system 254"
+            ):
+                await told(link, 0.1, 2.0)
+            await link.land()
+            assert not vehicle.armed
+            with pytest.raises(LinkError, match="FS_GCS_ENABLE was changed"):
+                await link.take_off()
+
+    run(flight())
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_forged_parameter_ends_no_flight(count):
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await link.take_off()
+            await told(link, 0.1, 1.0)
+            for _ in range(count):
+                vehicle.send(d.MAVLink_param_value_message(b"FS_GCS_ENABLE", 0.0, 9, 1, 0))
+            await told(link, 0.1, 2.0)
+
+    run(flight())

@@ -212,7 +212,7 @@ class StandIn:
         elif number == 85:
             self.send(
                 d.MAVLink_position_target_local_ned_message(
-                    ms, 1, 0xDC7, *nothing[:5], -self.told, *nothing[:5]
+                    ms, 1, 0xDC7, *nothing[:3], *self.along, -self.told, *nothing[:5]
                 )
             )
         elif number == 30:

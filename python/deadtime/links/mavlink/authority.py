@@ -115,8 +115,8 @@ class Authority:
         )
 
     def _was_taken(self, mode: int, pilot: Autopilot, link: Connection, time: float) -> str:
-        others = "".join(f"; on the link is {one}" for one in link.senders.ground_stations)
         return (
             f"{self._name}: the vehicle went to {pilot.mode_name(mode)}, which was not commanded "
-            f"from here{others}{link.said(time - REASON)}: no set points are sent any more"
+            f"from here{link.senders.named}{link.said(time - REASON)}: no set points are sent any "
+            "more"
         )

@@ -81,6 +81,8 @@ class Autopilot(ABC):
         Message with the flags of its position estimate.
     simulated : str or None
         A parameter that its simulator has and vehicles have not.
+    echoes : bool
+        Whether it reports the set points that it follows as they were sent.
     shaping : mapping of str to (Scaled, Scaled or None)
         The parameters that limit the change of a commanded rate, and the change of that, by axis.
     speeds : tuple of Speed
@@ -95,6 +97,7 @@ class Autopilot(ABC):
     integers_as_bits: ClassVar[bool]
     estimator: ClassVar[str]
     simulated: ClassVar[str | None] = None
+    echoes: ClassVar[bool] = False
     shaping: ClassVar[Mapping[str, tuple[Scaled, Scaled | None]]] = {}
     speeds: ClassVar[tuple[Speed, ...]] = ()
 
@@ -142,6 +145,7 @@ class ArduPilot(Autopilot):
     integers_as_bits = False
     estimator = "EKF_STATUS_REPORT"
     simulated = "SIM_SPEEDUP"
+    echoes = True
     shaping: ClassVar[Mapping[str, tuple[Scaled, Scaled | None]]] = {
         "z": (Scaled("WPNAV_ACCEL_Z", 0.01), Scaled("PSC_JERK_Z", 1.0)),
         **{axis: (Scaled("WPNAV_ACCEL", 0.01), Scaled("PSC_JERK_XY", 1.0)) for axis in ("x", "y")},
@@ -300,6 +304,7 @@ async def _at_most(parameters: Parameters, most: float, name: str) -> float:
     if held is None:
         raise LinkError(f"the vehicle does not answer for its {name}")
     if 0.0 < held <= most:
+        parameters.kept[name] = held
         return held
     await parameters.set(name, most)
     return most

@@ -18,11 +18,11 @@ from deadtime.links.mavlink.authority import Authority
 from deadtime.links.mavlink.autopilots import Autopilot, autopilot_of
 from deadtime.links.mavlink.changed_parameters import ChangedParameters, VehicleId
 from deadtime.links.mavlink.codec import dialect
-from deadtime.links.mavlink.commanding import Commanding
 from deadtime.links.mavlink.connection import Connection
 from deadtime.links.mavlink.parameters import Parameters
 from deadtime.links.mavlink.senders import is_autopilot
 from deadtime.links.mavlink.set_points import CYCLE, SetPoints
+from deadtime.links.mavlink.settings import Settings
 from deadtime.links.mavlink.states import ON_GROUND, UNKNOWN, StateReader, echo_of
 from deadtime.links.mavlink.take_off import SHOWN, TakeOff, ask_over_all
 from deadtime.links.mavlink.time_sync import LinkTime
@@ -35,14 +35,11 @@ FIRST_HEARTBEAT = 10.0
 #: Time in which every vehicle on the link has sent a heartbeat, s.
 HEARTBEATS = 1.5
 
-#: Longest wait for news that make sure that it is on the ground, s: 5 heartbeats of one a second.
-GROUND_KNOWN = 5.0
-
 #: Time between two landing commands, and between landing and the command to disarm, s.
 AGAIN, DISARM_AFTER = 0.5, 3.0
 
 
-class MAVLinkVehicle(Commanding):
+class MAVLinkVehicle(Settings):
     """A link to a multicopter with ArduPilot or PX4.
 
     As an asynchronous context manager it connects on entry, and lands and closes on exit, also by
@@ -138,6 +135,8 @@ commanding it
         self._authority = Authority(self.address)
         self._landing_sent = -math.inf
         self._failing: str | None = None
+        self._meddled: str | None = None
+        self._asking: dict[str, asyncio.Task[None]] = {}
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -201,20 +200,6 @@ commanding it
     def _remark(self) -> str | None:
         return self._failing
 
-    def _may_put_back(self) -> bool:
-        """Whether the newest news make sure that it is on the ground."""
-        # Who has armed it otherwise flies it, with the failsafes that it had.
-        armed_here = self._authority.armed_here
-        return self._reader.is_down if armed_here else self._reader.is_on_ground
-
-    async def _put_back(self) -> str | None:
-        held = self._parameters
-        if held is None or not held.changed.changes:
-            return None
-        if not self._silent:
-            await self._until(self._may_put_back, GROUND_KNOWN)
-        return await held.put_back(self._may_put_back)
-
     # Connecting
 
     async def _open(self) -> None:
@@ -266,21 +251,6 @@ commanding it
         await link.until(lambda: self._reader.landed_state != UNKNOWN, SHOWN)
         return pilot
 
-    async def _recover(self, tell: Callable[[str], None]) -> None:
-        """Put back what earlier runs have left changed, and tell it."""
-        for left in ChangedParameters.left(self._held.changed.vehicle, self._folder):
-            tell(
-                f"{self.address}: the run of {left.written} was killed or lost its link, and has "
-                f"left parameters changed in the vehicle. It had {left.words()}: these are put "
-                "back before anything is set"
-            )
-            await self._until(self._may_put_back, GROUND_KNOWN)
-            if since := await self._held.restore(left, self._may_put_back):
-                tell(
-                    f"{self.address}: somebody has changed these since, and they are left alone: "
-                    f"{', '.join(since)}"
-                )
-
     async def restore(self) -> list[str]:
         """Put back what earlier runs have left changed in the vehicle, which is not flown.
 
@@ -323,12 +293,8 @@ commanding it
 
     def _take(self, message: Any, time: float) -> None:
         state = self._reader.take(message, time)
-        if message.get_type() == "HEARTBEAT" and self._autopilot is not None:
-            self._authority.heard(self._reader, self._autopilot, self._link, time)
-            if self._authority.lost is not None:
-                self._set_points.give_up(self._authority.lost)
-        if self._reader.has_lost_position and self._authority.armed_here:
-            self._failing = f"{self.address}: the vehicle {self._lost_position}"
+        if self._autopilot is not None:
+            self._compare(message, time, self._autopilot)
         try:
             if state is not None and self._listener is not None:
                 self._listener(state)
@@ -338,59 +304,11 @@ commanding it
             self._listener = self._echo_listener = None
             raise
 
-    async def parameter(self, name: str) -> float:
-        """The value of a parameter of the vehicle.
-
-        Raises
-        ------
-        LinkError
-            If it is not connected, or does not answer.
-        """
-        value = await self._held.read(name)
-        if value is None:
-            raise LinkError(f"{self.address}: the vehicle does not answer for its {name}")
-        return value
-
-    async def set_parameter(self, name: str, value: float) -> None:
-        """Set a parameter, and read it back; the old value is put back when the link is closed.
-
-        Raises
-        ------
-        LinkError
-            If it is not connected, or does not keep the value.
-        """
-        await self._held.set(name, value)
-
-    async def shaping(self, axis: str) -> tuple[float, float | None] | None:
-        """Within which limits the vehicle lets a commanded rate change, by its parameters.
-
-        Parameters
-        ----------
-        axis : str
-            One of `axes`.
-
-        Returns
-        -------
-        (float, float or None) or None
-            Largest rate of change, 1/s² times the unit of the axis, and largest rate of that,
-            where it has one; None where the vehicle does not tell.
-
-        Raises
-        ------
-        LinkError
-            If it is not connected.
-        """
-        found: list[float | None] = []
-        for parameter in self._known.shaping.get(axis, ()):
-            value = None if parameter is None else await self._held.read(parameter.name)
-            found.append(None if not value or parameter is None else parameter.factor * value)
-        if not found or found[0] is None:
-            return None
-        return found[0], found[1]
-
     # Flying
 
     async def _prepare(self) -> None:
+        if self._meddled is not None:
+            raise LinkError(f"{self.address}: {self._meddled}: connect again")
         self._set_points.expired = None  # that of an earlier flight
         await self._steps().prepare(self.limits.min_battery)
 
@@ -473,5 +391,7 @@ commanding it
             self._cycle.cancel()
             self._command_landing()
         self._cycle = None
+        for task in self._asking.values():
+            task.cancel()
         self._link.shut()
         self._autopilot = self._parameters = None

@@ -89,6 +89,7 @@ class Parameters:
         LinkError
             If the vehicle does not answer for it, or does not say that it has taken the value.
         """
+        self.kept.pop(name, None)
         held = await self.read(name)
         if held is None:
             raise LinkError(f"{self._link.address}: the vehicle does not answer for its {name}")
@@ -123,6 +124,19 @@ class Parameters:
             if same(held, value):
                 return
         raise LinkError(f"{link.address}: the vehicle does not keep {name} = {value:g}")
+
+    def contradicts(self, message: Any) -> bool:
+        """Whether a message says another value of a parameter than was set."""
+        if message.get_type() != "PARAM_VALUE" or message.param_id not in self.kept:
+            return False
+        return not same(self.value_of(message), self.kept[message.param_id])
+
+    async def changed_elsewhere(self, name: str) -> str | None:
+        """A clause about a parameter that somebody else has changed; None if it is as set."""
+        held, kept = await self.read(name), self.kept.get(name)
+        if held is None or kept is None or same(held, kept):
+            return None
+        return f"{name} was changed from {kept:g} to {held:g}, and not from here"
 
     async def put_back(self, may: Callable[[], bool]) -> str | None:
         """Put the changed parameters back as long as this may be done.

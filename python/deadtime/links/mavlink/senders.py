@@ -88,6 +88,11 @@ class Senders:
         return [one for one in self.foreign.values() if "ground station" in one.kind]
 
     @property
+    def named(self) -> str:
+        """Other ground stations as a clause, or nothing."""
+        return "".join(f"; on the link is {one}" for one in self.ground_stations)
+
+    @property
     def vehicles(self) -> list[Foreign]:
         """Other vehicles."""
         return [one for one in self.foreign.values() if one.kind == "another vehicle"]

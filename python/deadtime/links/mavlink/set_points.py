@@ -12,9 +12,10 @@ from typing import Any
 
 from deadtime._base.validation import finite
 from deadtime.links.expiry import ExpiringCommand
+from deadtime.links.mavlink.elsewhere import CommandedElsewhere
 from deadtime.links.mavlink.point_messages import message_of
 from deadtime.links.safety import Limits
-from deadtime.links.vehicle import Motion
+from deadtime.links.vehicle import Echo, Motion
 
 #: Time between two checks of its age, and between two set points where no new one comes, s.
 CYCLE, REPEAT = 0.05, 0.1
@@ -50,11 +51,13 @@ class SetPoints(ExpiringCommand):
     def __init__(self, limits: Limits) -> None:
         super().__init__(limits, HOVER)
         self._sent = 0.0
+        self._elsewhere = CommandedElsewhere()
 
     def begin(self, now: float) -> None:
         """Send set points from now on, hovering first."""
         self.guarded = self.expired is None
         self._motion, self._given = HOVER, now
+        self._elsewhere = CommandedElsewhere()
 
     def stop(self) -> None:
         """Send none any more."""
@@ -72,4 +75,9 @@ class SetPoints(ExpiringCommand):
     def message(self, target: tuple[int, int], now: float, ground: float) -> Any:
         """The set point as a message; `ground` is the down coordinate that heights count from."""
         self._sent = now
+        self._elsewhere.sent(self._motion, now)
         return message_of(self._motion, target, now, ground)
+
+    def are_not(self, echo: Echo) -> bool:
+        """Whether the vehicle follows velocities that were not sent from here, by its echoes."""
+        return self.guarded and self._elsewhere.heard(echo)
