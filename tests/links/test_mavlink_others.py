@@ -322,3 +322,20 @@ def test_a_forged_parameter_ends_no_flight(count):
             await told(link, 0.1, 2.0)
 
     run(flight())
+
+
+def test_what_a_vehicle_says_is_printable():
+    """ESC and BEL of a STATUSTEXT reached the terminal."""
+
+    async def flight():
+        async with StandIn() as vehicle, MAVLinkVehicle(ADDRESS, LIMITS) as link:
+            await link.take_off()
+            vehicle.say("a\x1b[2J\x07\x9b31mb")
+            vehicle.change_mode(5)
+            with pytest.raises(FlightAbortedError) as ended:
+                await told(link, 0.1, 2.0)
+            assert str(ended.value).isprintable()
+            assert r"a\x1b[2J\x07" in str(ended.value)
+            vehicle.change_mode(vehicle.landing)
+
+    run(flight())

@@ -14,6 +14,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
+from deadtime._base.printable import printable
+
 
 @dataclass(frozen=True)
 class VehicleId:
@@ -80,12 +82,12 @@ class ChangedParameters:
         try:
             text = json.loads(path.read_text(encoding="utf-8"))
             changes = {
-                str(name): Change(float(one["before"]), float(one["set"]))
+                printable(str(name)): Change(float(one["before"]), float(one["set"]))
                 for name, one in text["parameters"].items()
             }
             board = text["vehicle"]
             vehicle = VehicleId(str(board["autopilot"]), int(board["system"]), str(board["unique"]))
-            return cls(vehicle, path, str(text["written"]), changes)
+            return cls(vehicle, path, printable(str(text["written"])), changes)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
 

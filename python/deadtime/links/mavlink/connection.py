@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from deadtime._base.errors import LinkError
+from deadtime._base.printable import printable
 from deadtime.links.mavlink.addresses import LinkAddress
 from deadtime.links.mavlink.belief import SURE
 from deadtime.links.mavlink.carrier import Carrier
@@ -182,7 +183,7 @@ class Connection:
         kind = message.get_type()
         self.latest[kind] = time, message
         if kind == "STATUSTEXT" and message.severity <= WARNING:
-            self.texts = [*self.texts[1 - TEXTS :], (time, str(message.text))]
+            self.texts = [*self.texts[1 - TEXTS :], (time, printable(str(message.text)))]
         try:
             self.take(message, time)
         except Exception as error:  # nobody could catch it here: the vehicle raises it later
