@@ -1,6 +1,7 @@
 """ArduPilot's Copter itself: a flight, another station that lands it, a station that is killed."""
 
 import json
+import os
 
 import pytest
 
@@ -93,3 +94,35 @@ def test_a_flight_goes_on_over_the_second_of_two_links():
     assert flown["first_trip"] > flown["second_trip"] + 0.03
     assert flown["second"]["oldest"] < 0.5
     assert flown["landed"]
+
+
+#: The long form of the flights below: `DEADTIME_LONG_FLIGHTS=1`.
+LONG = bool(os.environ.get("DEADTIME_LONG_FLIGHTS"))
+
+
+def test_after_a_kill_or_a_cut_link_every_parameter_is_as_before_the_first_run():
+    """At random moments (seed 44): the next run, or `restore`, puts back and says so."""
+    count = 20 if LONG else 3
+    told = told_by("arducopter_killed.py", str(count), "44", timeout=120.0 + 70.0 * count)
+    result = json.loads(told.splitlines()[-1])
+    before = result["before"]
+    for flight in result["flights"]:
+        assert flight["after"] == before, flight
+        if flight["changed"] != before:
+            assert "was killed or lost its link" in str(flight["said"]), flight
+    assert any(flight["changed"] != before for flight in result["flights"])
+    assert any(flight["flew"] for flight in result["flights"])
+
+
+def test_no_few_messages_leave_it_in_the_air_without_its_failsafes_or_armed():
+    """Forged, late, repeated and missing ones of every kind (seeds from 100)."""
+    count = 24 if LONG else 2
+    told = told_by("arducopter_meddled.py", str(count), "100", timeout=120.0 + 70.0 * count)
+    result = json.loads(told.splitlines()[-1])
+    before = result["before"]
+    for flight in result["flights"]:
+        assert flight["without_failsafes"] == 0, flight
+        assert flight["after"] == before, flight
+        if flight["left"] != before:
+            assert "changed-parameters" in str([flight["ended"], flight["warned"]]), flight
+    assert max(flight["highest"] for flight in result["flights"]) > 0.8

@@ -197,3 +197,23 @@ def test_an_arming_that_was_answered_wrongly_ends_on_the_ground():
                 assert not vehicle.armed
 
     run(flight())
+
+
+def test_a_message_that_comes_a_second_late_is_no_gap_of_82():
+    """Sequence numbers begin anew after 255: an old one seemed to be far ahead."""
+    reader, vehicle = StateReader(), d.MAVLink(None, 1, 1)
+
+    def take(number, time):
+        message = d.MAVLink_attitude_message(0, *[0.0] * 6)
+        vehicle.seq = number % 256
+        message.pack(vehicle)
+        reader.take(message, time)
+        return max((lost for _, lost in reader._gaps), default=0)
+
+    numbers = list(range(400))
+    assert max(take(number, 5e-3 * number) for number in numbers) == 0
+    assert take(400 - 174, 2.0) == 0  # seems to be 82 ahead
+    assert take(400, 2.0) == 0
+    assert take(404, 2.01) == 0  # three are missing: known with the next one
+    assert take(405, 2.02) == 3
+    assert max(take(number, 2.03 + 0.01 * number) for number in range(410, 1000, 5)) == 4

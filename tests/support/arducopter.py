@@ -59,8 +59,8 @@ def told_by(program, *options, timeout):
 
 
 @contextmanager
-def firmware(*serials):
-    """Run it at the speed of the clock, in a network that `alone` has made."""
+def firmware(*serials, longest=600):
+    """Run it at the speed of the clock, for so many seconds, in a network that `alone` has made."""
     place = executable()
     options = ["--model", "quad", "--speedup", "1", "--home", "38.7,-9.1,100,0", "-w", "-I0"]
     for number in range(3):
@@ -68,7 +68,7 @@ def firmware(*serials):
     options += ["--defaults", str(place.parent / "copter.parm")]
     with tempfile.TemporaryDirectory() as folder, Path(folder, "said").open("w") as said:
         process = subprocess.Popen(
-            ["timeout", "600", str(place), *options], cwd=folder, stdout=said, stderr=said
+            ["timeout", str(longest), str(place), *options], cwd=folder, stdout=said, stderr=said
         )
         try:
             yield process

@@ -111,6 +111,7 @@ class Station:
             note("height", -message.z)
         elif kind == "PARAM_VALUE":
             self.parameters[message.param_id] = message.param_value
+            note("parameter", (message.param_id, message.param_value))
 
     def first(self, since, name, holds, within=60.0):
         """When something was first reported after a time: the time, and the vehicle's."""

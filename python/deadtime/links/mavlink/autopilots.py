@@ -102,12 +102,12 @@ class Autopilot(ABC):
     speeds: ClassVar[tuple[Speed, ...]] = ()
 
     async def allow(self, parameters: Parameters, limits: Limits, kind: Kind) -> None:
-        """Set what set points of a kind need: the speeds towards a position, the sense of a thrust.
+        """Plan what set points of a kind need: speeds towards a position, the sense of a thrust.
 
         Raises
         ------
         LinkError
-            If it does not keep a setting.
+            If it does not answer for a setting.
         """
         for one in self.speeds if kind == "position" else ():
             most = max(one.least, getattr(limits, one.limit) / one.factor)
@@ -127,12 +127,12 @@ class Autopilot(ABC):
 
     @abstractmethod
     async def set_limits(self, parameters: Parameters, limits: Limits, system: int) -> float:
-        """Set limits and failsafes; return the time for which it follows an old set point, s.
+        """Plan limits and failsafes; return the time for which it follows an old set point, s.
 
         Raises
         ------
         LinkError
-            If it does not keep one of them.
+            If it does not answer for one of them, or the limits reach beyond its own fence.
         """
 
 
@@ -166,7 +166,7 @@ class ArduPilot(Autopilot):
         held = await parameters.read("GUID_OPTIONS")
         if held is None:
             raise LinkError("the vehicle does not answer for its GUID_OPTIONS")
-        await parameters.set("GUID_OPTIONS", float(int(held) | THRUST_AS_THRUST))
+        await parameters.plan("GUID_OPTIONS", float(int(held) | THRUST_AS_THRUST))
 
     def mode(self, custom: int) -> tuple[float, ...]:
         """As in `Autopilot`."""
@@ -202,17 +202,17 @@ class ArduPilot(Autopilot):
         own = int(kinds) if fenced else 0
         await self._check_fence(parameters, limits, own)
         silence = await _at_most(parameters, SILENCE, "GUID_TIMEOUT")
-        await parameters.set("FS_GCS_TIMEOUT", HEARTBEATS_LOST)
-        await parameters.set("FS_GCS_ENABLE", 5.0)  # always land
+        await parameters.plan("FS_GCS_TIMEOUT", HEARTBEATS_LOST)
+        await parameters.plan("FS_GCS_ENABLE", 5.0)  # always land
         margin = await parameters.read("FENCE_MARGIN") or 0.0
         top = limits.max_height + limits.max_climb * silence + margin
         if own & FENCE_TOP:
             await _at_most(parameters, top, "FENCE_ALT_MAX")
         else:
-            await parameters.set("FENCE_ALT_MAX", top)
-        await parameters.set("FENCE_TYPE", float(own | FENCE_TOP))
-        await parameters.set("FENCE_ACTION", 2.0)  # land; the default climbs and returns
-        await parameters.set("FENCE_ENABLE", 1.0)
+            await parameters.plan("FENCE_ALT_MAX", top)
+        await parameters.plan("FENCE_TYPE", float(own | FENCE_TOP))
+        await parameters.plan("FENCE_ACTION", 2.0)  # land; the default climbs and returns
+        await parameters.plan("FENCE_ENABLE", 1.0)
         degrees = max(10.0, math.degrees(limits.max_angle))
         if await parameters.read("ANGLE_MAX") is not None:
             await _at_most(parameters, 100.0 * degrees, "ANGLE_MAX")
@@ -271,13 +271,13 @@ class PX4(Autopilot):
         await _reaches(parameters, "GF_MAX_VER_DIST", "max_height", _highest(limits))
         await _reaches(parameters, "GF_MAX_HOR_DIST", "max_distance", limits.max_distance)
         silence = await _at_most(parameters, SILENCE, "COM_OF_LOSS_T")
-        await parameters.set("COM_OBL_RC_ACT", 5.0)  # hold
-        await parameters.set("COM_DL_LOSS_T", 5.0)  # s, the least that it accepts
-        await parameters.set("NAV_DLL_ACT", 3.0)  # land
+        await parameters.plan("COM_OBL_RC_ACT", 5.0)  # hold
+        await parameters.plan("COM_DL_LOSS_T", 5.0)  # s, the least that it accepts
+        await parameters.plan("NAV_DLL_ACT", 3.0)  # land
         await _at_most(
             parameters, limits.max_height + limits.max_climb * silence, "GF_MAX_VER_DIST"
         )
-        await parameters.set("GF_ACTION", 5.0)  # land
+        await parameters.plan("GF_ACTION", 5.0)  # land
         degrees = max(20.0, math.degrees(limits.max_angle))
         await _at_most(parameters, degrees, "MPC_TILTMAX_AIR")
         return silence
@@ -306,7 +306,7 @@ async def _at_most(parameters: Parameters, most: float, name: str) -> float:
     if 0.0 < held <= most:
         parameters.kept[name] = held
         return held
-    await parameters.set(name, most)
+    await parameters.plan(name, most)
     return most
 
 

@@ -210,6 +210,7 @@ commanding it
         pilot = await self._meet()
         await self._recover(lambda what: warnings.warn(what, RuntimeWarning, stacklevel=5))
         await pilot.set_limits(self._held, self.limits, self._ids[0])
+        await self._held.apply()
         self._cycle = asyncio.get_running_loop().create_task(self._keep_sending())
 
     async def _meet(self) -> Autopilot:

@@ -159,6 +159,7 @@ class Commanding(VehicleLink):
         if kind not in get_args(Kind):
             raise ValueError(f"no set points of kind {kind!r}: {', '.join(get_args(Kind))}")
         await self._known.allow(self._held, self.limits, kind)
+        await self._held.apply()
         self._allowed.add(kind)
 
     def command_position(

@@ -16,6 +16,7 @@ from deadtime.links.mavlink.carrier import Carrier
 from deadtime.links.mavlink.carriers import Carriers
 from deadtime.links.mavlink.codec import Codec, dialect
 from deadtime.links.mavlink.senders import Senders
+from deadtime.links.mavlink.states import NUMBERS
 from deadtime.links.mavlink.time_sync import EVERY, LinkTime
 
 T = TypeVar("T")
@@ -32,9 +33,6 @@ ANSWER, TRIES = 0.7, 8
 #: Of two heartbeats that come within this time, s, the one that was sent later counts: a link that
 #: scatters delivers them in another order, and the mode would seem to go back.
 REORDERED = 0.2
-
-#: Messages are numbered up to this.
-NUMBERS = 256
 
 #: Texts of the vehicle that are kept, and severity up to which: 4 is a warning.
 TEXTS, WARNING = 8, 4

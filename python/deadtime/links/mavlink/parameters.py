@@ -6,6 +6,7 @@ import asyncio
 import math
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from deadtime._base.errors import LinkError
@@ -63,6 +64,7 @@ class Parameters:
     ) -> None:
         self._link, self._bits, self.changed = link, integers_as_bits, changed
         self.kept: dict[str, float] = {}
+        self._planned: dict[str, Change] = {}
         self._kinds: dict[str, int] = {}
 
     async def read(self, name: str) -> float | None:
@@ -81,24 +83,44 @@ class Parameters:
         self._kinds[answer.param_id] = kind
         return from_bits(value, kind) if self._bits else value
 
-    async def set(self, name: str, value: float) -> None:
-        """Set a parameter, after the value that it had is on disk.
+    async def plan(self, name: str, value: float) -> None:
+        """Set a parameter with the next `apply`; until then nothing is set.
 
         Raises
         ------
         LinkError
-            If the vehicle does not answer for it, or does not say that it has taken the value.
+            If the vehicle does not answer for it.
         """
         self.kept.pop(name, None)
         held = await self.read(name)
         if held is None:
             raise LinkError(f"{self._link.address}: the vehicle does not answer for its {name}")
-        if not same(held, value):
-            before = self.changed.changes.get(name, Change(held, value)).before
-            self.changed.changes[name] = Change(before, value)
+        before = self.changed.changes.get(name, Change(held, value)).before
+        if same(held, value):
+            self.kept[name] = value
+        else:
+            self._planned[name] = Change(before, value)
+
+    async def apply(self) -> None:
+        """Set what was planned, after the values that the vehicle had are on disk.
+
+        Raises
+        ------
+        LinkError
+            If they cannot be written, or the vehicle does not keep a value.
+        """
+        planned, self._planned = self._planned, {}
+        if planned:
+            self.changed.changes |= planned
             await self._save()
-            await self._write(name, value)
-        self.kept[name] = value
+        for name, change in planned.items():
+            await self._write(name, change.set)
+            self.kept[name] = change.set
+
+    async def set(self, name: str, value: float) -> None:
+        """Set a parameter now; as `plan` and `apply`."""
+        await self.plan(name, value)
+        await self.apply()
 
     async def _save(self) -> None:
         """Write the file of the changes; a disk that is slow delays nothing that is in the air."""
@@ -154,10 +176,11 @@ class Parameters:
                 self.kept.pop(name, None)
                 await self._write(name, change.before)
                 del changes[name]
-                await self._save()
             except LinkError:
                 if self._link.silent > ANSWER:
                     break  # the others would fail as well, each after seconds
+        with suppress(LinkError):  # the file says more than it has to, then
+            await self._save()
         return self.left
 
     async def restore(self, left: ChangedParameters, may: Callable[[], bool]) -> list[str]:
@@ -182,6 +205,7 @@ class Parameters:
                 elif not same(held, change.before):
                     since.append(f"{name} = {held:g}")
                 del left.changes[name]
+            with suppress(OSError):  # the values are those of before, next time as well
                 left.save()
         except LinkError as error:
             raise LinkError(

@@ -16,6 +16,9 @@ from deadtime.links.mavlink.states import echo_of
 #: Longest wait for news that make sure that it is on the ground, s: 5 heartbeats of one a second.
 GROUND_KNOWN = 5.0
 
+#: Number of times that parameters are put back where this was interrupted.
+TRIES = 3
+
 
 class Settings(Commanding):
     """The parameters of a vehicle."""
@@ -85,9 +88,12 @@ class Settings(Commanding):
         held = self._parameters
         if held is None or not held.changed.changes:
             return None
-        if not self._silent:
-            await self._until(self._may_put_back, GROUND_KNOWN)
-        return await held.put_back(self._may_put_back)
+        for _ in range(TRIES):  # news may contradict each other in between
+            if self._silent or not await self._until(self._may_put_back, GROUND_KNOWN):
+                break
+            if await held.put_back(self._may_put_back) is None:
+                break
+        return held.left
 
     async def _recover(self, tell: Callable[[str], None]) -> None:
         """Put back what earlier runs have left changed, and tell it."""

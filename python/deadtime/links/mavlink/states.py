@@ -19,6 +19,9 @@ ESTIMATED, CONSTANT = 16 | 32, 128
 #: Age beyond which a report is not news any more, s: heartbeats come once a second at least.
 NEWS = 2.5
 
+#: Frames are numbered up to this.
+NUMBERS = 256
+
 #: Time over which lost frames are looked at, s.
 RECENT = 1.0
 
@@ -75,6 +78,7 @@ class StateReader:
         self._time = -math.inf
         self._frames = 0
         self._sequence: int | None = None
+        self._ahead: int | None = None
         self._gaps: deque[tuple[float, int]] = deque()
 
     @property
@@ -110,7 +114,7 @@ class StateReader:
 
     def count_anew(self) -> None:
         """Count frames of another link, which has numbers of its own."""
-        self._sequence = None
+        self._sequence = self._ahead = None
 
     def take(self, message: Any, time: float) -> VehicleState | None:
         """Take a message that arrived at a time, s; return the state that it completes."""
@@ -144,14 +148,26 @@ class StateReader:
             self.echo = echo
 
     def _count(self, sequence: int, time: float) -> None:
-        """Count frames and gaps; an old frame that comes late is none."""
-        passed = 1 if self._sequence is None else (sequence - self._sequence) % 256
-        if passed == 0 or passed > 128:
-            return
-        self._sequence = sequence
-        self._frames += passed
-        if passed > 1:
-            self._gaps.append((time, passed - 1))
+        """Count frames and gaps.
+
+        An old frame that comes late is none; numbers begin anew after 255, so that it may seem to
+        be far ahead. A gap counts once the next frame continues behind it.
+        """
+        self._frames += 1
+        if self._sequence is None:
+            self._sequence = sequence
+        passed = (sequence - self._sequence) % NUMBERS
+        if passed > 1 and self._ahead is not None:
+            beyond = (sequence - self._ahead) % NUMBERS
+            if 0 < beyond <= NUMBERS // 2:
+                lost = (self._ahead - self._sequence) % NUMBERS - 1
+                self._gaps.append((time, lost))
+                self._frames += lost
+                self._sequence, passed = self._ahead, beyond
+        if passed == 1:
+            self._sequence, self._ahead = sequence, None
+        elif 1 < passed <= NUMBERS // 2:
+            self._ahead = sequence
         while self._gaps and self._gaps[0][0] < time - RECENT:
             self._gaps.popleft()
 
@@ -218,7 +234,7 @@ class StateReader:
     @property
     def has_lost_position(self) -> bool:
         """Whether it has flown, and does not know its position any more."""
-        return self._flown and self.estimate.value is False
+        return self._flown and self.estimate.is_sure(False)
 
     @property
     def _emergency(self) -> bool:
