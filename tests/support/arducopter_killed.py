@@ -43,13 +43,14 @@ NAMES = (
     "ANGLE_MAX",
 )
 
-#: The moments are drawn up to so many seconds after the start: connection, take-off, flight.
+#: The moments are drawn up to so many seconds after it begins: connection, take-off, flight.
 MOMENTS = 18.0
 
 LIMITS = Limits(max_climb=1.0)
 
 
 async def pilot(folder):
+    print("begins", flush=True)
     async with MAVLinkVehicle(f"udp:127.0.0.1:{BEHIND}", LIMITS, folder=folder) as link:
         await link.take_off()
         while True:
@@ -110,10 +111,15 @@ def wait_on_ground(station):
 
 def interrupted(station, relay, folder, moment, how, then):
     """One flight that is ended at a moment, and what follows."""
+    station.ask()  # it may have been starting when it was asked before
     del station.notes[:]
     process = subprocess.Popen(
-        [sys.executable, __file__, "pilot", str(folder)], stderr=subprocess.PIPE, text=True
+        [sys.executable, __file__, "pilot", str(folder)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
+    process.stdout.readline()
     time.sleep(moment)
     if how == "kill":
         process.kill()
@@ -170,7 +176,7 @@ def main(count, seed):
                 station,
                 relay,
                 Path(folder, str(number)),
-                draw.uniform(3.0, MOMENTS),
+                draw.uniform(2.0, MOMENTS),
                 ("kill", "cut")[number % 2],
                 ("next", "restore")[number // 2 % 2],
             )

@@ -134,6 +134,7 @@ def without_failsafes(notes):
 
 
 def meddled(station, folder, seed):
+    station.ask()  # it may have been starting when it was asked before
     del station.notes[:]
     ended, warned, done = asyncio.run(flight(folder, seed))
     down = wait_on_ground(station)

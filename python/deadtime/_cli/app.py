@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import warnings
 from typing import Annotated, Any
 
 import typer
@@ -12,6 +13,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from deadtime._base.errors import DeadtimeError
+from deadtime._base.printable import printable
 from deadtime._cli.interruption import INTERRUPTED, ended_by_ctrl_c
 
 #: Errors that end a command with one line; any other is a defect and prints its traceback.
@@ -100,13 +102,20 @@ for _name, _help in COMMANDS.items():
     app.command(_name, help=_help)(_not_loaded)
 
 
+def _show_warning(message: Warning | str, *place: object, **more: object) -> None:
+    """Print a warning as a line, as an error is."""
+    print(f"deadtime: {printable(' '.join(str(message).split()))}", file=sys.stderr)
+
+
 def run() -> None:
     """Run the command; an error is one line on standard error and a non-zero exit code.
 
     An unexpected error is a defect of the package: its traceback is printed.
     """
     try:
-        app()
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            app()
     except SystemExit as ended:
         if ended.code == INTERRUPTED:  # typer says nothing when it ends so
             raise KeyboardInterrupt from None
@@ -124,12 +133,12 @@ def run() -> None:
             )
         elif isinstance(error, MemoryError):
             message = f"out of memory: {message or 'ask for less at once'}"
-        print(f"deadtime: {' '.join(message.split())}", file=sys.stderr)
+        print(f"deadtime: {printable(' '.join(message.split()))}", file=sys.stderr)
         raise SystemExit(1) from None
     except Exception as error:
         import traceback
 
-        traceback.print_exc()
+        print(printable(traceback.format_exc()), file=sys.stderr)
         print(
             f"deadtime: the command has failed internally ({type(error).__name__}); this is a "
             "defect, please report it with the lines above and the command",

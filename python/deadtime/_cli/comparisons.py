@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rich.table import Table
 
+from deadtime._base.printable import printable
 from deadtime.estimation import (
     COLUMNS,
     PLANT_COLUMNS,
@@ -37,5 +38,5 @@ def _table(
         table.add_column(head, justify="left" if head in left else "right", no_wrap=True)
     for row in rows:
         # A reason does not fit into a cell; it is said in full below the table.
-        table.add_row(*(row if len(row) > 2 else [row[0], "refused"]))
+        table.add_row(*map(printable, row if len(row) > 2 else [row[0], "refused"]))
     return table

@@ -55,7 +55,7 @@ Texts: TypeAlias = list[str] | None
 def command(
     *,
     vehicle: Annotated[
-        Given, Fills(VehicleOptions, "host link consent=--i-have-a-safe-area plant")
+        Given, Fills(VehicleOptions, "host link key consent=--i-have-a-safe-area plant")
     ],
     axes: Annotated[str, typer.Option(metavar="AXIS,…")] = "z",
     gains: Annotated[Texts, typer.Option(metavar="[AXIS=]K,…")] = None,
@@ -65,6 +65,7 @@ def command(
     beyond: Annotated[Given, Fills(Limits, "max_height max_speed max_distance")],
     times: Annotated[Given, Fills(FlightPlan, "hold")],
     folder: Path | None = None,
+    restore: bool = False,
     adapt: bool = False,
     adaptive: Annotated[Given, Fills(AdaptivePlan, "longest", longest=LONGEST)],
     emulated: Annotated[Given, Fills(VehicleOptions, "moving_delay seed virtual_time")],
@@ -86,10 +87,16 @@ def command(
         than z with its name: x=1 (may be repeated).
     folder
         Where recordings and report go. Without: flight, flight-2, …
+    restore
+        Fly nothing: put back the parameters that an earlier run has left changed in the vehicle at
+        --link, by its file in the --folder or the working directory.
     adapt
         Afterwards fly gains that follow the delay beside robust ones, both proved.
     """
     chosen = VehicleOptions(**vehicle, **emulated, ports=ports)
+    if restore:
+        _print_restored(chosen.restored(folder), as_json)
+        return
     if max_climb is None:
         max_climb = EMULATED_CLIMB if chosen.elsewhere is None else REAL_CLIMB
     limits = Limits(max_climb=max_climb, **beyond)
@@ -104,7 +111,7 @@ def command(
     follow = AdaptivePlan(**adaptive) if adapt else None
     try:
         with (
-            chosen.flown(limits, start["base"], moving) as flown,
+            chosen.flown(limits, start["base"], moving, where) as flown,
             stages(count, quiet=as_json) as begin,
         ):
             found = fly_and_report(flown, plans, where, follow, begin, _print_note)
@@ -183,6 +190,13 @@ def _print_plan(plans: list[FlightPlan], vehicle: str) -> None:
     axes = tuple(plan.axis for plan in plans)
     for line in (*(plan.line() for plan in plans), *plans[0].limits.lines(axes)):
         print_text(f"  {line}", wrapped=False, on=ERRORS)
+
+
+def _print_restored(said: list[str], as_json: bool) -> None:
+    if as_json:
+        print_json("restored", {"restored": said})
+    else:
+        print_text("\n".join(said) or "no earlier run has left anything changed in the vehicle")
 
 
 def _print_report(found: FlightReport) -> None:

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from deadtime._base.drawing import check_matplotlib
 from deadtime._base.plain import json_text
+from deadtime._base.printable import printable
 from deadtime._cli.readable import shows
 
 if TYPE_CHECKING:
@@ -30,7 +31,9 @@ PICTURES = (".png", ".svg", ".pdf")
 def print_json(schema: str, found: Mapping[str, Any]) -> None:
     """Print values as JSON."""
     text = json_text(schema, found)
-    print(text if shows(text) else json.dumps(json.loads(text), indent=2))
+    print(
+        text if shows(text) and printable(text) == text else json.dumps(json.loads(text), indent=2)
+    )
 
 
 def print_table(table: Table) -> None:
@@ -50,15 +53,15 @@ def results_table(
     for head in heads:
         table.add_column(head, justify="left" if head in left else "right")
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     return table
 
 
 def print_text(
     text: str, style: str | None = None, wrapped: bool = True, on: Console = console
 ) -> None:
-    """Print a text as it is: nothing in it is markup or highlighted."""
-    on.print(text, style=style, highlight=False, markup=False, soft_wrap=not wrapped)
+    """Print a text as it is: nothing in it is markup or highlighted, or obeyed by a terminal."""
+    on.print(printable(text), style=style, highlight=False, markup=False, soft_wrap=not wrapped)
 
 
 def print_points(sentences: Iterable[str]) -> None:
@@ -100,7 +103,7 @@ def _bar(what: str, total: int, quiet: bool) -> Iterator[Callable[..., object]]:
     words = TextColumn("{task.description}")
     columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=ERRORS, transient=True) as progress:
-        yield partial(progress.update, progress.add_task(what, total=total))
+        yield partial(progress.update, progress.add_task(printable(what), total=total))
 
 
 @contextmanager
@@ -128,4 +131,4 @@ def stages(count: int, quiet: bool) -> Iterator[Callable[[str], object]]:
     """A progress bar over named stages, on standard error; call it as each stage begins."""
     begun = itertools.count()
     with _bar("", count, quiet) as change:
-        yield lambda stage: change(description=stage, completed=next(begun))
+        yield lambda stage: change(description=printable(stage), completed=next(begun))

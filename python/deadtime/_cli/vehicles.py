@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,10 +13,10 @@ import typer
 from deadtime._base.bounds import Bounds
 from deadtime._cli.own_emulator import own_emulator
 from deadtime.flights import FlownVehicle, MovingDelay
-from deadtime.links import Limits, terminated_like_interrupted
+from deadtime.links import Limits, run_landing, terminated_like_interrupted
 from deadtime.links.ardrone2.emulator import EmulatorOptions
 from deadtime.links.ardrone2.emulator.motion import PlantName
-from deadtime.links.mavlink import LinkAddress
+from deadtime.links.mavlink import LinkAddress, MAVLinkVehicle, read_key
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,9 @@ class VehicleOptions:
         Vehicle with ArduPilot or PX4: udp:HOST:PORT waits there for it, udpout:HOST:PORT sends
         first, tcp:HOST:PORT connects, serial:DEVICE:BAUD is a serial port. Several links to it have
         commas between them.
+    key : Path, optional
+        File with the signing key of the --link: 32 bytes, or 64 hexadecimal digits. What is not
+        signed is refused then.
     consent : bool
         Needed with --host, and with a --link to another computer or to what is no simulator: a
         vehicle is about to take off there.
@@ -48,6 +52,7 @@ class VehicleOptions:
 
     host: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None
     link: Annotated[str | None, typer.Option(metavar="KIND:HOST:PORT,…")] = None
+    key: Path | None = None
     consent: bool = False
     plant: PlantName = EmulatorOptions.plant
     moving_delay: Annotated[str | None, typer.Option(metavar="FIRST,LONGEST")] = None
@@ -58,6 +63,8 @@ class VehicleOptions:
     def __post_init__(self) -> None:
         if self.host is not None and self.link is not None:
             raise ValueError("--host is an AR.Drone, --link ArduPilot or PX4: take one")
+        if self.key is not None and self.link is None:
+            raise ValueError("--key signs a --link: give one")
 
     @property
     def elsewhere(self) -> str | None:
@@ -99,9 +106,20 @@ class VehicleOptions:
             ) from None
         return MovingDelay((first, longest))
 
+    def restored(self, folder: Path | None) -> list[str]:
+        """Put back what earlier runs have left changed over the link; what was done."""
+        if self.link is None:
+            raise ValueError("--restore is for a vehicle over --link: give one")
+        with terminated_like_interrupted():
+            link = MAVLinkVehicle(self.link, key=self._key(), folder=folder)
+            return run_landing(link.restore())
+
+    def _key(self) -> bytes | None:
+        return None if self.key is None else read_key(self.key)
+
     @contextmanager
     def flown(
-        self, limits: Limits, height: float, moving: MovingDelay | None
+        self, limits: Limits, height: float, moving: MovingDelay | None, folder: Path
     ) -> Iterator[FlownVehicle]:
         """The vehicle; outside virtual time each signal that ends the command lands it first."""
         emulated = FlownVehicle.emulated(self.plant, self.seed, limits, moving)
@@ -111,7 +129,9 @@ class VehicleOptions:
         with ExitStack() as stack:
             stack.enter_context(terminated_like_interrupted())
             if self.link is not None:
-                found = FlownVehicle.over_mavlink(self.link, limits, height, not self.consent)
+                found = FlownVehicle.over_mavlink(
+                    self.link, limits, height, not self.consent, self._key(), folder
+                )
             elif self.host is not None:
                 found = FlownVehicle.ardrone2(self.host, limits, **self.ports)
             else:

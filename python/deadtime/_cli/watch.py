@@ -16,7 +16,7 @@ from deadtime._cli.fills import Fills, Given, filled
 from deadtime._cli.show import print_json, print_text
 from deadtime._cli.watch_page import WatchPage
 from deadtime.estimation import DelayTrack, OnlineEstimate, OnlineEstimator
-from deadtime.links.mavlink import LinkAddress, heard_rows
+from deadtime.links.mavlink import LinkAddress, heard_rows, read_key
 from deadtime.recordings import Row, Sent, growing_rows, read_recording
 
 
@@ -36,6 +36,7 @@ def command(
     ],
     follow: bool = False,
     axis: Literal["x", "y", "z"] = "z",
+    key: Path | None = None,
     silence: float = math.inf,
     every: float = 1.0,
     page: bool = False,
@@ -59,6 +60,9 @@ def command(
         The file grows: wait for further lines.
     axis
         Of a link.
+    key
+        File with the signing key of the link: 32 bytes, or 64 hexadecimal digits. What is not
+        signed is refused then.
     silence
         End after so many seconds without a line or message.
     every
@@ -76,7 +80,7 @@ def command(
     if shown is not None and not as_json:
         print_text(f"page: {shown.address}")
     found: list[OnlineEstimate] = []
-    events = _events(source, (time, output, command), follow, axis, silence)
+    events = _events(source, (time, output, command), follow, axis, silence, key)
     rows = 0
     try:
         for estimate in _estimates(estimator, events):
@@ -104,10 +108,18 @@ def command(
 
 
 def _events(
-    source: str, columns: tuple[str, str, str], follow: bool, axis: str, silence: float
+    source: str,
+    columns: tuple[str, str, str],
+    follow: bool,
+    axis: str,
+    silence: float,
+    key: Path | None,
 ) -> Iterator[Row | Sent]:
     if source.startswith(("udp:", "udpout:", "tcp:")):
-        return heard_rows(LinkAddress.of(source), axis, silence)
+        secret = None if key is None else read_key(key)
+        return heard_rows(LinkAddress.of(source), axis, silence, secret)
+    if key is not None:
+        raise ValueError(f"--key signs a link, and {source} is a file")
     if follow:
         return growing_rows(Path(source), columns, silence)
     return recorded_rows(Path(source), columns)

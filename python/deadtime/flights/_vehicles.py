@@ -7,6 +7,7 @@ import itertools
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -123,7 +124,13 @@ class FlownVehicle:
 
     @classmethod
     def over_mavlink(
-        cls, link: str, limits: Limits, take_off_height: float = 1.0, simulated: bool = False
+        cls,
+        link: str,
+        limits: Limits,
+        take_off_height: float = 1.0,
+        simulated: bool = False,
+        key: bytes | None = None,
+        folder: Path | None = None,
     ) -> FlownVehicle:
         """A vehicle with ArduPilot or PX4.
 
@@ -137,13 +144,22 @@ class FlownVehicle:
             Height that it takes off to, m.
         simulated : bool
             Whether anything but a simulator is refused.
+        key : bytes, optional
+            Signing key, 32 bytes.
+        folder : Path, optional
+            Where the old values of parameters are kept while they are changed.
         """
         times: list[LinkTime] = []
 
         @asynccontextmanager
         async def connect() -> AsyncIterator[Vehicle]:
             async with MAVLinkVehicle(
-                link, limits, take_off_height=take_off_height, simulated=simulated
+                link,
+                limits,
+                take_off_height=take_off_height,
+                simulated=simulated,
+                key=key,
+                folder=folder,
             ) as vehicle:
                 yield vehicle
                 if vehicle.link_time is not None:

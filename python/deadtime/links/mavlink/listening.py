@@ -25,7 +25,9 @@ AXES = {"x": ("x", "vx", 1.0), "y": ("y", "vy", 1.0), "z": ("z", "vz", -1.0)}
 LATER = 1e-6
 
 
-def heard_rows(address: LinkAddress, axis: str, silence: float) -> Iterator[Row | Sent]:
+def heard_rows(
+    address: LinkAddress, axis: str, silence: float, key: bytes | None = None
+) -> Iterator[Row | Sent]:
     """Set points and positions on a MAVLink link, until nothing has come for `silence` s.
 
     The socket only receives: nothing is ever sent. Whoever routes the link has to pass on the
@@ -39,6 +41,8 @@ def heard_rows(address: LinkAddress, axis: str, silence: float) -> Iterator[Row 
         The position to the north, to the east, or the height.
     silence : float
         How long it is waited for another message of the axis, s; infinity for ever.
+    key : bytes, optional
+        Signing key, 32 bytes: unsigned frames are refused then.
 
     Yields
     ------
@@ -48,14 +52,14 @@ def heard_rows(address: LinkAddress, axis: str, silence: float) -> Iterator[Row 
     Raises
     ------
     ValueError
-        If the address is of another kind.
+        If the address is of another kind, or the key has another length.
     LinkError
         If it cannot be opened.
     """
     if address.kind != "udp":
         raise ValueError(f"{address}: give udp:HOST:PORT, at which a link is listened to")
     position, speed, sign = AXES[axis]
-    codec, begun = Codec(255, 0), time.monotonic()
+    codec, begun = Codec(255, 0, key), time.monotonic()
     family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
     with closing(socket.socket(family, socket.SOCK_DGRAM)) as ears:
         try:
