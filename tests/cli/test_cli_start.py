@@ -50,7 +50,11 @@ def test_a_command_loads_no_other():
     _, own = loaded("roots", "--help")
     commands = {f"deadtime._cli.{name.replace('-', '_')}" for name in COMMANDS}
     assert own & commands == {"deadtime._cli.roots"}
-    assert not {name for name in own if name.startswith(("deadtime.estimation", "deadtime.dde"))}
+    assert not {
+        name
+        for name in own
+        if name.startswith(("deadtime.estimation", "deadtime.dde", "deadtime.recordings"))
+    }
 
 
 def test_the_version_is_that_of_the_package():

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from deadtime._cli import options as opt
+from deadtime._cli.columns import COLUMNS
 from deadtime._cli.fills import Given, filled
 from deadtime._cli.show import print_json, print_text
 from deadtime.estimation import estimate_delay
@@ -25,7 +26,7 @@ def command(
     delay: float = 0.36,
     numbers: Annotated[Given, opt.LOOP],
     filter: opt.Filter = None,  # noqa: A002
-    columns: Annotated[Given, opt.COLUMNS],
+    columns: Annotated[Given, COLUMNS],
     window: opt.Window = None,
     out: Path | None = None,
     as_json: opt.As_json = False,

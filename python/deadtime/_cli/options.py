@@ -25,7 +25,6 @@ from deadtime.loops import (
     P,
     RationalPlant,
 )
-from deadtime.recordings import read_recording
 
 
 def _drawn_later(path: Path | None) -> Path | None:
@@ -82,16 +81,6 @@ Flight = Annotated[
     ),
 ]
 
-
-#: The columns of a table that is read.
-COLUMNS = Fills(
-    read_recording,
-    "time reference output command",
-    time=Time,
-    reference=Reference,
-    output=Output,
-    command=Command,
-)
 
 #: Upper limit on the ratio of the simulated time to the shortest time of the loop (bounds time).
 MOST_PARTS = 1e6

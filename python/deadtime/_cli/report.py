@@ -7,6 +7,7 @@ from typing import Annotated
 
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
+from deadtime._cli.columns import COLUMNS
 from deadtime._cli.fills import Fills, Given, filled
 from deadtime._cli.show import print_json, print_text, stages
 from deadtime.recordings import read_recording
@@ -18,7 +19,7 @@ def command(
     *,
     file: opt.File,
     kp: opt.Kp,
-    columns: Annotated[Given, opt.COLUMNS],
+    columns: Annotated[Given, COLUMNS],
     numbers: Annotated[Given, Fills(opt.described_loop, "sample_time limit plant gain")],
     window: opt.Window = None,
     out: Path = Path("report.html"),
