@@ -14,20 +14,32 @@ BINDINGS = ROOT / "rust" / "bindings" / "src"
 # What each package of the core may use besides itself; every package may use the foundation.
 FOUNDATION = {"error", "memory", "simd", "status", "task"}
 CORE_ARROWS = {
+    "linear_algebra": set(),
     "lambertw": set(),
     "elementary": set(),
-    "eigenvalues": set(),
     "quasipoly": {"elementary"},
-    "roots": {"eigenvalues", "elementary", "lambertw", "quasipoly"},
+    "roots": {"linear_algebra", "elementary", "lambertw", "quasipoly"},
     # Loops with a hold are stepped in `dde`.
-    "stability": {"elementary", "lambertw", "quasipoly", "roots", "dde"},
+    "stability": {"linear_algebra", "elementary", "lambertw", "quasipoly", "roots", "dde"},
     "frequency": {"elementary", "quasipoly", "roots", "stability"},
-    "dde": {"eigenvalues", "elementary", "quasipoly"},
-    "estimation": {"dde"},
+    "dde": {"linear_algebra", "elementary"},
+    "estimation": {"linear_algebra"},
 }
 
 # Files and folders of a package in order: each uses only those before it.
 ORDER = {
+    "linear_algebra": [
+        "vectors",
+        "rows",
+        "banded",
+        "elimination",
+        "lu",
+        "cholesky",
+        "triangle",
+        "balance",
+        "hessenberg",
+        "eigenvalues",
+    ],
     "roots": ["region", "disc", "root_set", "chains", "counting", "locating", "matrix"],
     "stability": [
         "family",
@@ -70,7 +82,6 @@ ORDER = {
         "propagation",
         "steps",
         "path",
-        "orthogonal",
         "whiten",
         "noises",
         "kicks",

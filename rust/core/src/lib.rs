@@ -2,18 +2,18 @@
 //! differential equations, the likelihood of recordings.
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
-//! Python. Dependencies run one way: error, simd ← lambertw; eigenvalues ← roots, dde; error ← elementary ← quasipoly ← roots
-//! ← stability ← frequency; quasipoly ← dde ← estimation, stability.
+//! Python. Dependencies run one way: error, simd ← linear_algebra, lambertw, elementary ← quasipoly
+//! ← roots ← stability ← frequency; linear_algebra ← dde ← stability; linear_algebra ← estimation.
 
 #[macro_use]
 pub mod error;
 
 pub mod dde;
-mod eigenvalues;
 pub mod elementary;
 pub mod estimation;
 pub mod frequency;
 pub mod lambertw;
+mod linear_algebra;
 pub mod memory;
 pub mod quasipoly;
 pub mod roots;

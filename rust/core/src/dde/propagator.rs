@@ -13,24 +13,13 @@
 //! non-normal A.
 
 use super::scalar::Scalar;
-
-/// Share of the norm below which a scaling of balancing is made.
-const BALANCED: f64 = 0.95;
-
-/// Least size of a row or column in balancing, as a share of the diagonal.
-const LEAST_SIDE: f64 = 0.125;
-
-/// Largest exponent of a scaling.
-const MOST_EXPONENT: f64 = 500.0;
+use crate::linear_algebra::balance;
 
 /// Largest ‖A‖₁ h for which the series is summed without doubling.
 const REACH: f64 = 0.5;
 
 /// Number of terms: 0.5^17/17! is below 1e-19.
 const TERMS: u32 = 17;
-
-/// Upper limit on the rounds of balancing; few are needed for few states.
-const ROUNDS: usize = 100;
 
 /// Φ and the Γ_i of one step length.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,63 +155,10 @@ pub(crate) fn multiply_add<S: Scalar>(a: &[S], x: &[S], out: &mut [S]) {
     }
 }
 
-/// ‖D⁻¹ A D‖₁, the largest column sum, with D of `balanced`.
+/// ‖D⁻¹ A D‖₁ of the values of A, balanced.
 pub(crate) fn balanced_norm<S: Scalar>(a: &[S], n: usize) -> f64 {
-    norm(&balanced(a, n).0, n)
-}
-
-/// D⁻¹ A D and the exponents k of D = diag(2^k), chosen to make its norm small.
-///
-/// Osborne 1960, in powers of two: each state in turn is scaled until its row and its column,
-/// diagonal left out, are of one size. A state with an empty row or column can be scaled by any
-/// factor. It is scaled until the other entry is negligible beside the diagonal.
-pub(crate) fn balanced<S: Scalar>(a: &[S], n: usize) -> (Vec<f64>, Vec<i32>) {
-    let mut a: Vec<f64> = a.iter().map(|a| a.value()).collect();
-    let mut exponents = vec![0; n];
-    let diagonal = (0..n).fold(0.0_f64, |most, i| most.max(a[i * n + i].abs()));
-    let floor = (LEAST_SIDE * diagonal).max(f64::MIN_POSITIVE);
-    for _ in 0..ROUNDS {
-        let mut settled = true;
-        for i in 0..n {
-            let others = (0..n).filter(|&j| j != i);
-            let column: f64 = others.clone().map(|j| a[j * n + i].abs()).sum();
-            let row: f64 = others.map(|j| a[i * n + j].abs()).sum();
-            if column.max(row) <= floor {
-                continue;
-            }
-            // A chain of integrators alone has no rate at which to stop.
-            if (column == 0.0 || row == 0.0) && diagonal == 0.0 {
-                continue;
-            }
-            let (column, row) = (column.max(floor), row.max(floor));
-            let exponent = (0.5 * libm::log2(row / column))
-                .round()
-                .clamp(-MOST_EXPONENT, MOST_EXPONENT);
-            let factor = libm::exp2(exponent);
-            if column * factor + row / factor >= BALANCED * (column + row) {
-                continue;
-            }
-            settled = false;
-            exponents[i] += exponent as i32;
-            for j in 0..n {
-                if j != i {
-                    a[j * n + i] *= factor;
-                    a[i * n + j] /= factor;
-                }
-            }
-        }
-        if settled {
-            break;
-        }
-    }
-    (a, exponents)
-}
-
-/// ‖A‖₁, the largest column sum.
-fn norm(a: &[f64], n: usize) -> f64 {
-    (0..n)
-        .map(|column| (0..n).map(|row| a[row * n + column].abs()).sum())
-        .fold(0.0, f64::max)
+    let values: Vec<f64> = a.iter().map(|a| a.value()).collect();
+    balance::balanced_norm(&values, n)
 }
 
 fn side<S>(a: &[S]) -> usize {
@@ -301,16 +237,6 @@ mod tests {
         // Poles −1000, −1300 and −1 in observable canonical form: entries up to 1.3e6, rates up
         // to 1.3e3.
         let a = [-2301.0, 1.0, 0.0, -1_302_300.0, 0.0, 1.0, -1.3e6, 0.0, 0.0];
-        assert!(balanced_norm(&a, 3) < 6e3);
-        let slow: Vec<f64> = a.iter().map(|a| a * 2f64.powi(-30)).collect();
-        assert_eq!(
-            balanced_norm(&slow, 3),
-            balanced_norm(&a, 3) * 2f64.powi(-30)
-        );
-        // A lag before an integrator: the unit of the integrator is arbitrary.
-        assert!(balanced_norm(&[-1e-6, 1.0, 0.0, 0.0], 2) < 2e-6);
-        assert_eq!(balanced_norm(&[0.0, 3.0, 0.0, 0.0], 2), 3.0);
-        assert_eq!(balanced_norm::<f64>(&[], 0), 0.0);
         // x₁ after a unit impulse on the last state, by partial fractions.
         let h: f64 = 0.0325;
         let found = Propagator::new(&a, &[&[0.0, 0.0, 1.0]], h).phi()[2];
@@ -346,7 +272,7 @@ mod tests {
             };
             let whole = step(first + second, &x);
             let parts = step(second, &step(first, &x));
-            let size = (norm(&a, 3) * (first + second)).exp();
+            let size = (balance::norm(&a, 3) * (first + second)).exp();
             for (whole, part) in whole.iter().zip(&parts) {
                 prop_assert!((whole - part).abs() <= 1e-14 * size);
             }

@@ -17,11 +17,11 @@ use super::disturbance::{Disturbance, Entry, Joint};
 use super::kicks::kicks;
 use super::mean::{Derivatives, Gain, Mean, Values, sizes};
 use super::noises::{One, Shared, triangles};
-use super::orthogonal::Triangle;
-use super::path::dot;
 use super::plant::{Plant, PlantSpace};
 use super::rows::Rows;
 use super::whiten::{Kick, Known, whiten_in_place};
+use crate::linear_algebra::triangle::Triangle;
+use crate::linear_algebra::vectors::dot;
 use crate::{Error, Task, memory};
 
 /// Smallest sum of squares, as a share of that of the output: below is rounding.

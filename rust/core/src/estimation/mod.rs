@@ -18,7 +18,6 @@ mod likelihood;
 mod mean;
 mod noises;
 mod online;
-mod orthogonal;
 mod over_delays;
 mod path;
 mod plant;

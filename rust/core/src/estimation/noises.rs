@@ -2,7 +2,7 @@
 //!
 //! Difference quotients by the numbers of the noise take most of the evaluations of a search. Their
 //! columns are the same, and so are the operations of the Kalman pass of `whiten`: each lane of a
-//! register takes one noise. The whitened rows are not kept; R of `orthogonal` is made of them block
+//! register takes one noise. The whitened rows are not kept; R of `triangle` is made of them block
 //! by block.
 
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
@@ -10,10 +10,10 @@ use pulp::{Simd, WithSimd};
 
 use super::disturbance::Joint;
 use super::kept::Kept;
-use super::orthogonal::Triangle;
 use super::path::{SETTLED, settled};
 use super::propagation::Propagation;
 use super::whiten::{Kick, LARGE, SAME_ROWS};
+use crate::linear_algebra::triangle::Triangle;
 use crate::simd::Instructions;
 use crate::{Error, Task, memory};
 

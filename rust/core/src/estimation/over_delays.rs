@@ -6,11 +6,11 @@
 use super::disturbance::Joint;
 use super::likelihood::{Counts, Noise};
 use super::mean::{Derivatives, Gain, Values, base_of, sizes, trim_of};
-use super::orthogonal::Triangle;
 use super::path::{Held, respond};
 use super::plant::{Plant, PlantSpace};
 use super::rows::Rows;
 use super::whiten::{Known, whiten_in_place};
+use crate::linear_algebra::triangle::Triangle;
 use crate::{Error, Task, memory};
 
 /// Deviation from even times, and of a delay from a rest, in rows.

@@ -160,27 +160,6 @@ fn product<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Sums that a dot product is split into, so that they are computed side by side.
-const SUMS: usize = 8;
-
-#[inline(always)]
-pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut sums = [0.0; SUMS];
-    let (left, right) = (x.chunks_exact(SUMS), y.chunks_exact(SUMS));
-    let rest: f64 = left
-        .remainder()
-        .iter()
-        .zip(right.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in left.zip(right) {
-        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
-            *sum += x * y;
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -302,15 +281,6 @@ mod tests {
         let (found, rate) = response(plant, &inputs, 0.2, &times);
         for (found, rate) in found.chunks_exact(3).zip(rate.chunks_exact(3)) {
             assert!(((found[2] - found[0]) / (2.0 * step) - rate[1]).abs() < 1e-6);
-        }
-    }
-
-    #[test]
-    fn a_dot_product_of_any_length_is_one() {
-        for length in 0..40 {
-            let x: Vec<f64> = (0..length).map(f64::from).collect();
-            let n = f64::from(length);
-            assert_eq!(dot(&x, &x), (n - 1.0) * n * (2.0 * n - 1.0) / 6.0);
         }
     }
 

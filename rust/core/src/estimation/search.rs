@@ -13,6 +13,7 @@ use std::ops::Range;
 use super::likelihood::Wanted;
 use super::quotients::{Around, Function, Quotients, Slack, Value, Variable, keep_within, shorten};
 use crate::Error;
+use crate::linear_algebra::cholesky::inverse_of_positive;
 
 /// Most iterations, and those over the first variables alone.
 const ITERATIONS: usize = 60;
@@ -79,7 +80,7 @@ fn descend(
     let (n, known) = (x.len(), found.slope.len());
     let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
     for _ in 0..FIRST_ITERATIONS {
-        let Some(inverse) = inverted(&found.curvature, known) else {
+        let Some(inverse) = inverse_of_positive(&found.curvature, known, RIDGE) else {
             break;
         };
         let slack = function.slack(&x);
@@ -234,7 +235,7 @@ impl Near {
         for (i, bend) in quotients.curvature.iter().enumerate() {
             inverse[i * n + i] = 1.0 / bend;
         }
-        if let Some(first) = inverted(&found.curvature, known) {
+        if let Some(first) = inverse_of_positive(&found.curvature, known, RIDGE) {
             for (to, from) in inverse
                 .chunks_exact_mut(n)
                 .zip(first.chunks_exact(known.max(1)))
@@ -261,44 +262,6 @@ impl Near {
         );
         self.gradient = slopes;
     }
-}
-
-/// The inverse of a matrix of this size, by Cholesky's method on its unit diagonal; none for one that
-/// is not positive definite.
-fn inverted(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
-    let scales: Vec<f64> = (0..n).map(|i| matrix[i * n + i].sqrt().recip()).collect();
-    if !scales.iter().all(|scale| scale.is_finite() && *scale > 0.0) {
-        return None;
-    }
-    let mut l = vec![0.0; n * n];
-    for i in 0..n {
-        for j in 0..=i {
-            let scaled = matrix[i * n + j] * scales[i] * scales[j];
-            let left = scaled - product(&l[i * n..][..j], &l[j * n..][..j]);
-            l[i * n + j] = if i > j {
-                left / l[j * n + j]
-            } else if left + RIDGE > 0.0 {
-                (left + RIDGE).sqrt()
-            } else {
-                return None;
-            };
-        }
-    }
-    // The solutions for the unit vectors.
-    let mut inverse = vec![0.0; n * n];
-    for unit in 0..n {
-        let mut column = vec![0.0; n];
-        for i in unit..n {
-            let done: f64 = (unit..i).map(|k| l[i * n + k] * column[k]).sum();
-            column[i] = (f64::from(u8::from(i == unit)) - done) / l[i * n + i];
-        }
-        for i in (0..n).rev() {
-            let done: f64 = (i + 1..n).map(|k| l[k * n + i] * column[k]).sum();
-            column[i] = (column[i] - done) / l[i * n + i];
-            inverse[unit * n + i] = column[i] * scales[unit] * scales[i];
-        }
-    }
-    Some(inverse)
 }
 
 /// −H g, no longer than allowed: the least of the quadratic model with the variables that would leave

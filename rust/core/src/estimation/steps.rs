@@ -8,7 +8,7 @@
 use super::kept::Kept;
 use super::plant::PlantSpace;
 use super::propagation::{Square, add, product, scaled};
-use crate::dde::propagator::balanced_norm;
+use crate::linear_algebra::balance::balanced_norm;
 
 /// Largest ‖A‖₁ h, of A balanced, for which the series is summed without doubling.
 const REACH: f64 = 0.5;

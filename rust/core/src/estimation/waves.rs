@@ -9,10 +9,10 @@ use std::f64::consts::PI;
 
 use super::likelihood::{Counts, Through, Whitening, check_count, clear};
 use super::mean::{Derivatives, Gain, Mean, Values, base_of, sizes};
-use super::orthogonal::Triangle;
 use super::path::{Held, respond};
 use super::plant::{Plant, PlantSpace};
 use super::rows::Rows;
+use crate::linear_algebra::triangle::Triangle;
 use crate::{Error, Task, memory};
 
 /// What memory is asked for.

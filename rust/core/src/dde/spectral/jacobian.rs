@@ -10,10 +10,10 @@
 //! component at a time. Columns come in blocks, so that memory grows with the entries and not with
 //! the square of the components.
 
-use super::dense::add_multiple;
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation};
 use super::sparsity::Sparsity;
+use crate::linear_algebra::vectors::add_multiple;
 use crate::{Error, Task};
 
 /// Number of columns in which all components move.

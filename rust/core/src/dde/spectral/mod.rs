@@ -11,12 +11,10 @@
 //! local, as in every method of this
 //! kind; how errors of the past grow depends on the equation.
 
-mod banded;
 pub mod breaks;
 mod chebyshev;
 mod control;
 mod delayed;
-mod dense;
 mod element;
 mod events;
 mod fit;

@@ -9,7 +9,6 @@
 //! the same length.
 
 use super::delayed::Delayed;
-use super::dense::{Factors, add_multiple};
 use super::jacobian::{ALONE, Differences, Jacobian, Point};
 use super::nodes::Nodes;
 use super::problem::{Columns, Equation};
@@ -18,6 +17,8 @@ use super::scalar::Scalar;
 use super::shifted::Shifted;
 use super::sizes::{largest, largest_of};
 use super::sparsity::Sparsity;
+use crate::linear_algebra::lu::Lu;
+use crate::linear_algebra::vectors::add_multiple;
 use crate::{Error, Task};
 
 /// Largest number of unknowns of a system that is solved as a whole.
@@ -53,7 +54,7 @@ pub(super) struct Newton {
     diagonal: Option<Diagonal>,
     /// (h/2, order) of the factors.
     key: Option<(f64, usize)>,
-    whole: Option<Factors>,
+    whole: Option<Lu>,
     shifted: Option<Shifted>,
     /// One system for each distinct entry of the diagonal, in their order.
     single: Vec<Single>,
@@ -390,7 +391,7 @@ impl Newton {
                     add_multiple(&mut matrix[at..at + order], -half * value, weights);
                 }
             }
-            self.whole = Factors::new(size, matrix);
+            self.whole = Lu::regular(matrix, size);
             if self.whole.is_none() {
                 return false;
             }

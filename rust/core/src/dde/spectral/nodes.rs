@@ -13,8 +13,8 @@
 use std::sync::OnceLock;
 
 use super::chebyshev;
-use super::dense::Factors;
 use super::products::{Rows, multiply, transposed};
+use crate::linear_algebra::lu::Lu;
 
 /// The numbers of nodes to choose from.
 pub(super) const ORDERS: [usize; 12] = [4, 6, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48];
@@ -115,7 +115,7 @@ fn inverse_of_basis(points: &[f64], n: usize) -> Vec<f64> {
     chebyshev::basis(points, n, &mut table);
     let rows = (0..n * n).map(|at| table[(at % n) * n + at / n]).collect();
     // Distinct points make a regular matrix.
-    Factors::new(n, rows).map_or_else(|| vec![0.0; n * n], |factors| factors.inverse())
+    Lu::regular(rows, n).map_or_else(|| vec![0.0; n * n], |factors| factors.inverse())
 }
 
 /// P_{n−1} and P_n at x.
@@ -185,7 +185,7 @@ mod tests {
                 .map(|x| f64::from(power) * x.powi(power - 1))
                 .collect();
             for (row, x) in nodes.integrate.chunks_exact(order).zip(&nodes.points[1..]) {
-                let sum = super::super::dense::dot(row, &slopes);
+                let sum = crate::linear_algebra::vectors::dot(row, &slopes);
                 assert!((sum - (x.powi(power) - start)).abs() < 2e-13, "{order} {x}");
             }
             let values: Vec<f64> = nodes.points.iter().map(|x| x.powi(power)).collect();
@@ -203,6 +203,6 @@ mod tests {
         // Exact to degree 2N − 2: ∫ x^14 = 2/15.
         let values: Vec<f64> = nodes.points[1..].iter().map(|x| x.powi(14)).collect();
         let weights = &nodes.integrate[7 * 8..];
-        assert!((super::super::dense::dot(weights, &values) - 2.0 / 15.0).abs() < 1e-14);
+        assert!((crate::linear_algebra::vectors::dot(weights, &values) - 2.0 / 15.0).abs() < 1e-14);
     }
 }

@@ -164,9 +164,9 @@ fn add(row: &mut [f64], factor: f64, other: &[f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dense::dot;
     use super::super::nodes::{ORDERS, nodes};
     use super::*;
+    use crate::linear_algebra::vectors::dot;
 
     #[test]
     fn the_solution_satisfies_the_full_system() {

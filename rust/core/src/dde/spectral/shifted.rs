@@ -9,15 +9,16 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector, DVectorViewMut, Dyn, LU};
 use num_complex::Complex64;
 
-use super::banded::Banded;
-use super::dense::add_multiple;
 use super::jacobian::Jacobian;
 use super::nodes::{COUPLED, Nodes};
 use super::products::transposed;
-use crate::eigenvalues::eigenvalues;
+use crate::linear_algebra::banded::Banded;
+use crate::linear_algebra::eigenvalues::eigenvalues;
+use crate::linear_algebra::elimination::Eliminated;
+use crate::linear_algebra::rows::Rows;
+use crate::linear_algebra::vectors::add_multiple;
 
 /// Upper limit on the numbers in the factors of all systems together (bounds memory).
 const MOST: usize = 1 << 24;
@@ -54,9 +55,11 @@ fn modes(nodes: &Nodes) -> &'static [Mode] {
             .iter()
             .map(|value| eigenpair(&nodes.integrate, n, *value));
         let (found, columns): (Vec<_>, Vec<_>) = pairs.flatten().unzip();
-        let vectors = (columns.len() == n).then(|| DMatrix::from_columns(&columns));
-        let inverse = vectors.clone().and_then(DMatrix::try_inverse);
-        let (Some(vectors), Some(inverse)) = (vectors, inverse) else {
+        if columns.len() != n {
+            return Vec::new();
+        }
+        let vectors = filled(n, |i, k| columns[k][i]);
+        let Some(inverse) = Eliminated::new(vectors).map(|factors| factors.inverse()) else {
             return Vec::new();
         };
         let modes = (0..n).filter(|k| found[*k].im >= 0.0).map(|k| {
@@ -64,10 +67,11 @@ fn modes(nodes: &Nodes) -> &'static [Mode] {
             Mode {
                 value: found[k],
                 into: (0..n)
-                    .map(|i| (inverse[(k, i)].re, inverse[(k, i)].im))
+                    .map(|i| (inverse.get(k, i).re, inverse.get(k, i).im))
                     .unzip(),
-                back: (0..n)
-                    .map(|i| (weight * vectors[(i, k)].re, weight * vectors[(i, k)].im))
+                back: columns[k]
+                    .iter()
+                    .map(|x| (weight * x.re, weight * x.im))
                     .unzip(),
             }
         });
@@ -77,30 +81,39 @@ fn modes(nodes: &Nodes) -> &'static [Mode] {
 
 /// Eigenvalue and eigenvector of a real matrix, row-major, close to a computed eigenvalue, by
 /// Rayleigh quotient iteration: their residual is that of rounding.
-fn eigenpair(
-    matrix: &[f64],
-    n: usize,
-    value: Complex64,
-) -> Option<(Complex64, DVector<Complex64>)> {
-    let matrix = DMatrix::from_row_slice(n, n, matrix).map(Complex64::from);
-    let start = (value, DVector::from_element(n, Complex64::ONE));
-    (0..ITERATIONS).try_fold(start, |(value, vector), _| {
+fn eigenpair(matrix: &[f64], n: usize, value: Complex64) -> Option<(Complex64, Vec<Complex64>)> {
+    let start = (value, vec![Complex64::ONE; n]);
+    (0..ITERATIONS).try_fold(start, |(value, mut vector), _| {
         // Beside the eigenvalue, by its own rounding error, so that there are factors.
         let near = value * (1.0 + 4.0 * f64::EPSILON);
-        let shifted = &matrix - DMatrix::from_diagonal_element(n, n, near);
-        let vector = shifted.lu().solve(&vector)?;
-        let length = vector.norm();
-        let vector = vector.unscale(length);
-        let quotient = vector.dotc(&(&matrix * &vector));
+        let shifted = filled(n, |i, k| {
+            matrix[i * n + k] - if i == k { near } else { Complex64::ZERO }
+        });
+        Eliminated::new(shifted)?.solve(&mut vector);
+        let length = vector.iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();
+        vector.iter_mut().for_each(|x| *x /= length);
+        let image =
+            |row: &[f64]| -> Complex64 { row.iter().zip(&vector).map(|(a, x)| x * a).sum() };
+        let images = matrix.chunks_exact(n).map(image);
+        let quotient: Complex64 = vector.iter().zip(images).map(|(x, y)| x.conj() * y).sum();
         (length.is_finite() && quotient.is_finite()).then_some((quotient, vector))
     })
+}
+
+/// The matrix with these entries.
+fn filled(n: usize, entry: impl Fn(usize, usize) -> Complex64) -> Rows {
+    let mut rows = Rows::zeros(n);
+    for i in 0..n {
+        (0..n).for_each(|k| rows.add(i, k, entry(i, k)));
+    }
+    rows
 }
 
 /// The factors of one system.
 #[derive(Debug)]
 enum Factors {
     Banded(Banded),
-    Full(LU<Complex64, Dyn, Dyn>),
+    Full(Eliminated),
 }
 
 /// The factors of all systems for one length and order.
@@ -137,12 +150,12 @@ impl Shifted {
         let factors = modes.iter().map(|mode| {
             let factor = -half * mode.value;
             if full {
-                let mut matrix = DMatrix::<Complex64>::identity(n, n);
+                let mut matrix = Rows::zeros(n);
+                (0..n).for_each(|d| matrix.add(d, d, Complex64::ONE));
                 for (row, column, value) in jacobian.entries() {
-                    matrix[(jacobian.place[row], jacobian.place[column])] += factor * value;
+                    matrix.add(jacobian.place[row], jacobian.place[column], factor * value);
                 }
-                let factors = matrix.lu();
-                factors.is_invertible().then_some(Factors::Full(factors))
+                Eliminated::new(matrix).map(Factors::Full)
             } else {
                 let mut matrix = Banded::new(n, band);
                 for (row, column, value) in jacobian.entries() {
@@ -200,9 +213,7 @@ impl Shifted {
             }
             match factors {
                 Factors::Banded(factors) => factors.solve(&mut x),
-                Factors::Full(factors) => {
-                    factors.solve_mut(&mut DVectorViewMut::from_slice(&mut x, dim));
-                }
+                Factors::Full(factors) => factors.solve(&mut x),
             }
             for ((place, re), im) in self.place.iter().zip(&mut re).zip(&mut im) {
                 (*re, *im) = (x[*place].re, x[*place].im);

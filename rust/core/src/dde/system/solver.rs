@@ -13,6 +13,7 @@
 //! to zero: a stiff A restricts the element only while its fast transients last.
 
 use super::legendre::{DEGREE, TERMS};
+use crate::linear_algebra::lu::Lu;
 
 /// Number of lengths whose factors are stored.
 const KEPT: usize = 4;
@@ -28,7 +29,8 @@ pub(super) struct Solver {
     work: Vec<f64>,
 }
 
-/// Factors that depend on the length of the element.
+/// Factors that depend on the length of the element. A singular one gives numbers that are not
+/// finite, which the check of growth detects.
 #[derive(Debug)]
 struct Factors {
     h: f64,
@@ -190,77 +192,6 @@ fn identity(n: usize) -> Vec<f64> {
         out[i * n + i] = 1.0;
     }
     out
-}
-
-/// A matrix as L U with rows exchanged. A pivot of zero gives infinities, which the caller's check
-/// of growth detects.
-#[derive(Debug)]
-struct Lu {
-    n: usize,
-    /// L below the diagonal, U above, reciprocal pivots on it.
-    entries: Vec<f64>,
-    exchanged: Vec<usize>,
-}
-
-impl Lu {
-    fn new(mut entries: Vec<f64>, n: usize) -> Self {
-        let mut exchanged = Vec::with_capacity(n);
-        for k in 0..n {
-            let size = |i: &usize| entries[i * n + k].abs();
-            let best = (k..n)
-                .max_by(|i, j| size(i).total_cmp(&size(j)))
-                .unwrap_or(k);
-            exchanged.push(best);
-            if best != k {
-                for j in 0..n {
-                    entries.swap(k * n + j, best * n + j);
-                }
-            }
-            let reciprocal = 1.0 / entries[k * n + k];
-            entries[k * n + k] = reciprocal;
-            for i in k + 1..n {
-                let factor = entries[i * n + k] * reciprocal;
-                entries[i * n + k] = factor;
-                if factor != 0.0 {
-                    let (above, below) = entries.split_at_mut(i * n);
-                    let pivot_row = &above[k * n + k + 1..(k + 1) * n];
-                    for (entry, above) in below[k + 1..n].iter_mut().zip(pivot_row) {
-                        *entry -= factor * above;
-                    }
-                }
-            }
-        }
-        Self {
-            n,
-            entries,
-            exchanged,
-        }
-    }
-
-    fn solve(&self, x: &mut [f64]) {
-        let n = self.n;
-        if let [reciprocal] = self.entries[..] {
-            x[0] *= reciprocal;
-            return;
-        }
-        for (k, &row) in self.exchanged.iter().enumerate() {
-            x.swap(k, row);
-        }
-        for i in 1..n {
-            let row = &self.entries[i * n..i * n + i];
-            let known: f64 = row.iter().zip(x.iter()).map(|(l, x)| l * x).sum();
-            x[i] -= known;
-        }
-        for i in (0..n).rev() {
-            let row = &self.entries[i * n..(i + 1) * n];
-            let known: f64 = row[i + 1..]
-                .iter()
-                .zip(&x[i + 1..])
-                .map(|(u, x)| u * x)
-                .sum();
-            x[i] = (x[i] - known) * row[i];
-        }
-    }
 }
 
 #[cfg(test)]

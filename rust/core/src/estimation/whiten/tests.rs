@@ -1,9 +1,9 @@
 //! Compares with dense matrices.
 
 use super::super::disturbance::Entry;
-use super::super::path::dot;
 use super::super::tests::{cholesky, coloured, forward, gaussian, integrated, log_det};
 use super::*;
+use crate::linear_algebra::vectors::dot;
 
 const AIR: Disturbance = Disturbance {
     entry: Entry::Input,

@@ -17,8 +17,8 @@ use std::f64::consts::{LN_2, PI, TAU};
 use num_complex::Complex64;
 
 use super::factor::ROUNDING;
-use super::rows::Rows;
 use crate::elementary::{exp, exp_above, log, sin_cos};
+use crate::linear_algebra::rows::Rows;
 use crate::{Error, Task};
 
 const MARGIN: f64 = 1.0 + 1e-9;

@@ -1,7 +1,7 @@
 //! Factors and inverse of a complex matrix, with bounds on their rounding errors.
 //!
-//! Gaussian elimination with partial pivoting, written out here because the proofs rest on the
-//! rounding errors of exactly these operations. u = 2⁻⁵³; a complex product has the relative error
+//! The proofs rest on the rounding errors of exactly the operations of
+//! `linear_algebra::elimination`, Gaussian elimination with partial pivoting. u = 2⁻⁵³; a complex product has the relative error
 //! √5 u (Brent, Percival and Zimmermann 2007), a sum u, a quotient, computed as the product with
 //! the reciprocal, 6 u. An entry of L or U is a sum of at most n products and a quotient: the
 //! computed factors of the n × n matrix Ĝ, rows permuted, fulfil |Ĝ − L U| ≤ γ |L| |U| with γ =
@@ -13,8 +13,8 @@
 
 use num_complex::Complex64;
 
-use super::kernel::{Eliminated, eliminate};
-use super::rows::Rows;
+use crate::linear_algebra::elimination::Eliminated;
+use crate::linear_algebra::rows::Rows;
 use crate::quasipoly::modulus;
 
 /// Larger than every effect of underflow.
@@ -38,20 +38,15 @@ pub(super) struct Factored {
 
 /// Factor and invert; `None` where a pivot is zero or leaves the usable range.
 pub(super) fn factor(g: Rows) -> Option<Factored> {
-    let Eliminated {
-        lower,
-        upper,
-        inverse,
-        direction,
-    } = eliminate(g)?;
+    let factors = Eliminated::new(g)?;
+    let inverse = factors.inverse();
     let norms = inverse.norms();
-    let residual = residual(&lower, &upper, &norms);
-    let length = modulus(direction);
+    let direction = factors.direction;
     Some(Factored {
+        residual: residual(&factors.lower, &factors.upper, &norms),
         inverse,
         norms,
-        direction: direction / length,
-        residual,
+        direction: direction / modulus(direction),
     })
 }
 

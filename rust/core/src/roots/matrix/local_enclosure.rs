@@ -23,10 +23,10 @@ use num_complex::Complex64;
 use super::balance::{Balanced, balance, exponent};
 use super::factor::{FLOOR, Factored, ROUNDING, factor};
 use super::kernel::combine;
-use super::rows::{Rows, norm};
 use super::system::{CharacteristicMatrix, Term};
 use crate::Error;
 use crate::elementary::{angle, exp, sin_cos};
+use crate::linear_algebra::rows::{Rows, norm};
 use crate::quasipoly::modulus;
 
 /// Largest bound on |Z| along a step. A larger one gives longer steps and wider angles.

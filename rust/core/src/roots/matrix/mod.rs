@@ -1,7 +1,7 @@
 //! Roots of det M(s), M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), without expanding the determinant.
 //!
-//! `system` holds the matrices, `rows` complex ones, `balance` scales them at a point, `factor` their factors and
-//! inverses (`kernel`) with rounding bounds, `local_enclosure` what is proved about det M around a point;
+//! `system` holds the matrices, `balance` scales them at a point, `factor` bounds the rounding errors
+//! of their inverses, `local_enclosure` (`kernel`) is what is proved about det M around a point;
 //! `walker` evaluates M, `line` follows arg det M along lines and `newton` iterates to its roots, so
 //! that rectangles are counted, divided and searched as for one function (`counting::cell`,
 //! `locating::isolate`).
@@ -24,7 +24,6 @@ mod local_enclosure;
 mod newton;
 mod outer;
 mod prepared;
-mod rows;
 mod simple_root;
 mod starts;
 mod system;

@@ -12,9 +12,9 @@
 
 use super::difference::Difference;
 use super::factor::{ROUNDING, factor};
-use super::rows::Rows;
 use super::system::CharacteristicMatrix;
 use crate::elementary::exp_above;
+use crate::linear_algebra::rows::Rows;
 use crate::{Error, Task};
 use num_complex::Complex64;
 

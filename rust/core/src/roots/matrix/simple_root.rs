@@ -18,9 +18,9 @@ use num_complex::Complex64;
 use super::balance::Balanced;
 use super::factor::{FLOOR, Factored, ROUNDING, factor};
 use super::local_enclosure::Weights;
-use super::rows::{Rows, norm};
 use super::system::CharacteristicMatrix;
 use crate::elementary::exp;
+use crate::linear_algebra::rows::{Rows, norm};
 use crate::quasipoly::modulus;
 use crate::roots::disc::Disc;
 

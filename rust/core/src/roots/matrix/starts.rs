@@ -10,7 +10,7 @@ use super::factor::factor;
 use super::simple_root::Dense;
 use super::system::CharacteristicMatrix;
 use super::walker::{MatrixWalker, NEAR_ROOT};
-use crate::eigenvalues::eigenvalues;
+use crate::linear_algebra::eigenvalues::eigenvalues;
 
 /// Upper limit on the points at which M is linearised.
 const MAX_POINTS: usize = 4;
@@ -104,7 +104,7 @@ fn linearised(
         .filter(|mu| mu.im >= 0.0 && mu.norm() > least)
         .map(|mu| {
             let s = z - mu.inv();
-            // The arithmetic of the eigenvalues depends on the machine; so few digits do not.
+            // Guesses need few digits, and these do not depend on rounding errors.
             Complex64::new(f64::from(s.re as f32), f64::from(s.im.abs() as f32))
         })
         .filter(|s| s.is_finite());

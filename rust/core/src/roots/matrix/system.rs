@@ -1,14 +1,12 @@
 //! The characteristic matrix M(s) = s E + Σ (s N_j − A_j) e^(−s τ_j), checked once.
 //!
 //! Rows and columns are scaled by powers of two before anything else: each row by the largest
-//! entry of E and N in it, then row i by 1/f_i and column i by f_i as balancing does (Parlett and
-//! Reinsch 1969; Osborne 1960). That is exact and moves no root, and the inequalities of the
-//! proofs, which compare norms, hold over longer steps.
+//! entry of E and N in it, then row i by 1/f_i and column i by f_i as balancing does. That is exact
+//! and moves no root, and the inequalities of the proofs, which compare norms, hold over longer
+//! steps.
 
 use crate::Error;
-
-/// Upper limit on the sweeps of balancing, which usually needs few.
-const SWEEPS: usize = 12;
+use crate::linear_algebra::balance::balanced_above;
 
 /// Largest exponent of the scaling, so that nothing underflows or overflows.
 const MOST_EXPONENT: i32 = 200;
@@ -245,48 +243,13 @@ fn scale(slopes: &mut Matrices, values: &mut Matrices) -> f64 {
             .fold(0.0f64, f64::max)
     };
     let rate = norm(&rest);
-    let mut weight = rest;
-    for (row, other) in weight.iter_mut().zip(&on_s) {
-        for (x, y) in row.iter_mut().zip(other) {
-            *x += rate * y;
-        }
-    }
-    for _ in 0..SWEEPS {
-        let mut changed = false;
-        for i in 0..size {
-            let off = |k: &usize| *k != i;
-            let entry = |r: usize, c: usize| {
-                weight
-                    .get(r)
-                    .and_then(|row| row.get(c))
-                    .copied()
-                    .unwrap_or(0.0)
-            };
-            let across: f64 = (0..size).filter(off).map(|k| entry(i, k)).sum();
-            let down: f64 = (0..size).filter(off).map(|k| entry(k, i)).sum();
-            if across == 0.0 || down == 0.0 {
-                continue;
-            }
-            let step = (libm::ilogb(across) - libm::ilogb(down)) / 2;
-            let (Some(row), Some(column)) = (rows.get_mut(i), columns.get_mut(i)) else {
-                continue;
-            };
-            if step == 0 || (*row - step).abs().max((*column + step).abs()) > MOST_EXPONENT {
-                continue;
-            }
-            *row -= step;
-            *column += step;
-            changed = true;
-            for (r, line) in weight.iter_mut().enumerate() {
-                for (c, x) in line.iter_mut().enumerate() {
-                    let exponent = i32::from(c == i) * step - i32::from(r == i) * step;
-                    *x = libm::ldexp(*x, exponent);
-                }
-            }
-        }
-        if !changed {
-            break;
-        }
+    let weights = rest.iter().flatten().zip(on_s.iter().flatten());
+    let weights: Vec<f64> = weights.map(|(x, y)| x + rate * y).collect();
+    let (_, exponents) = balanced_above(&weights, size, 0.0);
+    for ((row, column), exponent) in rows.iter_mut().zip(&mut columns).zip(exponents) {
+        let most = MOST_EXPONENT.min(MOST_EXPONENT + *row);
+        *column = exponent.clamp((*row).max(0) - MOST_EXPONENT, most);
+        *row -= *column;
     }
     for matrix in slopes.iter_mut().chain(&mut *values) {
         apply(matrix, &rows, &columns);

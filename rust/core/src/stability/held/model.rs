@@ -21,9 +21,9 @@
 
 use crate::Error;
 use crate::dde::control_loop::sampled::Timing;
-use crate::dde::propagator::balanced;
 use crate::dde::{LinearLoop, Update};
 use crate::elementary::DoubleDouble;
+use crate::linear_algebra::balance::balanced;
 use crate::stability::crossings::sizes;
 
 /// Bound on the errors in double-double arithmetic, relative to sums of moduli: some thousand

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::model::{LoopPolynomials, share_of_errors};
 use crate::dde::LinearLoop;
 use crate::dde::control_loop::sampled;
-use crate::dde::propagator::balanced_norm;
+use crate::linear_algebra::balance::balanced_norm;
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::branches::rightmost;
 use crate::stability::cell::Cell;

@@ -13,7 +13,9 @@ use num_complex::Complex64;
 
 use crate::Error;
 use crate::dde::control_loop::linear_loop::{LinearLoop, Update};
-use crate::dde::propagator::{Propagator, balanced, multiply_add};
+use crate::dde::propagator::{Propagator, multiply_add};
+use crate::linear_algebra::balance::balanced;
+use crate::linear_algebra::eigenvalues;
 
 use super::timing::Timing;
 
@@ -190,7 +192,7 @@ pub(crate) fn eigenvalues(
     size: usize,
 ) -> Result<Vec<Complex64>, Error> {
     balance(&mut matrix, states, size);
-    crate::eigenvalues::eigenvalues(&matrix, size).ok_or_else(|| Error::Convergence {
+    eigenvalues::eigenvalues(&matrix, size).ok_or_else(|| Error::Convergence {
         what: "the eigenvalues of the transition matrix",
         best: Complex64::new(f64::NAN, f64::NAN),
         advice: "the loop is scaled too badly: choose units in which its gains are moderate"

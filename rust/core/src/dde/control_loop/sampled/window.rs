@@ -10,8 +10,9 @@
 use crate::dde::control_loop::linear_loop::{Equations, dot};
 use crate::dde::control_loop::requested_output::RequestedOutput;
 use crate::dde::control_loop::series::{DEGREE, Series};
-use crate::dde::propagator::{Propagator, balanced_norm};
+use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
+use crate::linear_algebra::balance::balanced_norm;
 
 /// Largest ‖A‖ h of a step: 1/19! is below rounding errors.
 const REACH: f64 = 1.0;

@@ -3,25 +3,25 @@
 use num_complex::Complex64;
 
 /// Numbers that are processed at once: one register of the widest instruction set.
-pub(super) const BLOCK: usize = 8;
+pub(crate) const BLOCK: usize = 8;
 
 /// A complex matrix by rows, real and imaginary parts apart.
 ///
 /// Rows are filled up with zeros to whole blocks.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Rows {
-    pub(super) size: usize,
-    pub(super) re: Vec<f64>,
-    pub(super) im: Vec<f64>,
+pub(crate) struct Rows {
+    pub(crate) size: usize,
+    pub(crate) re: Vec<f64>,
+    pub(crate) im: Vec<f64>,
 }
 
 impl Rows {
-    pub(super) fn zeros(size: usize) -> Self {
+    pub(crate) fn zeros(size: usize) -> Self {
         Self::of(size, size)
     }
 
     /// One row of `size` columns.
-    pub(super) fn one(size: usize) -> Self {
+    pub(crate) fn one(size: usize) -> Self {
         Self::of(1, size)
     }
 
@@ -35,25 +35,25 @@ impl Rows {
     }
 
     /// Numbers from one row to the next.
-    pub(super) fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.blocks() * BLOCK
     }
 
     /// Blocks of a row.
-    pub(super) fn blocks(&self) -> usize {
+    pub(crate) fn blocks(&self) -> usize {
         self.size.div_ceil(BLOCK)
     }
 
     /// Blocks of all rows.
-    pub(super) fn parts(&self) -> (&[[f64; BLOCK]], &[[f64; BLOCK]]) {
+    pub(crate) fn parts(&self) -> (&[[f64; BLOCK]], &[[f64; BLOCK]]) {
         (self.re.as_chunks().0, self.im.as_chunks().0)
     }
 
-    pub(super) fn blocks_mut(&mut self) -> (&mut [[f64; BLOCK]], &mut [[f64; BLOCK]]) {
+    pub(crate) fn blocks_mut(&mut self) -> (&mut [[f64; BLOCK]], &mut [[f64; BLOCK]]) {
         (self.re.as_chunks_mut().0, self.im.as_chunks_mut().0)
     }
 
-    pub(super) fn get(&self, row: usize, column: usize) -> Complex64 {
+    pub(crate) fn get(&self, row: usize, column: usize) -> Complex64 {
         let at = row * self.stride() + column;
         match (self.re.get(at), self.im.get(at)) {
             (Some(re), Some(im)) => Complex64::new(*re, *im),
@@ -61,7 +61,7 @@ impl Rows {
         }
     }
 
-    pub(super) fn add(&mut self, row: usize, column: usize, x: Complex64) {
+    pub(crate) fn add(&mut self, row: usize, column: usize, x: Complex64) {
         let at = row * self.stride() + column;
         if let (Some(re), Some(im)) = (self.re.get_mut(at), self.im.get_mut(at)) {
             *re += x.re;
@@ -69,7 +69,7 @@ impl Rows {
         }
     }
 
-    pub(super) fn row(&self, row: usize) -> (&[f64], &[f64]) {
+    pub(crate) fn row(&self, row: usize) -> (&[f64], &[f64]) {
         let start = row * self.stride();
         let range = start..start + self.size;
         (
@@ -79,13 +79,13 @@ impl Rows {
     }
 
     /// Euclidean norms of the rows.
-    pub(super) fn norms(&self) -> Vec<f64> {
+    pub(crate) fn norms(&self) -> Vec<f64> {
         (0..self.size).map(|row| norm(self.row(row))).collect()
     }
 }
 
 /// Euclidean norm with a relative error of n u; infinite or NaN where squares overflow.
-pub(super) fn norm((re, im): (&[f64], &[f64])) -> f64 {
+pub(crate) fn norm((re, im): (&[f64], &[f64])) -> f64 {
     let mut sums = [0.0; BLOCK];
     let mut rest = 0.0;
     for part in [re, im] {

@@ -10,7 +10,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// A matrix to be filled, or its factors.
 #[derive(Debug)]
-pub(super) struct Banded {
+pub(crate) struct Banded {
     n: usize,
     band: usize,
     rows: Vec<Complex64>,
@@ -20,12 +20,12 @@ pub(super) struct Banded {
 
 impl Banded {
     /// Number of entries in factors of this size.
-    pub(super) fn size(n: usize, band: usize) -> usize {
+    pub(crate) fn size(n: usize, band: usize) -> usize {
         n * (4 * band + 1)
     }
 
     /// The zero matrix.
-    pub(super) fn new(n: usize, band: usize) -> Self {
+    pub(crate) fn new(n: usize, band: usize) -> Self {
         Self {
             n,
             band,
@@ -36,13 +36,13 @@ impl Banded {
     }
 
     /// An entry within the band.
-    pub(super) fn entry(&mut self, row: usize, column: usize) -> &mut Complex64 {
+    pub(crate) fn entry(&mut self, row: usize, column: usize) -> &mut Complex64 {
         let width = 3 * self.band + 1;
         &mut self.rows[row * width + (column + self.band - row)]
     }
 
     /// Replace the matrix by its factors; `false` where it is singular.
-    pub(super) fn factorise(&mut self) -> bool {
+    pub(crate) fn factorise(&mut self) -> bool {
         let (n, band, width) = (self.n, self.band, 3 * self.band + 1);
         for k in 0..n {
             let below = (k + band).min(n - 1);
@@ -83,7 +83,7 @@ impl Banded {
     }
 
     /// Solve in place.
-    pub(super) fn solve(&self, x: &mut [Complex64]) {
+    pub(crate) fn solve(&self, x: &mut [Complex64]) {
         let (n, band, width) = (self.n, self.band, 3 * self.band + 1);
         for k in 0..n {
             x.swap(k, self.pivots[k]);
