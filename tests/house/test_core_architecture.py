@@ -12,7 +12,7 @@ WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 
 # What each package of the core may use besides itself; every package may use the foundation.
-FOUNDATION = {"error", "memory", "simd", "status", "task"}
+FOUNDATION = {"error", "memory", "order", "parallel", "simd", "status", "task"}
 CORE_ARROWS = {
     "linear_algebra": set(),
     "lambertw": set(),

@@ -15,6 +15,8 @@ pub mod frequency;
 pub mod lambertw;
 mod linear_algebra;
 pub mod memory;
+mod order;
+mod parallel;
 pub mod quasipoly;
 pub mod roots;
 mod simd;

@@ -9,8 +9,6 @@
 
 use std::collections::VecDeque;
 
-use rayon::prelude::*;
-
 use crate::Error;
 
 /// Memory that has to remain free, in bytes: more than kernels allocate for small things between
@@ -114,29 +112,6 @@ fn grow<T>(what: &'static str, to: &mut Vec<T>, more: usize) -> Result<(), Error
         .map_err(|_| refused(what, most.saturating_mul(size_of::<T>())))
 }
 
-/// The results of `work` for 0, 1, … `count`, in that order, computed on all threads; `start`
-/// creates the state of each thread.
-pub fn in_parallel<T, W>(
-    what: &'static str,
-    count: usize,
-    start: impl Fn() -> W + Sync + Send,
-    work: impl Fn(&mut W, usize) -> Result<T, Error> + Sync + Send,
-) -> Result<Vec<T>, Error>
-where
-    T: Default + Send,
-{
-    let mut found = reserved(what, count)?;
-    found.resize_with(count, T::default);
-    found
-        .par_iter_mut()
-        .enumerate()
-        .try_for_each_init(start, |own, (index, place)| {
-            *place = work(own, index)?;
-            Ok(())
-        })?;
-    Ok(found)
-}
-
 /// A size in readable units.
 pub(crate) fn readable_size(bytes: u64) -> String {
     const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
@@ -165,15 +140,12 @@ mod tests {
              at once, or raise the limit"
         );
         assert!(reserved::<f64>("the test", usize::MAX).is_err());
-        assert!(in_parallel("the test", usize::MAX, || (), |(), _| Ok(0.0)).is_err());
     }
 
     #[test]
     fn small_and_large_vectors_hold_what_was_asked_for() {
         assert_eq!(filled("the test", 7, 3), Ok(vec![7, 7, 7]));
         assert_eq!(collected("the test", 0..4), Ok(vec![0, 1, 2, 3]));
-        let squares = in_parallel("the test", 4, || (), |(), i| Ok(i * i));
-        assert_eq!(squares, Ok(vec![0, 1, 4, 9]));
         let mut grown = Vec::new();
         for i in 0..300_000 {
             push("the test", &mut grown, i).unwrap();

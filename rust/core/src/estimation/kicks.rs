@@ -17,7 +17,7 @@ pub(super) fn kicks(
     arrivals: f64,
     sensor: f64,
 ) -> Result<Vec<Kick>, Error> {
-    match space.b.len() {
+    let mut found = match space.b.len() {
         0 => Ok(Vec::new()),
         1 => kicks_of::<1>(rows, space, delay, arrivals, sensor),
         2 => kicks_of::<2>(rows, space, delay, arrivals, sensor),
@@ -28,9 +28,14 @@ pub(super) fn kicks(
         7 => kicks_of::<7>(rows, space, delay, arrivals, sensor),
         8 => kicks_of::<8>(rows, space, delay, arrivals, sensor),
         n => refuse!("{n} states of the plant: the likelihood takes up to 8"),
+    }?;
+    if arrivals > 0.0 && !rows.commands.uncertain.is_empty() {
+        found.sort_by_key(|kick| kick.row);
     }
+    Ok(found)
 }
 
+/// Those of `uncertain` commands, then those of the times of arrival.
 fn kicks_of<const N: usize>(
     rows: &Rows,
     space: &PlantSpace,
@@ -73,9 +78,6 @@ fn kicks_of<const N: usize>(
             if jump != 0.0 {
                 add(&mut steps, &mut row, *end, &by_jump.map(|b| b * jump));
             }
-        }
-        if !uncertain.is_empty() {
-            found.sort_by_key(|kick| kick.row);
         }
     }
     Ok(found)

@@ -147,14 +147,17 @@ impl<const N: usize> WithSimd for Passes<'_, N> {
             task,
         } = self;
         let mut log_det = 0.0;
-        // Where registers are short two of them share the work on the covariance; in a page always,
-        // which has no room for both.
-        let is_page = cfg!(target_family = "wasm");
-        let is_enough = !is_page && columns.len() <= S::F64_LANES * time.len();
-        let is_wide = S::F64_LANES >= WIDE || is_enough;
-        let lanes = if is_wide { 1 } else { 2 } * S::F64_LANES;
-        for group in columns.chunks_mut(lanes * time.len()) {
-            log_det = if is_wide {
+        let length = time.len();
+        // Registers that share the work on the covariance.
+        let registers = match columns.len() {
+            _ if S::IS_SCALAR => 4,
+            few if few <= S::F64_LANES * length => 1,
+            _ => 2,
+        };
+        for group in columns.chunks_mut(registers * S::F64_LANES * length) {
+            log_det = if S::IS_SCALAR {
+                pass::<S, N, 4>(simd, time, known, group, joint, kicks, task)?
+            } else if registers == 1 {
                 pass::<S, N, 1>(simd, time, known, group, joint, kicks, task)?
             } else {
                 pass::<S, N, 2>(simd, time, known, group, joint, kicks, task)?
@@ -163,9 +166,6 @@ impl<const N: usize> WithSimd for Passes<'_, N> {
         Ok(log_det)
     }
 }
-
-/// Lanes of a register that are enough for the columns of a plant.
-const WIDE: usize = 8;
 
 fn square<const N: usize>(flat: &[f64]) -> Square<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| flat[i * N + j]))
@@ -250,7 +250,7 @@ fn pass<S: Simd, const N: usize, const K: usize>(
                 for j in 0..N {
                     let phi = simd.splat_f64s(by_step.phi[i][j]);
                     for k in 0..K {
-                        moved[i][k] = simd.mul_add_e_f64s(phi, states[j][k], moved[i][k]);
+                        moved[i][k] = simd.mul_add_f64s(phi, states[j][k], moved[i][k]);
                     }
                 }
             }
@@ -290,11 +290,11 @@ fn pass<S: Simd, const N: usize, const K: usize>(
                 let mut innovation = block[place][k];
                 for i in 0..N {
                     let c = simd.splat_f64s(c[i]);
-                    innovation = simd.negate_mul_add_e_f64s(c, states[i][k], innovation);
+                    innovation = simd.negate_mul_add_f64s(c, states[i][k], innovation);
                 }
                 for i in 0..N {
                     let gain = simd.splat_f64s(gain[i]);
-                    states[i][k] = simd.mul_add_e_f64s(gain, innovation, states[i][k]);
+                    states[i][k] = simd.mul_add_f64s(gain, innovation, states[i][k]);
                 }
                 block[place][k] = simd.mul_f64s(innovation, scale);
             }

@@ -14,6 +14,7 @@ use num_complex::Complex64;
 
 use super::bounds::{fujiwara, leading, moduli};
 use crate::elementary::{angle, sin_cos};
+use crate::order::sort_up;
 use crate::quasipoly::{Probe, QuasiPolynomial, modulus};
 use crate::{Error, Task};
 
@@ -46,7 +47,7 @@ pub fn argument(h: &QuasiPolynomial, omega: &[f64], task: &Task) -> Result<Vec<f
         .copied()
         .unwrap_or(0.0);
     let mut order: Vec<usize> = (0..omega.len()).collect();
-    order.sort_by(|a, b| omega[*a].total_cmp(&omega[*b]));
+    sort_up(&mut order, |place| omega[*place]);
     let Some(highest) = order.last().map(|last| omega[*last]) else {
         return Ok(Vec::new());
     };

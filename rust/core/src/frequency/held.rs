@@ -19,6 +19,7 @@ use std::f64::consts::{PI, TAU};
 use super::margins::{Margins, least};
 use super::zeros::{ORDER, RealFunction, Taylor, zeros_between};
 use crate::elementary::{DoubleDouble, angle};
+use crate::order::sort_up;
 use crate::stability::{HeldLoop, HeldNumbers};
 use crate::{Error, Task};
 
@@ -215,7 +216,7 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
         .filter(|at| at.low > 1.0 / FAR)
         .map(|at| (at.omega, at.gain))
         .collect();
-    factors.sort_by(|p, q| p.0.total_cmp(&q.0));
+    sort_up(&mut factors, |factor| factor.0);
     let (phase_crossovers, gains): (Vec<f64>, Vec<f64>) = factors.into_iter().unzip();
     let up = least(&gains, &phase_crossovers, |k| (k > 1.0).then_some(k));
     let mut down = least(&gains, &phase_crossovers, |k| (k < 1.0).then_some(-k));

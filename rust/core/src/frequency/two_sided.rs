@@ -6,6 +6,7 @@
 //! with u = 2⁻⁵³ a coefficient is within `roundings` · u · size of its value. Delays that agree to
 //! SAME_DELAY of the longest sum of delays are one sum in another order, and are merged.
 
+use crate::order::sort_up;
 use crate::quasipoly::{QuasiPolynomial, convolve};
 
 /// Delays closer than this, relative to the longest one, are the same.
@@ -72,7 +73,7 @@ impl TwoSided {
 
     /// Rows in any order, merged.
     pub(super) fn merged(mut rows: Vec<Row>, longest: f64, roundings: f64) -> Self {
-        rows.sort_by(|a, b| a.delay.total_cmp(&b.delay));
+        sort_up(&mut rows, |row| row.delay);
         let mut kept: Vec<Row> = Vec::with_capacity(rows.len());
         let (mut chain, mut most) = (0.0, 0.0f64);
         for row in rows {

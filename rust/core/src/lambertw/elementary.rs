@@ -191,13 +191,13 @@ pub(crate) fn rough_angle<S: Simd>(z: Complex<S>) -> Real<S> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use pulp::Scalar128b;
+    use pulp::Scalar;
 
     /// The errors of two factors.
     const BOUND: f64 = 1.0 / (1_u64 << 60) as f64;
 
     /// The difference between a double-double that should be 1 and 1.
-    fn beside_one(value: DoubleDouble<Scalar128b>) -> f64 {
+    fn beside_one(value: DoubleDouble<Scalar>) -> f64 {
         ((Real::first(value.hi) - 1.0) + Real::first(value.lo)).abs()
     }
 

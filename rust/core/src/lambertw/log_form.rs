@@ -153,6 +153,9 @@ fn upper<S: Simd>(modulus: Real<S>, angle: DoubleDouble<S>) -> Complex<S> {
 struct AtAngle;
 
 impl Kernel<3, 2> for AtAngle {
+    // Of few numbers.
+    const IS_WIDE: bool = false;
+
     #[inline(always)]
     fn lanes<S: Simd>(&self, [modulus, angle, low]: [Real<S>; 3]) -> [Real<S>; 2] {
         let side = angle.sign();

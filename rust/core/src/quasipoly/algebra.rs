@@ -7,6 +7,7 @@
 
 use super::quasi_polynomial::QuasiPolynomial;
 use crate::Error;
+use crate::order::sort_up;
 
 /// Upper limit on the coefficients of a product (bounds memory and time).
 const MAX_COEFFICIENTS: usize = 1_000_000;
@@ -31,7 +32,7 @@ pub(crate) fn convolve(a: &[f64], b: &[f64]) -> Vec<f64> {
 /// Sort rows by their delays, and give delays that agree to 4 ulp the same value: they are one sum
 /// in different orders.
 pub(crate) fn equate_close_delays(rows: &mut [(Vec<f64>, f64)]) {
-    rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+    sort_up(rows, |row| row.1);
     let mut last = f64::NEG_INFINITY;
     for (_, delay) in rows {
         if *delay - last <= SAME_DELAY * *delay {

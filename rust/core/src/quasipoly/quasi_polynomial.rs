@@ -1,6 +1,7 @@
 //! The type of quasi-polynomials, checked at construction.
 
 use crate::Error;
+use crate::order::sort_up;
 
 /// A quasi-polynomial with real coefficients.
 ///
@@ -49,7 +50,7 @@ impl QuasiPolynomial {
 
     /// Sort and merge finite rows; sums that overflow are refused.
     pub(super) fn from_rows(mut rows: Vec<(Vec<f64>, f64)>) -> Result<Self, Error> {
-        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+        sort_up(&mut rows, |row| row.1);
         let mut merged: Vec<(Vec<f64>, f64)> = Vec::with_capacity(rows.len());
         for (row, delay) in rows {
             match merged.last_mut() {

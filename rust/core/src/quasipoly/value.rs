@@ -1,7 +1,6 @@
 //! Values of a quasi-polynomial at single points.
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 
 use super::jet::modulus;
 use super::overflow;
@@ -9,6 +8,7 @@ use super::probe::Probe;
 use super::quasi_polynomial::QuasiPolynomial;
 use crate::elementary::{exp, sin_cos};
 use crate::memory::filled;
+use crate::parallel;
 use crate::{Error, Task};
 
 /// Points in one task of a thread.
@@ -123,17 +123,16 @@ fn at_all(
     task: &Task,
     value: impl Fn(Complex64) -> Complex64 + Sync,
 ) -> Result<Vec<Complex64>, Error> {
-    let mut values = filled("the array of values", Complex64::ZERO, points.len())?;
-    let places = values.par_chunks_mut(CHUNK);
-    places
-        .zip(points.par_chunks(CHUNK))
-        .try_for_each(|(places, points)| {
-            task.check()?;
-            for (place, point) in places.iter_mut().zip(points) {
-                *place = value(*point);
-            }
-            task.advance(points.len() as u64);
-            Ok(())
-        })?;
+    const WHAT: &str = "the array of values";
+    let mut values = filled(WHAT, Complex64::ZERO, points.len())?;
+    let chunks = values.chunks_mut(CHUNK).zip(points.chunks(CHUNK));
+    parallel::each(WHAT, chunks, |_, (places, points)| {
+        task.check()?;
+        for (place, point) in places.iter_mut().zip(points) {
+            *place = value(*point);
+        }
+        task.advance(points.len() as u64);
+        Ok(())
+    })?;
     Ok(values)
 }

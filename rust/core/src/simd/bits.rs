@@ -1,6 +1,7 @@
 //! Operations on the bits of a double: signs and exponents.
 
-use pulp::{Simd, cast};
+use pulp::Simd;
+use pulp::bytemuck::{cast, cast_slice_mut};
 
 use super::real::{Mask, Real};
 
@@ -9,12 +10,37 @@ const SIGN: u64 = 0x8000_0000_0000_0000;
 const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 /// All bits below the exponent.
 const FRACTION: u64 = 0x000f_ffff_ffff_ffff;
+/// From the last bits of the upper half to the exponent.
+const PLACES: u32 = 20;
 /// 2^32, the place value of the upper half of the bits.
 const HALF: f64 = 4_294_967_296.0;
 /// 1.5 * 2^52: added to a whole number below 2^51, its last bits are those of that number.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// 2^52: a double with these bits above a whole number in its lower bits has that number added.
 const CARRIER: f64 = 4_503_599_627_370_496.0;
+
+/// A method that shifts both halves of the bits of each number by [`PLACES`].
+macro_rules! shift {
+    ($name:ident, $halves:ident, $operator:tt) => {
+        #[inline(always)]
+        fn $name(self) -> Self {
+            let (simd, mut bits) = (self.simd, self.bits());
+            if S::IS_SCALAR {
+                // A vector of halves is one half there.
+                for half in cast_slice_mut::<_, u32>(&mut bits) {
+                    *half $operator PLACES;
+                }
+                return Self::from_bits(simd, bits);
+            }
+            let ([a, b], places) = (bits, simd.splat_u32s(PLACES));
+            let shifted = [
+                cast(simd.$halves(cast(a), places)),
+                cast(simd.$halves(cast(b), places)),
+            ];
+            Self::from_bits(simd, shifted)
+        }
+    };
+}
 
 impl<S: Simd> Real<S> {
     #[inline(always)]
@@ -91,18 +117,15 @@ impl<S: Simd> Real<S> {
         (self + WHOLE) - WHOLE
     }
 
+    shift!(halves_up, wrapping_dyn_shl_u32s, <<=);
+    shift!(halves_down, wrapping_dyn_shr_u32s, >>=);
+
     /// `2^self` for a whole number from -1022 to 1023.
     #[inline(always)]
     pub(crate) fn power_of_two(self) -> Self {
         // The biased exponent is moved to the last bits of the upper half, which is then shifted.
-        let [a, b] = self.mul_add(HALF, WHOLE + 1023.0 * HALF).bits();
-        let simd = self.simd;
-        let places = simd.splat_u32s(20);
-        let shifted = [
-            cast(simd.wrapping_dyn_shl_u32s(cast(a), places)),
-            cast(simd.wrapping_dyn_shl_u32s(cast(b), places)),
-        ];
-        Self::from_bits(simd, shifted)
+        let biased = self.mul_add(HALF, WHOLE + 1023.0 * HALF);
+        biased.halves_up()
     }
 
     /// The power of two at or below the modulus of a normal number.
@@ -121,14 +144,8 @@ impl<S: Simd> Real<S> {
     #[inline(always)]
     pub(crate) fn exponent(self) -> Self {
         // Shifted to the last bits of the upper half, then read as the whole number there.
-        let [a, b] = self.bits();
-        let simd = self.simd;
-        let places = simd.splat_u32s(20);
-        let shifted = [
-            cast(simd.wrapping_dyn_shr_u32s(cast(a), places)),
-            cast(simd.wrapping_dyn_shr_u32s(cast(b), places)),
-        ];
-        let whole = Self::from_bits(simd, shifted).joined(self.constant(CARRIER));
+        let shifted = self.halves_down();
+        let whole = shifted.joined(self.constant(CARRIER));
         (whole - CARRIER) * (1.0 / HALF) - 1023.0
     }
 }

@@ -15,30 +15,31 @@ pub(crate) const SHORT: usize = 16;
 
 /// A function of `IN` doubles with `OUT` doubles as its value.
 pub(crate) trait Kernel<const IN: usize, const OUT: usize>: Sync {
+    /// Is it compiled for AVX-512 as well? See [`Instructions`].
+    const IS_WIDE: bool = true;
+
     fn lanes<S: Simd>(&self, arguments: [Real<S>; IN]) -> [Real<S>; OUT];
 }
 
 /// Columns of one block.
 pub(crate) type Columns<const N: usize, const W: usize> = [[f64; W]; N];
 
-struct Sweep<'a, K, const IN: usize, const OUT: usize, const W: usize> {
+/// Columns of any length, so that a kernel is compiled once for all of them.
+struct Sweep<'a, K, const IN: usize, const OUT: usize> {
     kernel: &'a K,
-    arguments: &'a Columns<IN, W>,
-    values: &'a mut Columns<OUT, W>,
+    arguments: [&'a [f64]; IN],
+    values: [&'a mut [f64]; OUT],
     length: usize,
 }
 
-impl<K, const IN: usize, const OUT: usize, const W: usize> WithSimd for Sweep<'_, K, IN, OUT, W>
-where
-    K: Kernel<IN, OUT>,
-{
+impl<K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> WithSimd for Sweep<'_, K, IN, OUT> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
         let mut lanes = [Real::splat(simd, 0.0); IN];
         for pair in 0..self.length.div_ceil(2 * S::F64_LANES) {
-            for (lane, column) in lanes.iter_mut().zip(self.arguments) {
+            for (lane, column) in lanes.iter_mut().zip(&self.arguments) {
                 if let Some([a, b]) = S::as_simd_f64s(column).0.as_chunks().0.get(pair) {
                     *lane = Real::new(simd, [*a, *b]);
                 }
@@ -89,7 +90,7 @@ impl<K: Kernel<1, 1>> WithSimd for Along<'_, K> {
 
 /// `values[i] = kernel(x[i])` as far as both reach.
 pub(crate) fn sweep_along<K: Kernel<1, 1>>(kernel: &K, x: &[f64], values: &mut [f64]) {
-    Instructions::chosen().run(Along { kernel, x, values });
+    Instructions::chosen().run_widest(Along { kernel, x, values });
 }
 
 /// Fill `values` for the first `length` elements and for those that complete their last vector.
@@ -114,10 +115,15 @@ pub(crate) fn sweep_on<K, const IN: usize, const OUT: usize, const W: usize>(
 ) where
     K: Kernel<IN, OUT>,
 {
-    instructions.run(Sweep {
+    let sweep = Sweep {
         kernel,
-        arguments,
-        values,
+        arguments: arguments.each_ref().map(<[f64; W]>::as_slice),
+        values: values.each_mut().map(<[f64; W]>::as_mut_slice),
         length,
-    });
+    };
+    if K::IS_WIDE {
+        instructions.run_widest(sweep);
+    } else {
+        instructions.run(sweep);
+    }
 }

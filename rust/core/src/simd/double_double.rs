@@ -116,9 +116,9 @@ impl<S: Simd> DoubleDouble<S> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use pulp::Scalar128b;
+    use pulp::Scalar;
 
-    fn words(value: DoubleDouble<Scalar128b>) -> (f64, f64) {
+    fn words(value: DoubleDouble<Scalar>) -> (f64, f64) {
         (value.hi.first(), value.lo.first())
     }
 

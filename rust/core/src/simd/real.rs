@@ -8,8 +8,10 @@ use pulp::bytemuck::{cast_slice, cast_slice_mut};
 /// One double in each lane of two vectors.
 ///
 /// A kernel is one long chain of dependent operations; while one vector waits for a result, the
-/// other one proceeds.
+/// other one proceeds. It begins with a line of the cache: the widest vectors, as long as a line, would
+/// else be read from two.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(crate) struct Real<S: Simd> {
     pub(super) simd: S,
     pub(super) lanes: [S::f64s; 2],
@@ -98,7 +100,7 @@ impl<S: Simd> Real<S> {
         let simd = self.simd;
         Self::new(
             simd,
-            [simd.mul_add_e_f64s(a, c, e), simd.mul_add_e_f64s(b, d, f)],
+            [simd.mul_add_f64s(a, c, e), simd.mul_add_f64s(b, d, f)],
         )
     }
 
@@ -108,8 +110,8 @@ impl<S: Simd> Real<S> {
         let (factor, summand) = (factor.spread(self), summand.spread(self));
         let ([a, b], [c, d], [e, f]) = (self.lanes, factor.lanes, summand.lanes);
         let simd = self.simd;
-        let first = simd.negate_mul_add_e_f64s(a, c, e);
-        Self::new(simd, [first, simd.negate_mul_add_e_f64s(b, d, f)])
+        let first = simd.negate_mul_add_f64s(a, c, e);
+        Self::new(simd, [first, simd.negate_mul_add_f64s(b, d, f)])
     }
 
     /// `self * factor - subtrahend`, rounded once.
@@ -298,10 +300,10 @@ impl<S: Simd> Not for Mask<S> {
 }
 
 #[cfg(test)]
-impl Real<pulp::Scalar128b> {
+impl Real<pulp::Scalar> {
     /// The same number in every lane.
     pub(crate) fn lane(value: f64) -> Self {
-        Self::splat(pulp::Scalar128b, value)
+        Self::splat(pulp::Scalar, value)
     }
 
     /// The number in the first lane.

@@ -6,7 +6,7 @@
 use crate::dde::ensemble::Sets;
 use crate::dde::{Equations, LinearLoop};
 use crate::lambertw::dde_root;
-use crate::memory::in_parallel;
+use crate::parallel;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::spectral_abscissa;
 use crate::{Error, Task};
@@ -51,7 +51,7 @@ fn each<T: Send>(
     task: &Task,
     work: impl Fn(usize, &LinearLoop) -> Result<T, Error> + Sync + Send,
 ) -> Result<Vec<Option<T>>, Error> {
-    in_parallel(
+    parallel::results(
         "the poles of the sweep",
         sets.len(),
         || (),

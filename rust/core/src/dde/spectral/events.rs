@@ -17,6 +17,7 @@ use super::isolate::separators;
 use super::nodes::{Nodes, nodes};
 use super::problem::{Equation, Event};
 use crate::Error;
+use crate::order::sort_up;
 
 /// A false position is close to an end of its bracket within this share of it.
 const CLOSE: f64 = 0.01;
@@ -106,7 +107,7 @@ impl Watch {
 
     /// Store crossings in the order of time; returns the time of a terminal one.
     fn take(&mut self, mut found: Vec<Crossing>) -> Option<f64> {
-        found.sort_by(|a, b| a.time.total_cmp(&b.time));
+        sort_up(&mut found, |crossing| crossing.time);
         let mut stop = None;
         for crossing in found {
             if stop.is_some_and(|stop| crossing.time > stop) {

@@ -19,6 +19,7 @@ use super::sizes::{largest, largest_of};
 use super::sparsity::Sparsity;
 use crate::linear_algebra::lu::Lu;
 use crate::linear_algebra::vectors::add_multiple;
+use crate::order::sort_up;
 use crate::{Error, Task};
 
 /// Largest number of unknowns of a system that is solved as a whole.
@@ -84,7 +85,7 @@ impl Diagonal {
     /// Entries that differ by no more than the error of differences become one.
     fn new(values: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..values.len()).collect();
-        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        sort_up(&mut order, |component| values[*component]);
         let mut entries: Vec<(f64, usize)> = Vec::new();
         let mut of = vec![0; values.len()];
         for component in order {

@@ -4,6 +4,8 @@
 //! the density is a parabola through the three nearest, which is exact for a Gaussian however few
 //! cells it covers.
 
+use crate::order::sort_up;
+
 /// Points in each cell at which the density is taken.
 const POINTS: usize = 8;
 
@@ -90,7 +92,7 @@ pub(super) fn known(delays: &[f64], lags: &[f64], weights: &[f64], tail: f64) ->
         }
     }
     if lags.len() > 1 {
-        together.sort_by(|x, y| x.0.total_cmp(&y.0));
+        sort_up(&mut together, |part| part.0);
     }
     let places = (0..count).flat_map(|i| {
         let (low, width) = (edges[i], width(i));

@@ -13,6 +13,7 @@ use super::chain_laws::{Law, laws};
 use super::newton::{ARRIVED, ENLARGED, LEAST, LOST, MOST, PRECISE_ENOUGH, SHRUNK};
 use crate::elementary::exp;
 use crate::lambertw::{rough_angle, rough_log};
+use crate::order::sort_up;
 use crate::quasipoly::{Lanes, QuasiPolynomial, modulus};
 use crate::roots::counting::Cell;
 use crate::roots::disc::Disc;
@@ -94,7 +95,7 @@ pub(crate) fn discs_along_chains(
             }
         }
     }
-    discs.sort_by(|a, b| a.center.im.total_cmp(&b.center.im));
+    sort_up(&mut discs, |disc| disc.center.im);
     Ok(disjoint(discs))
 }
 

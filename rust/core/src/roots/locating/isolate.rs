@@ -15,6 +15,7 @@ use super::along_chains::discs_along_chains;
 use super::clusters::cluster;
 use super::newton::{Outcome, newton};
 use crate::Error;
+use crate::order::sort_up;
 use crate::roots::counting::{Cell, Walk, Walker};
 use crate::roots::disc::{Disc, RESOLVED};
 
@@ -111,7 +112,7 @@ impl<'w, W: Seek> Search<'w, W> {
 
     /// A search that starts with disjoint discs that are already known.
     pub(crate) fn with(walker: &'w mut W, mut found: Vec<Disc>) -> Self {
-        found.sort_by(|a, b| a.center.im.total_cmp(&b.center.im));
+        sort_up(&mut found, |disc| disc.center.im);
         let widest = found
             .iter()
             .map(|disc| disc.isolation.max(disc.radius))

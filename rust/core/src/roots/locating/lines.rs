@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use super::all_roots::locate;
 use super::isolate::{Search, Seek};
 use super::starts::tropical_roots;
+use crate::order::sort_down;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::counting::{Cell, MAX_EVALUATIONS, Walker, close, dominance, half_plane};
 use crate::roots::disc::Disc;
@@ -366,7 +367,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
     /// right of the next root and of the barrier, and left of `line` itself.
     fn beyond_known_roots(&mut self, line: &Line, wanted: u64) -> Result<Option<f64>, Error> {
         let mut starts = line.hints.clone();
-        starts.sort_by(|a, b| b.re.total_cmp(&a.re));
+        sort_down(&mut starts, |start| start.re);
         starts.truncate(
             usize::try_from(2 * wanted)
                 .unwrap_or(0)
@@ -376,8 +377,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
         if self.given_up > 0 {
             self.learn(&self.low_starts(line.sigma), u64::MAX, f64::NEG_INFINITY)?;
         }
-        self.known
-            .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+        sort_down(&mut self.known, |disc| disc.center.re);
         let mut total = 0;
         let mut places = self.known.iter().skip_while(|disc| {
             total += disc.weight();
@@ -469,8 +469,7 @@ impl<'a, S: Spectrum> Lines<'a, S> {
 
     /// A line left of the first `n` known discs and right of the next one.
     fn beside_the_first(&mut self, n: usize) -> Option<f64> {
-        self.known
-            .sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+        sort_down(&mut self.known, |disc| disc.center.re);
         let edge = self
             .known
             .get(..n)?

@@ -12,6 +12,7 @@
 use super::all_roots::add_zeros;
 use super::exact_abscissa::exact_abscissa;
 use super::lines::{Line, Lines, Spectrum, between_lines, half_plane_discs, is_beside_chains};
+use crate::order::sort_down;
 use crate::quasipoly::{Kind, QuasiPolynomial};
 use crate::roots::chains::chain_abscissa;
 use crate::roots::counting::{Prepared, TimeScaling, Walker, count_right_of, half_plane};
@@ -211,7 +212,7 @@ fn beyond_reach() -> Error {
 /// The first `n` of all discs right of `sigma`, and more where the next ones cannot be ordered
 /// after them.
 pub(crate) fn first(mut discs: Vec<Disc>, n: usize, sigma: f64) -> RootSet {
-    discs.sort_by(|a, b| b.center.re.total_cmp(&a.center.re));
+    sort_down(&mut discs, |disc| disc.center.re);
     let left = |disc: &Disc| disc.center.re - disc.radius;
     let right = |disc: &Disc| disc.center.re + disc.radius;
     let mut edge = f64::INFINITY;

@@ -12,6 +12,7 @@ use num_complex::Complex64;
 use super::isolate::{Search, Seek};
 use super::starts::tropical_roots;
 use crate::elementary::{log, sin_cos};
+use crate::order::sort_down;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::counting::{MAX_EVALUATIONS, Walker};
 use crate::{Error, Task};
@@ -50,7 +51,7 @@ pub(crate) fn has_unstable_root(
 /// The rightmost hints right of the axis.
 pub(crate) fn rightmost_first(mut hints: Vec<Complex64>) -> Vec<Complex64> {
     hints.retain(|hint| hint.re > 0.0);
-    hints.sort_by(|a, b| b.re.total_cmp(&a.re));
+    sort_down(&mut hints, |hint| hint.re);
     hints.truncate(MOST_HINTS);
     hints
 }

@@ -8,6 +8,7 @@
 use super::prepared::Prepared;
 use super::starts::starts;
 use super::walker::MatrixWalker;
+use crate::order::sort_down;
 use crate::roots::disc::Disc;
 use crate::roots::locating::{Effort, Line, Search, Spectrum, first};
 use crate::roots::root_set::RootSet;
@@ -91,7 +92,7 @@ pub(super) fn from_guesses(
         // The guesses missed some roots; only what is proved counts from here on.
         ahead.clear();
         guesses.clone_from(&hints);
-        guesses.sort_by(|a, b| b.re.total_cmp(&a.re));
+        sort_down(&mut guesses, |guess| guess.re);
         guesses.truncate(MAX_HINTS);
         last = Some(Line {
             sigma,
@@ -110,7 +111,7 @@ fn line_beside(discs: &[Disc], n: usize, ahead: &[f64], chain: f64, step: f64) -
         .iter()
         .map(|disc| (disc.center.re - disc.radius, disc.center.re + disc.radius))
         .collect();
-    sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
+    sort_down(&mut sorted, |disc| disc.0);
     let gap = |k: usize, edge: f64| {
         let known = sorted.get(k + 1).map(|disc| disc.1);
         let guessed = ahead.iter().copied().filter(|re| *re < edge);

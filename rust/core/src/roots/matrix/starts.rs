@@ -11,6 +11,7 @@ use super::simple_root::Dense;
 use super::system::CharacteristicMatrix;
 use super::walker::{MatrixWalker, NEAR_ROOT};
 use crate::linear_algebra::eigenvalues::eigenvalues;
+use crate::order::sort_down;
 
 /// Upper limit on the points at which M is linearised.
 const MAX_POINTS: usize = 4;
@@ -66,7 +67,7 @@ pub(super) fn starts(
         .filter(|s| (s - x).norm() * unit <= TRUSTED)
         .collect();
     let mut list = if near.is_empty() { found } else { near };
-    list.sort_by(|a, b| b.re.total_cmp(&a.re));
+    sort_down(&mut list, |start| start.re);
     list
 }
 

@@ -12,11 +12,10 @@
 
 use std::collections::VecDeque;
 
-use rayon::prelude::*;
-
 use super::box_expansion::{BoxExpansion, Range};
 use super::prove::{Claim, Verdict, judge_box};
 use super::reduced::Reduced;
+use crate::parallel;
 use crate::stability::cell::UNKNOWN;
 use crate::stability::family::Family;
 use crate::{Error, Task, memory};
@@ -219,17 +218,16 @@ impl<'a, const D: usize> Tree<'a, D> {
     }
 
     fn judge(&self, group: &[Waiting<D>], task: &Task) -> Result<Vec<Verdict>, Error> {
-        group
-            .par_iter()
-            .map_init(
-                || BoxExpansion::new(&self.reduced),
-                |expansion, one| {
-                    let verdict = judge_box(&self.reduced, &one.claim, expansion, task);
-                    task.advance(1);
-                    verdict
-                },
-            )
-            .collect()
+        let start = || BoxExpansion::new(&self.reduced);
+        let found = parallel::results("the boxes", group.len(), start, |expansion, index| {
+            let Some(waiting) = group.get(index) else {
+                return Ok(None);
+            };
+            let verdict = judge_box(&self.reduced, &waiting.claim, expansion, task)?;
+            task.advance(1);
+            Ok(Some(verdict))
+        })?;
+        Ok(found.into_iter().flatten().collect())
     }
 
     fn file(

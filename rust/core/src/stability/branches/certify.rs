@@ -42,6 +42,8 @@ pub(crate) const VALUES: usize = 5;
 pub(crate) struct Certify<'a>(pub(crate) &'a Plane);
 
 impl Kernel<ARGUMENTS, VALUES> for Certify<'_> {
+    const IS_WIDE: bool = false;
+
     #[inline(always)]
     fn lanes<S: Simd>(&self, arguments: [Real<S>; ARGUMENTS]) -> [Real<S>; VALUES] {
         let [re, im, k, error, slope_error, bend, x, y, within] = arguments;

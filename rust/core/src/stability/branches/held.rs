@@ -10,6 +10,7 @@ use num_complex::Complex64;
 use super::branch::{Branches, Root, are_apart};
 use super::plane::Plane;
 use crate::dde::control_loop::sampled::eigenvalues;
+use crate::order::sort_down;
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::{self, Region};
 use crate::stability::cell::Cell;
@@ -147,7 +148,7 @@ fn refined(h: &QuasiPolynomial, hold: Hold, starts: &[Complex64]) -> Vec<Complex
             roots.push(s);
         }
     }
-    roots.sort_by(|p, q| q.re.total_cmp(&p.re));
+    sort_down(&mut roots, |root| root.re);
     roots
 }
 
@@ -222,7 +223,7 @@ fn by_eigenvalues(h: &QuasiPolynomial, hold: Hold, samples: f64) -> Option<Vec<C
             Complex64::new(z.norm().ln() / hold.sample_time, angle)
         })
         .collect();
-    roots.sort_by(|p, q| q.re.total_cmp(&p.re));
+    sort_down(&mut roots, |root| root.re);
     Some(roots)
 }
 
@@ -238,7 +239,7 @@ fn proved(
     let mut branches = Branches::none();
     branches.start(&plane, starts.iter().copied().take(ROOTS), 0.0);
     let mut roots = branches.started();
-    roots.sort_by(|p, q| q.s.re.total_cmp(&p.s.re));
+    sort_down(&mut roots, |root| root.s.re);
     let Some(first) = roots.first().map(|root| root.s.re) else {
         return Ok(None);
     };

@@ -19,6 +19,7 @@ use super::branch::{Branches, Root, are_apart};
 use super::held;
 use super::plane::{DelayOf, Plane};
 use crate::memory::reserved;
+use crate::order::sort_down;
 use crate::quasipoly::QuasiPolynomial;
 use crate::roots::{Region, chain_abscissa, chain_margin, rightmost, roots};
 use crate::stability::cell::{Cell, judge, with_abscissa};
@@ -184,7 +185,7 @@ impl<'a> Leading<'a> {
         // Without the root that is lost the others may lie far to the left, where lines are long.
         let mut known = None;
         if self.branches.advance(&self.plane, points, &mut roots) {
-            roots.sort_by(|p, q| q.s.re.total_cmp(&p.s.re));
+            sort_down(&mut roots, |root| root.s.re);
             known = self.by_lines(index, &roots)?;
         }
         self.roots = roots;

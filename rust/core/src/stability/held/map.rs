@@ -6,12 +6,13 @@
 //! (`crossings`). A row of one cell is judged alone.
 
 use super::model::{LoopPolynomials, Polynomial, share_of_errors};
+use crate::parallel;
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::crossings::{Crossing, Members, crossings};
 use crate::stability::hold::Hold;
 use crate::stability::map::{Chart, Proof, Question, Vertex, join};
 use crate::stability::specification::Specification;
-use crate::{Error, Task, memory};
+use crate::{Error, Task};
 
 /// Upper limit on the number of cells (bounds memory and time).
 const MAX_CELLS: usize = 50_000_000;
@@ -262,7 +263,7 @@ impl<'a> LoopRows<'a> {
         task: &Task,
         work: impl Fn(usize) -> Result<T, Error> + Sync,
     ) -> Result<Vec<T>, Error> {
-        memory::in_parallel(
+        parallel::results(
             "the list of rows of the map",
             self.rows,
             || (),

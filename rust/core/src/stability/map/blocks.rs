@@ -5,12 +5,10 @@
 //! length of the boundaries and with the number of blocks, not of cells. Boundaries are the
 //! crossings of its rows (`row_search`), joined as those of any map.
 
-use rayon::prelude::*;
-
 use super::axes::{Axis, Map, put};
 use super::block::{Block, Grid};
 use super::chart::Chart;
-use crate::memory::in_parallel;
+use crate::parallel;
 use crate::stability::boxes::Reduced;
 use crate::stability::crossings::Crossing;
 use crate::status::CellStatus;
@@ -60,7 +58,7 @@ pub(crate) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
         (1, second, first)
     };
     let count = across.points.len();
-    let rows = in_parallel(
+    let rows = parallel::results(
         "the list of rows of the map",
         count,
         || (),
@@ -86,48 +84,49 @@ impl Grid<'_, 2> {
         let mut chart = Chart::stable(height * width)?;
         let bands = chart
             .unstable
-            .par_chunks_mut(SIDE * width)
-            .zip(chart.status.par_chunks_mut(SIDE * width));
-        bands
-            .enumerate()
-            .try_for_each(|(band, (unstable, status))| {
-                let top = band * SIDE;
-                let bottom = top + unstable.len() / width;
-                let found: Result<Vec<_>, Error> = (0..width.div_ceil(SIDE))
-                    .into_par_iter()
-                    .map(|index| {
-                        let left = index * SIDE;
-                        let block = Block {
-                            start: [top, left],
-                            end: [bottom, (left + SIDE).min(width)],
-                        };
-                        let mut own = Grid {
-                            reduced: self.reduced.clone(),
-                            points: self.points,
-                        };
-                        own.refer_to_middle(&block);
-                        let cells = own.cells(block, task)?;
-                        task.advance(block.cells() as u64);
-                        Ok(cells)
-                    })
-                    .collect();
-                for (block, cell) in found?.into_iter().flatten() {
-                    for line in block.start[0] - top..block.end[0] - top {
-                        let places = line * width + block.start[1]..line * width + block.end[1];
-                        if cell.unstable != 0
-                            && let Some(places) = unstable.get_mut(places.clone())
-                        {
-                            places.fill(cell.unstable);
-                        }
-                        if cell.status != CellStatus::Ok
-                            && let Some(places) = status.get_mut(places)
-                        {
-                            places.fill(cell.status);
-                        }
+            .chunks_mut(SIDE * width)
+            .zip(chart.status.chunks_mut(SIDE * width));
+        parallel::each("the map", bands, |band, (unstable, status)| {
+            let top = band * SIDE;
+            let bottom = top + unstable.len() / width;
+            let count = width.div_ceil(SIDE);
+            let found = parallel::results(
+                "the map",
+                count,
+                || (),
+                |(), index| {
+                    let left = index * SIDE;
+                    let block = Block {
+                        start: [top, left],
+                        end: [bottom, (left + SIDE).min(width)],
+                    };
+                    let mut own = Grid {
+                        reduced: self.reduced.clone(),
+                        points: self.points,
+                    };
+                    own.refer_to_middle(&block);
+                    let cells = own.cells(block, task)?;
+                    task.advance(block.cells() as u64);
+                    Ok(cells)
+                },
+            )?;
+            for (block, cell) in found.into_iter().flatten() {
+                for line in block.start[0] - top..block.end[0] - top {
+                    let places = line * width + block.start[1]..line * width + block.end[1];
+                    if cell.unstable != 0
+                        && let Some(places) = unstable.get_mut(places.clone())
+                    {
+                        places.fill(cell.unstable);
+                    }
+                    if cell.status != CellStatus::Ok
+                        && let Some(places) = status.get_mut(places)
+                    {
+                        places.fill(cell.status);
                     }
                 }
-                Ok(())
-            })?;
+            }
+            Ok(())
+        })?;
         Ok(chart)
     }
 }

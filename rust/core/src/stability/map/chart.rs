@@ -1,7 +1,6 @@
 //! The arrays of a map, and how its rows fill them.
 
-use rayon::prelude::*;
-
+use crate::parallel;
 use crate::stability::crossings::Row;
 use crate::status::CellStatus;
 use crate::{Error, memory};
@@ -34,9 +33,9 @@ impl Chart {
     pub(crate) fn fill(&mut self, rows: &[Row], width: usize, columns: bool) -> Result<(), Error> {
         let blocks = self
             .unstable
-            .par_chunks_mut(BLOCK * width)
-            .zip(self.status.par_chunks_mut(BLOCK * width));
-        blocks.enumerate().for_each(|(block, (unstable, status))| {
+            .chunks_mut(BLOCK * width)
+            .zip(self.status.chunks_mut(BLOCK * width));
+        parallel::each("the map", blocks, |block, (unstable, status)| {
             let top = block * BLOCK;
             let lines = unstable.len() / width;
             // The cells of the row that lie in the block, and where they are in it.
@@ -66,7 +65,8 @@ impl Chart {
                     }
                 }
             }
-        });
+            Ok(())
+        })?;
         if rows.iter().any(|row| !row.abscissas.is_empty()) {
             self.fill_abscissas(rows, width, columns)?;
         }
@@ -75,8 +75,8 @@ impl Chart {
 
     fn fill_abscissas(&mut self, rows: &[Row], width: usize, columns: bool) -> Result<(), Error> {
         self.abscissa = memory::filled("the map", f64::NAN, self.unstable.len())?;
-        let blocks = self.abscissa.par_chunks_mut(BLOCK * width);
-        blocks.enumerate().for_each(|(block, abscissa)| {
+        let blocks = self.abscissa.chunks_mut(BLOCK * width);
+        parallel::each("the map", blocks, |block, abscissa| {
             let top = block * BLOCK;
             if columns {
                 let lines = abscissa.len() / width;
@@ -94,8 +94,8 @@ impl Chart {
                     }
                 }
             }
-        });
-        Ok(())
+            Ok(())
+        })
     }
 }
 

@@ -7,6 +7,7 @@
 //! in the same row, they are the two arms of one curve that turns back there. Every point is a
 //! proved crossing; only the order of the points is heuristic.
 
+use crate::order::sort_up;
 use crate::stability::crossings::Crossing;
 
 /// Neighbours in the next row that are compared, on either side.
@@ -40,10 +41,9 @@ struct Arm {
 }
 
 impl Arm {
-    /// The order of their ends.
-    fn by_frequency(&self, other: &Self) -> std::cmp::Ordering {
-        let omega = |arm: &Self| arm.last().map_or(0.0, |last| last.omega);
-        omega(self).total_cmp(&omega(other))
+    /// The frequency at its end.
+    fn omega(&self) -> f64 {
+        self.last().map_or(0.0, |last| last.omega)
     }
 
     fn last(&self) -> Option<&Vertex> {
@@ -98,7 +98,7 @@ pub(crate) fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>
                 })
             })
             .collect();
-        vertices.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+        sort_up(&mut vertices, |vertex| vertex.omega);
         let heads: Vec<(f64, f64, i32)> = arms
             .iter()
             .map(|arm| {
@@ -137,7 +137,7 @@ pub(crate) fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>
         going.extend(fresh.map(|(vertex, _)| Arm {
             vertices: vec![*vertex],
         }));
-        going.sort_by(Arm::by_frequency);
+        sort_up(&mut going, Arm::omega);
         arms = going;
     }
     done.extend(arms.into_iter().map(|arm| arm.vertices));
@@ -206,7 +206,7 @@ fn closest<T>(
 
 /// Curves that end in the same row, two arms of opposite directions joined where they meet.
 fn turned(mut ended: Vec<Arm>, scale: (f64, f64)) -> Vec<Vec<Vertex>> {
-    ended.sort_by(Arm::by_frequency);
+    sort_up(&mut ended, Arm::omega);
     let mut curves = Vec::with_capacity(ended.len());
     let mut rest = ended.into_iter().peekable();
     while let Some(mut arm) = rest.next() {

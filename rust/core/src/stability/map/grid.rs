@@ -9,13 +9,12 @@
 //! cannot be formed, because a coefficient overflows, is an undecided cell; delays that become
 //! negative are refused before any work is done.
 
-use rayon::prelude::*;
-
 use super::axes::{Axis, Map, Proof, Question, check_parameters, put};
 use super::blocks;
 use super::chart::Chart;
 use super::curves::{Vertex, join};
 use super::rows::{Rows, Wanted};
+use crate::parallel;
 use crate::roots::chain_abscissa;
 use crate::stability::cell::{Cell, judge};
 use crate::stability::family::Family;
@@ -24,6 +23,10 @@ use crate::{Error, Task, memory};
 
 /// Upper limit on the number of cells (bounds memory and time).
 const MAX_CELLS: usize = 50_000_000;
+
+/// Least number of cells that a thread takes together, and most groups of these.
+const TOGETHER: usize = 16;
+const GROUPS: usize = 1 << 16;
 
 /// Judge the members of `family` over two of its parameters; `values` holds the others.
 ///
@@ -141,7 +144,7 @@ pub fn chains(
         put(values, second, index % width);
         Ok(family.at(values).map_or(f64::NAN, |h| chain_abscissa(&h)))
     };
-    memory::in_parallel("the map", cells, || values.to_vec(), cell)
+    parallel::results("the map", cells, || values.to_vec(), cell)
 }
 
 impl Map<'_> {
@@ -167,28 +170,27 @@ impl Map<'_> {
             self.task.advance(1);
             Ok(cell)
         };
-        let start = || self.values.to_vec();
-        let both = chart
-            .unstable
-            .par_iter_mut()
-            .zip(&mut chart.status)
-            .enumerate();
-        if abscissa {
-            both.zip(&mut chart.abscissa).try_for_each_init(
-                start,
-                |values, ((index, (unstable, status)), alpha)| {
-                    let cell = judged(values, index)?;
-                    (*unstable, *alpha, *status) = (cell.unstable, cell.abscissa, cell.status);
-                    Ok(())
-                },
-            )?;
-        } else {
-            both.try_for_each_init(start, |values, (index, (unstable, status))| {
-                let cell = judged(values, index)?;
-                (*unstable, *status) = (cell.unstable, cell.status);
+        let together = cells.div_ceil(GROUPS).max(TOGETHER);
+        let places = chart.unstable.chunks_mut(together);
+        let places = places.zip(chart.status.chunks_mut(together));
+        let mut abscissas: Vec<&mut [f64]> = chart.abscissa.chunks_mut(together).collect();
+        abscissas.resize_with(places.len(), Default::default);
+        let places = places.zip(abscissas);
+        parallel::each(
+            "the map",
+            places,
+            |group, ((unstable, status), abscissas)| {
+                let mut values = self.values.to_vec();
+                for (place, (unstable, status)) in unstable.iter_mut().zip(status).enumerate() {
+                    let cell = judged(&mut values, group * together + place)?;
+                    (*unstable, *status) = (cell.unstable, cell.status);
+                    if let Some(abscissa) = abscissas.get_mut(place) {
+                        *abscissa = cell.abscissa;
+                    }
+                }
                 Ok(())
-            })?;
-        }
+            },
+        )?;
         Ok(chart)
     }
 }

@@ -5,11 +5,12 @@
 //! member is found; members at both ends and in the middle are tried first.
 
 use super::axes::{Axis, check_parameters};
+use crate::parallel;
 use crate::stability::boxes::{BoxExpansion, Finding, Reduced, check, find_unstable, reduce};
 use crate::stability::cell::{ENDLESS, UNKNOWN, judge};
 use crate::stability::family::Family;
 use crate::stability::specification::Specification;
-use crate::{Error, Task, memory};
+use crate::{Error, Task};
 
 /// Judge the cells over `axes`: 0 where all members are stable, the largest number of unstable
 /// roots found, −1 for infinitely many, −2 where undecided. `ranges` holds intervals and values of
@@ -58,7 +59,7 @@ pub fn robust_map(
         judged
     };
     let cells = first.points.len().saturating_mul(width);
-    memory::in_parallel("the map", cells, || cell.clone(), judged)
+    parallel::results("the map", cells, || cell.clone(), judged)
 }
 
 /// A point of an interval.

@@ -6,7 +6,7 @@ use super::block::Grid;
 use super::blocks;
 use super::chart::Chart;
 use crate::Error;
-use crate::memory::in_parallel;
+use crate::parallel;
 use crate::stability::crossings::{ByParts, Crossing, Delay, Members, Row};
 use crate::stability::family::Family;
 use crate::stability::specification::Specification;
@@ -226,7 +226,7 @@ impl<'a> Rows<'a> {
         work: impl Fn(usize, Members<'_>) -> Result<T, Error> + Sync,
     ) -> Result<Vec<T>, Error> {
         let across = self.across();
-        in_parallel(
+        parallel::results(
             "the list of rows of the map",
             across.points.len(),
             || (),

@@ -12,7 +12,7 @@
 
 use crate::simd::{Mask, Outlined, Real, Simd};
 
-use super::loops::Loops;
+use super::loops::{Controllers, Runs};
 use super::transition::{Matrix, product, row};
 
 /// Largest degree: the work grows with its square, and few digits remain.
@@ -30,19 +30,20 @@ pub(super) struct Decay<S: Simd> {
 }
 
 /// Are all poles within `radius` of zero?
-pub(super) struct Within<'a, S: Simd, const N: usize, const P: usize> {
-    pub(super) loops: &'a Loops<S, N, P>,
+pub(super) struct Within<'a, S: Simd, const N: usize> {
+    pub(super) runs: &'a Runs<S>,
+    pub(super) controllers: &'a Controllers<S, N>,
     pub(super) radius: Real<S>,
 }
 
-impl<S: Simd, const N: usize, const P: usize> Outlined for Within<'_, S, N, P> {
+impl<S: Simd, const N: usize> Outlined for Within<'_, S, N> {
     type Output = Decay<S>;
 
     #[inline(always)]
     fn run(self) -> Decay<S> {
-        let (loops, radius) = (self.loops, self.radius);
-        let (zero, no_lane) = (loops.plants.zero, loops.plants.no_lane);
-        let degree = N + loops.plants.samples + 1;
+        let (runs, radius) = (self.runs, self.radius);
+        let (zero, no_lane) = (runs.zero, runs.no_lane);
+        let degree = N + runs.samples + 1;
         if degree > MOST_DEGREE {
             return Decay {
                 yes: no_lane,
@@ -50,7 +51,7 @@ impl<S: Simd, const N: usize, const P: usize> Outlined for Within<'_, S, N, P> {
             };
         }
         let mut terms = [zero; MOST_DEGREE + 1];
-        self.characteristic(&mut terms, loops.plants.samples + 1);
+        self.characteristic(&mut terms, runs.samples + 1);
         let mut power = radius;
         for term in terms.iter_mut().take(degree + 1).skip(1) {
             *term = *term * power;
@@ -76,12 +77,12 @@ impl<S: Simd, const N: usize, const P: usize> Outlined for Within<'_, S, N, P> {
     }
 }
 
-impl<S: Simd, const N: usize, const P: usize> Within<'_, S, N, P> {
+impl<S: Simd, const N: usize> Within<'_, S, N> {
     /// The coefficients of the characteristic polynomial, ascending.
     #[inline(always)]
     fn characteristic(&self, terms: &mut [Real<S>], shift: usize) {
-        let (map, k, l) = (&self.loops.step, &self.loops.k, self.loops.l);
-        let zero = self.loops.plants.zero;
+        let Controllers { k, l, step: map } = self.controllers;
+        let zero = self.runs.zero;
         let mut phi: Matrix<S, N> = map.growth;
         for (i, row) in phi.iter_mut().enumerate() {
             row[i] = row[i] + 1.0;
@@ -93,7 +94,7 @@ impl<S: Simd, const N: usize, const P: usize> Within<'_, S, N, P> {
             for (i, row) in adjugate.iter_mut().enumerate() {
                 row[i] = row[i] + coefficient;
             }
-            self.add(terms, N + 1 - j, coefficient, shift, l);
+            self.add(terms, N + 1 - j, coefficient, shift, *l);
             let (mut before, mut after) = (zero, zero);
             for i in 0..N {
                 before = k[i].mul_add(row(&adjugate[i], &map.before, zero), before);
@@ -108,7 +109,7 @@ impl<S: Simd, const N: usize, const P: usize> Within<'_, S, N, P> {
             }
             coefficient = trace * (-1.0 / j as f64);
         }
-        self.add(terms, 0, coefficient, shift, l);
+        self.add(terms, 0, coefficient, shift, *l);
     }
 
     /// Add a term of a(z) (z^`shift` − L).

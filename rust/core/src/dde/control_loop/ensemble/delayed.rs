@@ -13,15 +13,15 @@
     reason = "indices as in the formulas; closures would not be compiled for the vectors"
 )]
 
-use crate::simd::{Mask, Outlined, Real, Simd, outlined};
+use crate::simd::{Mask, Outlined, Real, Simd, flat, outlined};
 
 use super::block::{Block, Number};
 use super::decay::Decay;
-use super::loops::{Part, Plants};
-use super::piece::LONG;
+use super::loops::{Part, Plants, Runs};
+use super::piece::{LONG, Piece};
 use super::saturated::Saturated;
 use super::trace::{CHUNK, Summary, Trace, delays};
-use super::transition::{Map, row};
+use super::transition::row;
 use super::walk::{Ends, Run, are_sound, longer};
 
 /// Upper bounds on σ − σ^j for j from 2 on: σ^j c stays within c times this of its chord.
@@ -37,7 +37,8 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Loops in lanes. A sample is one delay, but for the second one where the command is at its limit
 /// at first.
 pub(super) struct Delayed<S: Simd, const N: usize> {
-    pub(super) plants: Plants<S, N>,
+    pub(super) runs: Runs<S>,
+    plants: Plants<S, N>,
     k: [Real<S>; N],
     l: Real<S>,
     /// Length of a part.
@@ -74,12 +75,11 @@ impl<S: Simd, const N: usize> Outlined for Made<'_, S, N> {
     fn run(self) -> Delayed<S, N> {
         let (simd, block, pair) = (self.simd, self.block, self.pair);
         let delay = block.number(simd, Number::Delay, pair);
-        let mut plants = Plants::new::<N>(simd, block, pair, (delay, self.span));
+        let mut runs = Runs::new(simd, block, pair, (delay, self.span));
         let parts = block.shape.late;
         let h = delay / f64::from(parts);
         for number in 0..parts {
-            plants.parts.push(Part {
-                start: Map::nothing(plants.zero),
+            runs.parts.push(Part {
                 offset: h * f64::from(number),
                 length: h,
                 is_after: true,
@@ -87,14 +87,15 @@ impl<S: Simd, const N: usize> Outlined for Made<'_, S, N> {
             });
         }
         let mut loops = Delayed {
-            plants,
+            runs,
+            plants: Plants::new::<N>(simd, block, pair),
             k: block.column(simd, N * N + 2 * N, pair),
             l: block.number(simd, Number::L, pair),
             h,
             saturated: None,
         };
-        loops.saturated = Saturated::of(&loops.plants, (&loops.k, loops.l), h);
-        loops.plants.share = loops.saturated.as_ref().map(|saturated| saturated.share);
+        loops.saturated = Saturated::of(&loops.runs, &loops.plants, (&loops.k, loops.l), h);
+        loops.runs.share = loops.saturated.as_ref().map(|saturated| saturated.share);
         loops
     }
 }
@@ -115,7 +116,7 @@ pub(super) struct Steps<'a, S: Simd, const N: usize> {
 
 impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
     pub(super) fn new(loops: &'a Delayed<S, N>) -> Self {
-        let (zero, no_lane) = (loops.plants.zero, loops.plants.no_lane);
+        let (zero, no_lane) = (loops.runs.zero, loops.runs.no_lane);
         let saturated = loops.saturated.as_ref();
         Self {
             loops,
@@ -126,6 +127,12 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
             lost: no_lane,
             limited: saturated.map_or(no_lane, |saturated| saturated.unfit),
         }
+    }
+
+    /// Are the runs of all loops over?
+    #[inline(always)]
+    fn is_over(&self) -> bool {
+        self.loops.runs.are_over(self.number) || !(!self.limited).any()
     }
 
     /// See [`Run::advance`].
@@ -145,7 +152,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
     /// Advance by [`CHUNK`] samples.
     #[inline(always)]
     fn chunk(&mut self, trace: &mut Trace<S>) {
-        let loops = &self.loops.plants;
+        let loops = &self.loops.runs;
         let zero = loops.zero;
         let (terms, per_sample) = (loops.degree + 1, trace.per_sample);
         let mut part = trace.samples * per_sample;
@@ -185,7 +192,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
                 let u = trace.commands.get((number - 1) * terms).copied();
                 let sound = are_sound(&self.x) & are_sound(&[u.unwrap_or(zero)]);
                 self.lost = self.lost | (begin.lt(loops.end) & !sound);
-                self.output = row(&loops.c, &self.x, zero);
+                self.output = row(&self.loops.plants.c, &self.x, zero);
                 if let (Some(output), Some(place)) =
                     (trace.outputs.get_mut(part + 1), trace.bulges.get_mut(part))
                 {
@@ -214,13 +221,13 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
         terms: usize,
     ) -> (Real<S>, Real<S>) {
         let loops = self.loops;
-        let plants = &loops.plants;
-        let zero = plants.zero;
+        let (runs, plants) = (&loops.runs, &loops.plants);
+        let zero = runs.zero;
         let (mut x, mut change, mut bulge) = (self.x, [zero; N], zero);
         // Partial sums of the coefficients of the command, of which each of its values is a mean.
         let (mut sum, mut most, mut least) = (zero, zero, zero);
         let sample = zero.constant(self.number as f64);
-        let h = plants.length(sample, loops.h);
+        let h = runs.length(sample, loops.h);
         let commands = trace.commands.get_mut(number * terms..(number + 1) * terms);
         let outputs = trace.pieces.get_mut(part * terms..(part + 1) * terms);
         let (Some(commands), Some(outputs)) = (commands, outputs) else {
@@ -242,7 +249,7 @@ impl<'a, S: Simd, const N: usize> Steps<'a, S, N> {
                 x[i] = row(&plants.a[i], &old, plants.b[i] * w);
             }
             if j == 0 {
-                u = u + plants.command;
+                u = u + runs.command;
                 for i in 0..N {
                     x[i] = x[i] + plants.e[i];
                 }
@@ -277,22 +284,17 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
     fn begin(&mut self, trace: &mut Trace<S>) {
         let loops = self.loops;
         *self = Self::new(loops);
-        let plants = &loops.plants;
-        trace.per_sample = plants.parts.len();
-        (trace.jump, trace.is_curved) = (plants.jump, true);
+        let runs = &loops.runs;
+        trace.per_sample = runs.parts.len();
+        (trace.jump, trace.is_curved) = (runs.jump, true);
         trace.is_continuous = true;
         trace.commands.clear();
-        let numbers = trace.per_sample * (plants.degree + 1);
-        longer(&mut trace.commands, numbers, plants.zero);
+        let numbers = trace.per_sample * (runs.degree + 1);
+        longer(&mut trace.commands, numbers, runs.zero);
     }
 
     fn advance(&mut self, trace: &mut Trace<S>) -> bool {
         outlined(self.output.simd(), Advance { steps: self, trace })
-    }
-
-    #[inline(always)]
-    fn is_over(&self) -> bool {
-        self.loops.plants.are_over(self.number) || !(!self.limited).any()
     }
 
     fn unfit(&self) -> Mask<S> {
@@ -303,9 +305,13 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
         self.lost
     }
 
+    fn piece(&self, trace: &Trace<S>, parts: Real<S>, piece: &mut Piece<S>) {
+        stored(trace, parts, piece);
+    }
+
     /// The poles of loops with a delay are not tested here.
     fn decay(&self, _: Real<S>) -> Decay<S> {
-        let none = self.loops.plants.no_lane;
+        let none = self.loops.runs.no_lane;
         Decay {
             yes: none,
             no: none,
@@ -325,5 +331,24 @@ impl<S: Simd, const N: usize> Outlined for Advance<'_, '_, S, N> {
     #[inline(always)]
     fn run(self) -> bool {
         self.steps.go_on(self.trace)
+    }
+}
+
+/// The polynomials that continuous loops leave in their trace.
+fn stored<S: Simd>(trace: &Trace<S>, parts: Real<S>, piece: &mut Piece<S>) {
+    for (lane, &part) in parts.numbers().iter().enumerate() {
+        if part < 0.0 {
+            continue;
+        }
+        let stored = trace.polynomial(part as usize, piece.degree + 1);
+        let numbers = flat::<S>(stored)
+            .iter()
+            .skip(lane)
+            .step_by(Trace::<S>::WIDTH);
+        for (term, &number) in piece.terms.iter_mut().zip(numbers) {
+            if let Some(place) = term.numbers_mut().get_mut(lane) {
+                *place = number;
+            }
+        }
     }
 }

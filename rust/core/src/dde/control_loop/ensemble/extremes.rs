@@ -5,7 +5,7 @@ use crate::simd::{Mask, Real, Simd, outlined};
 use super::search::Search;
 use super::window::{EndsAt, Exceeds, Hit, Least, Strays};
 
-impl<S: Simd, const P: usize> Search<'_, S, P> {
+impl<S: Simd> Search<'_, S> {
     /// Extremes at corners, and the end of unrest.
     #[inline(always)]
     pub(super) fn corners(&mut self) {

@@ -8,7 +8,7 @@ use super::search::{Passing, Search};
 use super::trace::of;
 use super::window::{Reaches, Strays};
 
-impl<S: Simd, const P: usize> Search<'_, S, P> {
+impl<S: Simd> Search<'_, S> {
     /// When a level of the rise is reached.
     #[inline(always)]
     pub(super) fn rise(&mut self, is_end: bool) {

@@ -9,9 +9,7 @@ use super::transition::{Map, Matrix, Over, row, scaled};
 
 /// A part of a sample, on which the command that reaches the plant is constant.
 #[derive(Clone, Copy)]
-pub(super) struct Part<S: Simd, const P: usize> {
-    /// From the sample to the start of the part.
-    pub(super) start: Map<S, P>,
+pub(super) struct Part<S: Simd> {
     /// Time from the sample to the start of the part.
     pub(super) offset: Real<S>,
     /// Zero for the jump of the output at the arrival of a command.
@@ -36,15 +34,21 @@ pub(super) struct Corner<S: Simd, const P: usize> {
 
 /// Loops in lanes.
 pub(super) struct Loops<S: Simd, const N: usize, const P: usize> {
+    pub(super) runs: Runs<S>,
     pub(super) plants: Plants<S, P>,
+    pub(super) controllers: Controllers<S, N>,
+}
+
+/// What closes the loops.
+pub(super) struct Controllers<S: Simd, const N: usize> {
     pub(super) k: [Real<S>; N],
     pub(super) l: Real<S>,
     /// Over one sample.
     pub(super) step: Map<S, N>,
 }
 
-/// Their plants, and what is the same for any controller.
-pub(super) struct Plants<S: Simd, const P: usize> {
+/// What is the same for any number of states.
+pub(super) struct Runs<S: Simd> {
     pub(super) samples: usize,
     /// Are the loops continuous, so that a sample is one delay?
     pub(super) is_continuous: bool,
@@ -54,11 +58,6 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     /// Is the output before the first arrival of a command hidden, and jumps there? It is if it is
     /// read ahead by the delay.
     pub(super) hides: bool,
-    /// A, B, E r, C of the plant.
-    pub(super) a: Matrix<S, P>,
-    pub(super) b: [Real<S>; P],
-    pub(super) e: [Real<S>; P],
-    pub(super) c: [Real<S>; P],
     pub(super) d: Real<S>,
     /// M r.
     pub(super) command: Real<S>,
@@ -75,9 +74,7 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) end: Real<S>,
     /// The end and rounding errors: what happens up to this time belongs to the run.
     pub(super) latest: Real<S>,
-    pub(super) parts: Vec<Part<S, P>>,
-    /// All corners of a sample but the last one.
-    pub(super) corners: Vec<Corner<S, P>>,
+    pub(super) parts: Vec<Part<S>>,
     /// The output at the start, after a jump at once.
     pub(super) first_output: Real<S>,
     pub(super) zero: Real<S>,
@@ -86,10 +83,23 @@ pub(super) struct Plants<S: Simd, const P: usize> {
     pub(super) is_direct: bool,
     /// The number, within a sample, of the part that is the jump of the output; of no part if D = 0.
     pub(super) jump: usize,
-    /// Is the output the first state, D left out?
-    pub(super) is_first: bool,
     /// Does the reference reach the plant other than through the command?
     pub(super) is_pushed: bool,
+}
+
+/// The plants.
+pub(super) struct Plants<S: Simd, const P: usize> {
+    /// A, B, E r, C.
+    pub(super) a: Matrix<S, P>,
+    pub(super) b: [Real<S>; P],
+    pub(super) e: [Real<S>; P],
+    pub(super) c: [Real<S>; P],
+    /// Is the output the first state, D left out?
+    pub(super) is_first: bool,
+    /// From the sample to the start of each part; none of continuous loops.
+    pub(super) starts: Vec<Map<S, P>>,
+    /// All corners of a sample but the last one.
+    pub(super) corners: Vec<Corner<S, P>>,
     /// The output exceeds its values at both ends of a part by at most bulge · |x′| at the sample,
     /// plus `bulge_of_jump` times the change of the command that reaches the plant.
     pub(super) bulge: [Real<S>; P],
@@ -116,19 +126,20 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             let early = early.larger(zero).smaller(sample_time);
             (sample_time - early, early)
         };
-        let mut plants = Plants::new::<N>(simd, block, pair, (sample_time, span));
+        let mut runs = Runs::new(simd, block, pair, (sample_time, span));
+        let mut plants = Plants::new::<N>(simd, block, pair);
         let mut step = Map::nothing(zero);
         let mut offset = zero;
         for (parts, length, is_after) in [(shape.early, early, false), (shape.late, late, true)] {
             let mut part = Part {
-                start: step.leading(zero),
                 offset,
                 length: zero,
                 is_after,
                 is_jump: true,
             };
             if is_after && shape.jumps {
-                plants.parts.push(part);
+                runs.parts.push(part);
+                plants.starts.push(step.leading(zero));
             }
             if parts == 0 {
                 continue;
@@ -142,55 +153,69 @@ impl<S: Simd, const N: usize, const P: usize> Loops<S, N, P> {
             };
             let held = over.held();
             for _ in 0..parts {
-                (part.start, part.offset) = (step.leading(zero), offset);
-                plants.parts.push(part);
+                part.offset = offset;
+                runs.parts.push(part);
+                plants.starts.push(step.leading(zero));
                 step = step.then(&held, !is_after);
                 offset = offset + part.length;
             }
         }
-        if plants.hides || (shape.jumps && shape.samples == 0 && shape.early == 0) {
-            plants.first_output = plants.d * plants.command.min(plants.limit).max(-plants.limit);
+        if runs.hides || (shape.jumps && shape.samples == 0 && shape.early == 0) {
+            runs.first_output = runs.d * runs.command.min(runs.limit).max(-runs.limit);
         }
-        for place in 1..plants.parts.len() {
-            let corner = plants.corner(place - 1);
+        for place in 1..runs.parts.len() {
+            let corner = plants.corner(&runs, place - 1);
             plants.corners.push(corner);
         }
-        if plants.is_curved {
-            outlined(simd, Bulges(&mut plants));
+        if runs.is_curved {
+            let plants = &mut plants;
+            outlined(
+                simd,
+                Bulges {
+                    plants,
+                    runs: &runs,
+                },
+            );
         }
         Self {
+            runs,
             plants,
-            k: block.column(simd, N * N + 2 * N, pair),
-            l: block.number(simd, Number::L, pair),
-            step,
+            controllers: Controllers {
+                k: block.column(simd, N * N + 2 * N, pair),
+                l: block.number(simd, Number::L, pair),
+                step,
+            },
         }
     }
 }
 
 /// A function with |y″| ≤ M stays within M h²/8 of its chord, and y″ = c A e^{A t} x′.
-struct Bulges<'a, S: Simd, const P: usize>(&'a mut Plants<S, P>);
+struct Bulges<'a, S: Simd, const P: usize> {
+    plants: &'a mut Plants<S, P>,
+    runs: &'a Runs<S>,
+}
 
 impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let plants = self.0;
-        let zero = plants.zero;
+        let Self { plants, runs } = self;
+        let zero = runs.zero;
         let slope = along(&plants.c, &plants.a);
         let (mut most, mut longest) = ([zero; P], zero);
-        for part in &plants.parts {
+        for (part, start) in runs.parts.iter().zip(&plants.starts) {
             if part.is_jump {
                 continue;
             }
             longest = longest.larger(part.length);
             // c A e^{A t} at the start of the part, and the sum of its Taylor terms.
-            let mut term = along(&slope, &part.start.growth);
+            let mut term = along(&slope, &start.growth);
             for (term, start) in term.iter_mut().zip(&slope) {
                 *term = *term + *start;
             }
             let mut sum = absolute(&term);
-            for j in 1..=plants.degree {
+            for j in 1..=runs.degree {
                 let factor = part.length * (1.0 / j as f64);
                 term = scaled(&along(&term, &plants.a), factor);
                 for (sum, term) in sum.iter_mut().zip(&term) {
@@ -207,11 +232,11 @@ impl<S: Simd, const P: usize> Outlined for Bulges<'_, S, P> {
     }
 }
 
-impl<S: Simd, const P: usize> Plants<S, P> {
-    /// The plants of loops with `N` states, without the parts of their samples. A sample takes
-    /// `sample_time`; the output is read for `span` seconds.
+impl<S: Simd> Runs<S> {
+    /// Runs without the parts of their samples. A sample takes `sample_time`; the output is read for
+    /// `span` seconds.
     #[inline(always)]
-    pub(super) fn new<const N: usize>(
+    pub(super) fn new(
         simd: S,
         block: &Block,
         pair: usize,
@@ -219,7 +244,6 @@ impl<S: Simd, const P: usize> Plants<S, P> {
     ) -> Self {
         let zero = Real::splat(simd, 0.0);
         let shape = block.shape;
-        let push = block.column::<S, N>(simd, N * N + N, pair);
         let limit = block.number(simd, Number::Limit, pair);
         let delay = block.number(simd, Number::Delay, pair);
         let ahead = if block.is_ahead { delay } else { zero };
@@ -230,10 +254,6 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             is_curved: shape.is_curved,
             degree: usize::from(shape.degree),
             hides: shape.jumps && block.is_ahead,
-            a: leading(&block.matrix::<S, N>(simd, pair), zero),
-            b: first(&block.column::<S, N>(simd, N * N, pair), zero),
-            e: first(&scaled(&push, zero.constant(block.amplitude)), zero),
-            c: first(&block.column::<S, N>(simd, N * N + 3 * N, pair), zero),
             d: block.number(simd, Number::D, pair),
             command: block.number(simd, Number::M, pair) * block.amplitude,
             limit,
@@ -245,7 +265,6 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             end,
             latest: (end + sample_time).mul_add(32.0 * f64::EPSILON, end),
             parts: Vec::with_capacity(shape.corners()),
-            corners: Vec::with_capacity(shape.corners()),
             first_output: zero,
             zero,
             no_lane: zero.lt(0.0),
@@ -255,10 +274,7 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             } else {
                 usize::MAX
             },
-            is_first: shape.is_first,
             is_pushed: shape.is_pushed,
-            bulge: [zero; P],
-            bulge_of_jump: zero,
         }
     }
 
@@ -289,6 +305,27 @@ impl<S: Simd, const P: usize> Plants<S, P> {
             None => length,
         }
     }
+}
+
+impl<S: Simd, const P: usize> Plants<S, P> {
+    /// The plants of loops with `N` states, without the parts of their samples.
+    #[inline(always)]
+    pub(super) fn new<const N: usize>(simd: S, block: &Block, pair: usize) -> Self {
+        let zero = Real::splat(simd, 0.0);
+        let push = block.column::<S, N>(simd, N * N + N, pair);
+        let corners = block.shape.corners();
+        Self {
+            a: leading(&block.matrix::<S, N>(simd, pair), zero),
+            b: first(&block.column::<S, N>(simd, N * N, pair), zero),
+            e: first(&scaled(&push, zero.constant(block.amplitude)), zero),
+            c: first(&block.column::<S, N>(simd, N * N + 3 * N, pair), zero),
+            is_first: block.shape.is_first,
+            starts: Vec::with_capacity(corners),
+            corners: Vec::with_capacity(corners),
+            bulge: [zero; P],
+            bulge_of_jump: zero,
+        }
+    }
 
     /// C x.
     #[inline(always)]
@@ -296,34 +333,34 @@ impl<S: Simd, const P: usize> Plants<S, P> {
         if self.is_first {
             x[0]
         } else {
-            row(&self.c, x, self.zero)
+            row(&self.c, x, x[0].constant(0.0))
         }
     }
 
     /// The output at the end of a part other than the last one.
     #[inline(always)]
-    fn corner(&self, place: usize) -> Corner<S, P> {
-        let (part, next) = (&self.parts[place], &self.parts[place + 1]);
-        let map = &next.start;
+    fn corner(&self, runs: &Runs<S>, place: usize) -> Corner<S, P> {
+        let (part, next) = (&runs.parts[place], &runs.parts[place + 1]);
+        let (map, zero) = (&self.starts[place + 1], runs.zero);
         let mut states = self.c;
         for (j, state) in states.iter_mut().enumerate() {
             for i in 0..P {
                 *state = self.c[i].mul_add(map.growth[i][j], *state);
             }
         }
-        let mut before = row(&self.c, &map.before, self.zero);
-        let mut after = row(&self.c, &map.after, self.zero);
+        let mut before = row(&self.c, &map.before, zero);
+        let mut after = row(&self.c, &map.after, zero);
         let direct = if part.is_after {
             &mut after
         } else {
             &mut before
         };
-        *direct = *direct + self.d;
+        *direct = *direct + runs.d;
         Corner {
             states,
             before,
             after,
-            constant: row(&self.c, &map.push, self.zero),
+            constant: row(&self.c, &map.push, zero),
             is_after: part.is_after,
             offset: next.offset,
         }

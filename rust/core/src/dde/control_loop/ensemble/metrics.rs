@@ -4,7 +4,7 @@ use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics};
 use crate::simd::Simd;
 
 use super::each::{TIME_CONSTANTS, judged};
-use super::loops::Plants;
+use super::loops::Runs;
 use super::measured::Measured;
 use super::rounds::measure;
 use super::sets::{Measures, Outcome, SETS, of as number};
@@ -31,9 +31,9 @@ impl Job for MetricsJob<'_> {
     }
 
     #[inline(always)]
-    fn found<S: Simd, const P: usize>(
+    fn found<S: Simd>(
         &self,
-        loops: &Plants<S, P>,
+        loops: &Runs<S>,
         run: &mut dyn Run<S>,
         members: &[usize],
         trace: &mut Trace<S>,
@@ -51,10 +51,12 @@ impl Job for MetricsJob<'_> {
         let is_known = steady.eq(steady);
         if (!is_known).any() {
             let mut last = trace.last(zero);
-            if !run.is_over() {
-                while advance(loops, run, trace) {
-                    last = trace.last(last);
-                }
+            let mut is_longer = false;
+            while advance(loops, run, trace) {
+                last = trace.last(last);
+                is_longer = true;
+            }
+            if is_longer {
                 run.begin(trace);
                 runs = advance(loops, run, trace);
             }
@@ -67,7 +69,7 @@ impl Job for MetricsJob<'_> {
         });
         let mut measured = Measured::new(&levels, first, members.len());
         while runs {
-            measure(&View { loops, trace }, &mut measured);
+            measure(&View { loops, run, trace }, &mut measured);
             runs = advance(loops, run, trace);
         }
         let lost = run.lost().select(1.0, zero);
@@ -136,14 +138,10 @@ fn since(time: f64, ahead: f64) -> f64 {
 
 /// Run on, and store the outputs at the ends of runs that end inside a part.
 #[inline(always)]
-fn advance<S: Simd, const P: usize>(
-    loops: &Plants<S, P>,
-    run: &mut dyn Run<S>,
-    trace: &mut Trace<S>,
-) -> bool {
+fn advance<S: Simd>(loops: &Runs<S>, run: &mut dyn Run<S>, trace: &mut Trace<S>) -> bool {
     let runs = run.advance(trace);
     if runs && trace.is_cut.any() {
-        let output = View { loops, trace }.cut();
+        let output = View { loops, run, trace }.cut();
         for lane in trace.is_cut.lanes() {
             trace.set_last(lane, of(&output, lane));
         }

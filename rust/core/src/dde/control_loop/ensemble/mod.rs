@@ -16,6 +16,7 @@ mod block;
 mod decay;
 mod delayed;
 mod each;
+mod expand;
 mod extremes;
 mod levels;
 mod loops;

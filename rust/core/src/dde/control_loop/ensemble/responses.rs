@@ -2,7 +2,7 @@
 
 use crate::simd::Simd;
 
-use super::loops::Plants;
+use super::loops::Runs;
 use super::piece::Piece;
 use super::sets::Outcome;
 use super::through::Job;
@@ -23,9 +23,9 @@ impl Job for ResponsesJob<'_> {
     }
 
     #[inline(always)]
-    fn found<S: Simd, const P: usize>(
+    fn found<S: Simd>(
         &self,
-        loops: &Plants<S, P>,
+        loops: &Runs<S>,
         run: &mut dyn Run<S>,
         members: &[usize],
         trace: &mut Trace<S>,
@@ -41,7 +41,7 @@ impl Job for ResponsesJob<'_> {
         let mut runs = true;
         while runs {
             runs = run.advance(trace);
-            let view = View { loops, trace };
+            let view = View { loops, run, trace };
             loop {
                 let (mut sigma, mut is_due) = (zero, false);
                 let mut parts = zero.constant(-1.0);

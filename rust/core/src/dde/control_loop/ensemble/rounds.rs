@@ -13,7 +13,7 @@ use super::view::View;
 use super::window::Window;
 
 /// Measure a trace.
-pub(super) fn measure<S: Simd, const P: usize>(view: &View<'_, S, P>, measured: &mut Measured<S>) {
+pub(super) fn measure<S: Simd>(view: &View<'_, S>, measured: &mut Measured<S>) {
     let zero = view.loops.zero;
     let mut spots = spots(view, measured);
     measured.counts = measured.counts & spots.parts.gt(0.0);
@@ -28,9 +28,9 @@ pub(super) fn measure<S: Simd, const P: usize>(view: &View<'_, S, P>, measured: 
 }
 
 /// See [`measure`].
-struct Whole<'a, 'b, S: Simd, const P: usize>(&'a mut Search<'b, S, P>);
+struct Whole<'a, 'b, S: Simd>(&'a mut Search<'b, S>);
 
-impl<S: Simd, const P: usize> Outlined for Whole<'_, '_, S, P> {
+impl<S: Simd> Outlined for Whole<'_, '_, S> {
     type Output = ();
 
     #[inline(always)]

@@ -15,7 +15,7 @@
 use crate::dde::limits::DIVERGED;
 use crate::simd::{Mask, Real, Simd};
 
-use super::loops::Plants;
+use super::loops::{Plants, Runs};
 use super::piece::Piece;
 use super::transition::row;
 
@@ -35,27 +35,28 @@ impl<S: Simd> Saturated<S> {
     /// Of commands u = K x + L w + M r on parts of length `h`; none, if all begin within their limits.
     #[inline(always)]
     pub(super) fn of<const N: usize>(
+        runs: &Runs<S>,
         plants: &Plants<S, N>,
         (k, l): (&[Real<S>; N], Real<S>),
         h: Real<S>,
     ) -> Option<Self> {
-        let zero = plants.zero;
-        let beyond = plants.command.abs().gt(plants.limit);
+        let zero = runs.zero;
+        let beyond = runs.command.abs().gt(runs.limit);
         if !beyond.any() {
             return None;
         }
         let one = zero.constant(1.0);
-        let command = plants.command.lt(0.0).select(-plants.limit, plants.limit);
+        let command = runs.command.lt(0.0).select(-runs.limit, runs.limit);
         // A command that depends on the one of a delay before does not stay constant.
-        let mut open = beyond & l.eq(0.0) & plants.command.abs().le(DIVERGED);
+        let mut open = beyond & l.eq(0.0) & runs.command.abs().le(DIVERGED);
         let (mut samples, mut share, mut unfit) = (zero, one, beyond & !open);
-        let parts = plants.parts.len();
+        let parts = runs.parts.len();
         let mut x = [zero; N];
         let mut number = 0;
         loop {
             // A run ends where its own loop does, not where its neighbours do.
-            let begin = plants.time(zero.constant(number as f64), zero);
-            let over = open & !begin.le(plants.latest);
+            let begin = runs.time(zero.constant(number as f64), zero);
+            let over = open & !begin.le(runs.latest);
             samples = over.select(f64::INFINITY, samples);
             open = open & !over;
             if !open.any() {
@@ -63,9 +64,9 @@ impl<S: Simd> Saturated<S> {
             }
             let held = if number == 0 { zero } else { command };
             for part in 0..parts {
-                let excess = Excess::of(plants, k, h, &mut x, held);
+                let excess = Excess::of(runs, plants, k, h, &mut x, held);
                 let (stays, leaves) = excess.kinds(open);
-                let known = if number == 0 { plants.no_lane } else { leaves };
+                let known = if number == 0 { runs.no_lane } else { leaves };
                 unfit = unfit | (open & !stays & !known);
                 if known.any() {
                     let sigma = excess.0.zero(zero, zero, one, known);
@@ -93,18 +94,19 @@ impl<S: Simd> Excess<S> {
     /// Go from `x` to the end of a part on which the plant receives a constant.
     #[inline(always)]
     fn of<const N: usize>(
+        runs: &Runs<S>,
         plants: &Plants<S, N>,
         k: &[Real<S>; N],
         h: Real<S>,
         x: &mut [Real<S>; N],
         held: Real<S>,
     ) -> Self {
-        let zero = plants.zero;
-        let is_low = plants.command.lt(0.0);
+        let zero = runs.zero;
+        let is_low = runs.command.lt(0.0);
         let mut piece = Piece::new(zero);
-        piece.degree = plants.degree;
+        piece.degree = runs.degree;
         let mut term = *x;
-        for j in 0..=plants.degree {
+        for j in 0..=runs.degree {
             if j > 0 {
                 for i in 0..N {
                     x[i] = x[i] + term[i];
@@ -112,10 +114,10 @@ impl<S: Simd> Excess<S> {
             }
             let mut u = row(k, &term, zero);
             if j == 0 {
-                u = u + plants.command;
+                u = u + runs.command;
             }
             u = is_low.select(-u, u);
-            piece.terms[j] = if j == 0 { u - plants.limit } else { u };
+            piece.terms[j] = if j == 0 { u - runs.limit } else { u };
             let old = term;
             for i in 0..N {
                 term[i] = row(&plants.a[i], &old, zero);

@@ -16,8 +16,8 @@ use super::view::View;
 use super::window::{Hit, Seek, Test, Window};
 
 /// The search of a trace.
-pub(super) struct Search<'a, S: Simd, const P: usize> {
-    pub(super) view: &'a View<'a, S, P>,
+pub(super) struct Search<'a, S: Simd> {
+    pub(super) view: &'a View<'a, S>,
     pub(super) spots: &'a mut Spots<S>,
     pub(super) window: &'a mut Window<S>,
     /// The outputs on the parts that are examined, and polynomials whose zeros are sought.
@@ -25,7 +25,7 @@ pub(super) struct Search<'a, S: Simd, const P: usize> {
     pub(super) measured: &'a mut Measured<S>,
 }
 
-impl<S: Simd, const P: usize> Search<'_, S, P> {
+impl<S: Simd> Search<'_, S> {
     /// The first part of a range that passes a test.
     #[inline(always)]
     pub(super) fn seek<T: Test<S>, const BACK: bool>(

@@ -40,10 +40,7 @@ pub(super) struct Spots<S: Simd> {
     pub(super) last: Real<S>,
 }
 
-pub(super) fn spots<S: Simd, const P: usize>(
-    view: &View<'_, S, P>,
-    measured: &Measured<S>,
-) -> Spots<S> {
+pub(super) fn spots<S: Simd>(view: &View<'_, S>, measured: &Measured<S>) -> Spots<S> {
     let look = Look {
         trace: view.trace,
         measured,

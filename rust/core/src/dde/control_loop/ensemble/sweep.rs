@@ -1,7 +1,5 @@
 //! Metrics and responses of all sets.
 
-use rayon::prelude::*;
-
 use super::block::{Column, Members};
 use super::each;
 use super::metrics::MetricsJob;
@@ -11,6 +9,7 @@ use super::shape::{Shapes, plant_states};
 use super::through::{Job, through};
 use crate::dde::control_loop::metrics::{Criteria, Metrics};
 use crate::memory::{filled, push, reserved, room};
+use crate::parallel;
 use crate::{Error, Task};
 
 /// What memory is requested for, in errors.
@@ -71,7 +70,7 @@ impl Sets<'_> {
         };
         let mut results: Vec<Vec<J::Found>> = Vec::new();
         for group in blocks.chunks(at_once.div_ceil(SETS)) {
-            let work = |(blocks, found): (&[Members<'_>], &mut Vec<J::Found>)| {
+            let work = |_, (blocks, found): (&[Members<'_>], &mut Vec<J::Found>)| {
                 task.check()?;
                 let columns = blocks.iter().map(|(shape, _)| shape.columns()).max();
                 room::<Column>(SWEEP, columns.unwrap_or(0))?;
@@ -81,8 +80,7 @@ impl Sets<'_> {
             };
             let share = group.len().div_ceil(tasks).clamp(1, BLOCKS);
             results.resize_with(group.len().div_ceil(share), Vec::new);
-            let shares = group.par_chunks(share).zip(&mut results);
-            shares.map(work).collect::<Result<(), Error>>()?;
+            parallel::each(SWEEP, group.chunks(share).zip(&mut results), work)?;
             let mut found = results.iter_mut().flat_map(|found| found.drain(..));
             for (_, members) in group {
                 let mut members = *members;
@@ -96,14 +94,14 @@ impl Sets<'_> {
             }
         }
         for group in left.chunks(at_once) {
-            let work = |set: &usize| {
+            let work = |(): &mut (), index: usize| {
                 task.check()?;
-                let found = alone(*set)?;
+                let found = group.get(index).map(|set| alone(*set)).transpose()?;
                 task.advance(1);
                 Ok(found)
             };
-            let found: Result<Vec<_>, Error> = group.par_iter().map(work).collect();
-            for (set, found) in group.iter().zip(found?) {
+            let found = parallel::results(SWEEP, group.len(), || (), work)?;
+            for (set, found) in group.iter().zip(found.into_iter().flatten()) {
                 kept.single(*set, found);
             }
         }

@@ -6,7 +6,7 @@ use crate::simd::{Instructions, Outlined, Real, Simd, outlined};
 
 use super::block::{Block, Members};
 use super::delayed::{Delayed, Steps};
-use super::loops::{Loops, Plants};
+use super::loops::{Loops, Runs};
 use super::sets::{SETS, Sets};
 use super::trace::Trace;
 use super::walk::{Run, Walk};
@@ -20,9 +20,9 @@ pub(super) trait Job: Sync {
     fn done(found: &Self::Found) -> usize;
 
     /// Append the results of the lanes of `members`.
-    fn found<S: Simd, const P: usize>(
+    fn found<S: Simd>(
         &self,
-        plants: &Plants<S, P>,
+        loops: &Runs<S>,
         run: &mut dyn Run<S>,
         members: &[usize],
         trace: &mut Trace<S>,
@@ -48,7 +48,7 @@ pub(super) fn through<J: Job>(
     (span, job): (f64, &J),
     found: &mut Vec<J::Found>,
 ) {
-    Instructions::chosen().run(Through {
+    Instructions::chosen().run_widest(Through {
         sets,
         plant,
         blocks,
@@ -127,25 +127,25 @@ impl<S: Simd, J: Job> Pair<'_, S, J> {
             span: self.span,
         };
         let loops = outlined(self.simd, made);
-        self.process(&loops.plants, &mut Walk::new(&loops), trace, found);
+        self.process(&loops.runs, &mut Walk::new(&loops), trace, found);
     }
 
     /// Continuous loops.
     fn step<const N: usize>(&self, trace: &mut Trace<S>, found: &mut Vec<J::Found>) {
         let loops: Delayed<S, N> = Delayed::new(self.simd, self.block, self.pair, self.span);
-        self.process(&loops.plants, &mut Steps::new(&loops), trace, found);
+        self.process(&loops.runs, &mut Steps::new(&loops), trace, found);
     }
 
-    fn process<const P: usize>(
+    fn process(
         &self,
-        plants: &Plants<S, P>,
+        loops: &Runs<S>,
         run: &mut dyn Run<S>,
         trace: &mut Trace<S>,
         found: &mut Vec<J::Found>,
     ) {
         let job = Done {
             job: self.job,
-            plants,
+            loops,
             run,
             members: self.members,
             trace,
@@ -173,22 +173,22 @@ impl<S: Simd, const N: usize, const P: usize> Outlined for Made<'_, S, N, P> {
 }
 
 /// See [`Job::found`].
-struct Done<'a, S: Simd, J: Job, const P: usize> {
+struct Done<'a, S: Simd, J: Job> {
     job: &'a J,
-    plants: &'a Plants<S, P>,
+    loops: &'a Runs<S>,
     run: &'a mut dyn Run<S>,
     members: &'a [usize],
     trace: &'a mut Trace<S>,
     found: &'a mut Vec<J::Found>,
 }
 
-impl<S: Simd, J: Job, const P: usize> Outlined for Done<'_, S, J, P> {
+impl<S: Simd, J: Job> Outlined for Done<'_, S, J> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         let (members, trace) = (self.members, self.trace);
         self.job
-            .found(self.plants, self.run, members, trace, self.found);
+            .found(self.loops, self.run, members, trace, self.found);
     }
 }

@@ -3,27 +3,22 @@
 //! Place 0 is the begin of the trace and place i the end of part i − 1, so that part p lies between
 //! places p and p + 1.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "indices as in the formulas; closures would not be compiled for the vectors"
-)]
-
 use crate::dde::limits::slack;
-use crate::simd::{Mask, Outlined, Real, Simd, flat, outlined};
+use crate::simd::{Mask, Real, Simd};
 
-use super::loops::Plants;
+use super::loops::Runs;
 use super::piece::Piece;
 use super::trace::{CHUNK, Trace, of};
-use super::transition::row;
-use super::window::shared;
+use super::walk::Run;
 
 /// A trace with its loops.
-pub(super) struct View<'a, S: Simd, const P: usize> {
-    pub(super) loops: &'a Plants<S, P>,
+pub(super) struct View<'a, S: Simd> {
+    pub(super) loops: &'a Runs<S>,
+    pub(super) run: &'a dyn Run<S>,
     pub(super) trace: &'a Trace<S>,
 }
 
-impl<S: Simd, const P: usize> View<'_, S, P> {
+impl<S: Simd> View<'_, S> {
     /// Parts of a chunk.
     #[inline]
     pub(super) fn per_chunk(&self) -> usize {
@@ -78,7 +73,7 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         )
     }
 
-    /// [`Plants::time`] of a lane.
+    /// [`Runs::time`] of a lane.
     #[inline]
     fn time(&self, lane: usize, sample: f64, offset: f64) -> f64 {
         let sample_time = of(&self.loops.sample_time, lane);
@@ -122,12 +117,9 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
 
     /// Make `piece` the output on one part of each loop in `wanted`, any polynomial of the others.
     pub(super) fn piece(&self, parts: Real<S>, wanted: Mask<S>, piece: &mut Piece<S>) {
-        let made = PieceOf {
-            view: self,
-            parts: wanted.select(parts, parts.constant(-1.0)),
-            piece,
-        };
-        outlined(self.loops.d.simd(), made);
+        piece.degree = self.loops.degree;
+        let parts = wanted.select(parts, parts.constant(-1.0));
+        self.run.piece(self.trace, parts, piece);
     }
 
     /// The part of a time, and σ in it; none if it is not in the trace.
@@ -174,123 +166,5 @@ impl<S: Simd, const P: usize> View<'_, S, P> {
         let parts = self.trace.count;
         let place = (parts, self.until(parts));
         self.outputs(place, self.trace.is_cut, &mut Piece::new(parts))
-    }
-}
-
-/// See [`View::piece`].
-struct PieceOf<'a, S: Simd, const P: usize> {
-    view: &'a View<'a, S, P>,
-    /// Negative where none is wanted.
-    parts: Real<S>,
-    piece: &'a mut Piece<S>,
-}
-
-impl<S: Simd, const P: usize> PieceOf<'_, S, P> {
-    /// The states and commands of sampled loops, and the numbers of the parts within their samples.
-    #[inline(always)]
-    fn gather(&self, x: &mut [Real<S>; P], [before, after, numbers]: [&mut Real<S>; 3]) {
-        let trace = self.view.trace;
-        for (lane, &part) in self.parts.numbers().iter().enumerate() {
-            if part < 0.0 {
-                continue;
-            }
-            let (sample, number) = trace.split(part as usize);
-            let states = trace.states.get(sample * P..(sample + 1) * P);
-            let states = states.unwrap_or_default();
-            for (x, state) in x.iter_mut().zip(states) {
-                x.numbers_mut()[lane] = of(state, lane);
-            }
-            if let Some([one, two]) = trace.commands.get(sample..sample + 2) {
-                before.numbers_mut()[lane] = of(one, lane);
-                after.numbers_mut()[lane] = of(two, lane);
-            }
-            numbers.numbers_mut()[lane] = number as f64;
-        }
-    }
-
-    /// The polynomials that continuous loops leave in their trace.
-    #[inline(always)]
-    fn stored(self) {
-        let piece = self.piece;
-        for (lane, &part) in self.parts.numbers().iter().enumerate() {
-            if part < 0.0 {
-                continue;
-            }
-            let part = part as usize;
-            let stored = self.view.trace.polynomial(part, piece.degree + 1);
-            let numbers = flat::<S>(stored)
-                .iter()
-                .skip(lane)
-                .step_by(Trace::<S>::WIDTH);
-            for (term, &number) in piece.terms.iter_mut().zip(numbers) {
-                if let Some(place) = term.numbers_mut().get_mut(lane) {
-                    *place = number;
-                }
-            }
-        }
-    }
-}
-
-impl<S: Simd, const P: usize> Outlined for PieceOf<'_, S, P> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let (view, loops) = (self.view, self.view.loops);
-        let zero = loops.zero;
-        self.piece.degree = loops.degree;
-        if loops.is_continuous {
-            self.stored();
-            return;
-        }
-        let wanted = self.parts.ge(0.0);
-        let (mut x, mut before, mut after, mut numbers) = ([zero; P], zero, zero, zero);
-        // Neighbours often have the same part.
-        if let Some(part) = shared(self.parts, wanted) {
-            let (sample, number) = view.trace.split(part as usize);
-            let states = view.trace.states.get(sample * P..(sample + 1) * P);
-            if let (Some(states), Some(&[one, two])) =
-                (states, view.trace.commands.get(sample..sample + 2))
-            {
-                x.copy_from_slice(states);
-                (before, after) = (one, two);
-            }
-            numbers = zero.constant(number as f64);
-        } else {
-            self.gather(&mut x, [&mut before, &mut after, &mut numbers]);
-        }
-        let sample = x;
-        let (mut w, mut h) = (before, zero);
-        for (number, part) in loops.parts.iter().enumerate() {
-            let here = numbers.eq(number as f64);
-            if !here.any() {
-                continue;
-            }
-            h = here.select(part.length, h);
-            if part.is_after {
-                w = here.select(after, w);
-            }
-            if number > 0 {
-                let start = part.start.apply(&sample, before, after);
-                for (x, start) in x.iter_mut().zip(start) {
-                    *x = here.select(start, *x);
-                }
-            }
-        }
-        let piece = self.piece;
-        piece.terms[0] = row(&loops.c, &x, loops.d * w);
-        let mut v = x;
-        for i in 0..P {
-            v[i] = row(&loops.a[i], &x, loops.b[i].mul_add(w, loops.e[i])) * h;
-        }
-        piece.terms[1] = loops.seen(&v);
-        for j in 2..=piece.degree {
-            let factor = h * (1.0 / j as f64);
-            let old = v;
-            for i in 0..P {
-                v[i] = row(&loops.a[i], &old, zero) * factor;
-            }
-            piece.terms[j] = loops.seen(&v);
-        }
     }
 }

@@ -9,7 +9,9 @@ use crate::dde::limits::DIVERGED;
 use crate::simd::{Mask, Outlined, Real, Simd, outlined};
 
 use super::decay::{Decay, Within};
-use super::loops::Loops;
+use super::expand::Expand;
+use super::loops::{Loops, Runs};
+use super::piece::Piece;
 use super::trace::{CHUNK, SAMPLES, Summary, Trace};
 use super::transition::row;
 
@@ -18,17 +20,19 @@ pub(super) trait Run<S: Simd> {
     /// Begin again.
     fn begin(&mut self, trace: &mut Trace<S>);
 
-    /// Run on for as many samples as a trace holds. False, if the runs of all loops are over.
+    /// Run on for as many samples as a trace holds. False, with the trace as it was, if the runs of all
+    /// loops are over.
     fn advance(&mut self, trace: &mut Trace<S>) -> bool;
-
-    /// Are the runs of all loops over?
-    fn is_over(&self) -> bool;
 
     /// The loops whose response exceeds all limits before its end.
     fn lost(&self) -> Mask<S>;
 
     /// The loops that this method cannot simulate, as it turned out.
     fn unfit(&self) -> Mask<S>;
+
+    /// Make `piece` the output on one part of each loop; none is wanted where the number of the part
+    /// is negative, and any polynomial is made there.
+    fn piece(&self, trace: &Trace<S>, parts: Real<S>, piece: &mut Piece<S>);
 
     /// Are all poles of the loops without their limits within `radius` of zero?
     fn decay(&self, radius: Real<S>) -> Decay<S>;
@@ -49,27 +53,27 @@ pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
 impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
     #[inline(always)]
     pub(super) fn new(loops: &'a Loops<S, N, P>) -> Self {
-        let plants = &loops.plants;
+        let runs = &loops.runs;
         Self {
             loops,
-            x: [plants.zero; N],
-            output: plants.first_output,
-            inside: plants.first_output,
+            x: [runs.zero; N],
+            output: runs.first_output,
+            inside: runs.first_output,
             number: 0,
-            lost: plants.no_lane,
+            lost: runs.no_lane,
         }
     }
 
     /// Time of sample `number`.
     #[inline(always)]
     fn time(&self, number: usize) -> Real<S> {
-        self.loops.plants.sample_time * number as f64
+        self.loops.runs.sample_time * number as f64
     }
 
     /// See [`Run::advance`].
     #[inline(always)]
     fn go_on(&mut self, trace: &mut Trace<S>) -> bool {
-        let loops = &self.loops.plants;
+        let loops = &self.loops.runs;
         if loops.are_over(self.number) {
             return false;
         }
@@ -102,8 +106,8 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
     /// and does nothing where some response may have exceeded all limits.
     #[inline(always)]
     fn chunk<const EXACT: bool>(&mut self, trace: &mut Trace<S>) -> bool {
-        let feedback = self.loops;
-        let loops = &feedback.plants;
+        let (loops, plants) = (&self.loops.runs, &self.loops.plants);
+        let controllers = &self.loops.controllers;
         let mut summary = Summary {
             most: self.inside,
             least: self.inside,
@@ -122,11 +126,11 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         let (mut lost, mut size) = (self.lost, loops.zero);
         // Copies of few numbers stay in registers while the trace is written; more are read faster
         // where they are.
-        let copies = (feedback.k, feedback.step);
+        let copies = (controllers.k, controllers.step);
         let (k, step) = if N == 1 {
             (&copies.0, &copies.1)
         } else {
-            (&feedback.k, &feedback.step)
+            (&controllers.k, &controllers.step)
         };
         let (limit, lowest) = (loops.limit, -loops.limit);
         let first_sample = trace.samples;
@@ -136,7 +140,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
                 break;
             };
             let before = commands.first().copied().unwrap_or(loops.zero);
-            let u = row(k, &x, feedback.l.mul_add(before, loops.command));
+            let u = row(k, &x, controllers.l.mul_add(before, loops.command));
             let w = u.min(limit).max(lowest);
             if let Some(place) = commands.last_mut() {
                 *place = w;
@@ -144,11 +148,11 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             let after = commands.get(1).copied().unwrap_or(w);
             if loops.is_curved {
                 let held = if is_late { after } else { before };
-                let mut bulge = (after - before).abs() * loops.bulge_of_jump;
+                let mut bulge = (after - before).abs() * plants.bulge_of_jump;
                 for i in 0..P {
-                    let forced = loops.b[i].mul_add(held, loops.e[i]);
-                    let slope = row(&loops.a[i], &first(&x), forced);
-                    bulge = slope.abs().mul_add(loops.bulge[i], bulge);
+                    let forced = plants.b[i].mul_add(held, plants.e[i]);
+                    let slope = row(&plants.a[i], &first(&x), forced);
+                    bulge = slope.abs().mul_add(plants.bulge[i], bulge);
                 }
                 summary.bulge = summary.bulge.max(bulge);
                 if let Some(place) = trace.bulges.get_mut(sample) {
@@ -171,7 +175,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             };
             let is_hidden = loops.hides && number <= loops.samples;
             let mut begin = now;
-            for (corner, place) in loops.corners.iter().zip(places) {
+            for (corner, place) in plants.corners.iter().zip(places) {
                 let mut forced = corner.before * before;
                 if corner.is_after {
                     forced = corner.after.mul_add(after, forced);
@@ -201,7 +205,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             } else {
                 size = row(&x, &x, u.mul_add(u, size));
             }
-            output = loops.seen(&first(&x));
+            output = plants.seen(&first(&x));
             if loops.is_direct {
                 output = loops.d.mul_add(after, output);
             }
@@ -232,6 +236,18 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         trace.chunks.push(summary);
         true
     }
+}
+
+/// A trace at the begin of runs, with no commands before.
+#[inline(never)]
+fn begun<S: Simd>(runs: &Runs<S>, trace: &mut Trace<S>) {
+    let history = runs.samples + 1;
+    longer(&mut trace.commands, history + SAMPLES, runs.zero);
+    let commands = trace.commands.iter_mut();
+    commands.take(history).for_each(|u| *u = runs.zero);
+    trace.per_sample = runs.parts.len();
+    (trace.jump, trace.is_curved) = (runs.jump, runs.is_curved);
+    trace.is_continuous = false;
 }
 
 /// Are all numbers within the limit on those of a response?
@@ -275,18 +291,7 @@ impl<S: Simd> Ends<S> {
 impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
     fn begin(&mut self, trace: &mut Trace<S>) {
         *self = Self::new(self.loops);
-        let plants = &self.loops.plants;
-        let zero = plants.zero;
-        let history = plants.samples + 1;
-        longer(&mut trace.commands, history + SAMPLES, zero);
-        trace
-            .commands
-            .iter_mut()
-            .take(history)
-            .for_each(|u| *u = zero);
-        trace.per_sample = plants.parts.len();
-        (trace.jump, trace.is_curved) = (plants.jump, plants.is_curved);
-        trace.is_continuous = false;
+        begun(&self.loops.runs, trace);
     }
 
     fn advance(&mut self, trace: &mut Trace<S>) -> bool {
@@ -294,21 +299,36 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
         outlined(simd, Advance { walk: self, trace })
     }
 
-    fn is_over(&self) -> bool {
-        self.loops.plants.are_over(self.number)
-    }
-
     fn lost(&self) -> Mask<S> {
         self.lost
     }
 
     fn unfit(&self) -> Mask<S> {
-        self.loops.plants.no_lane
+        self.loops.runs.no_lane
+    }
+
+    fn piece(&self, trace: &Trace<S>, parts: Real<S>, piece: &mut Piece<S>) {
+        let Loops { runs, plants, .. } = self.loops;
+        let expand = Expand {
+            runs,
+            plants,
+            trace,
+            parts,
+            piece,
+        };
+        outlined(parts.simd(), expand);
     }
 
     fn decay(&self, radius: Real<S>) -> Decay<S> {
-        let loops = self.loops;
-        outlined(radius.simd(), Within { loops, radius })
+        let Loops {
+            runs, controllers, ..
+        } = self.loops;
+        let within = Within {
+            runs,
+            controllers,
+            radius,
+        };
+        outlined(radius.simd(), within)
     }
 }
 

@@ -5,9 +5,8 @@
 //! alone, so that results have the same bits for any number of threads. A pole violates a decay σ
 //! if it lies outside the circle |z| = e^(−σ Ts).
 
-use rayon::prelude::*;
-
 use crate::dde::control_loop::linear_loop::{Equations, LinearLoop};
+use crate::parallel;
 use crate::status::CellStatus;
 use crate::{Error, Task, memory};
 
@@ -75,17 +74,14 @@ pub fn abscissa_grid(
         status: CellStatus::Undecided,
     };
     let mut found = memory::filled("the map", unknown, cells.cells)?;
-    found
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .try_for_each(|(chunk, places)| {
-            task.check()?;
-            for (i, place) in places.iter_mut().enumerate() {
-                *place = rows.cell(chunk * CHUNK + i, decay, shared.as_ref())?;
-            }
-            task.advance(places.len() as u64);
-            Ok(())
-        })?;
+    parallel::each("the map", found.chunks_mut(CHUNK), |chunk, places| {
+        task.check()?;
+        for (i, place) in places.iter_mut().enumerate() {
+            *place = rows.cell(chunk * CHUNK + i, decay, shared.as_ref())?;
+        }
+        task.advance(places.len() as u64);
+        Ok(())
+    })?;
     Ok(found)
 }
 
