@@ -31,6 +31,7 @@ from deadtime.logs.latencies._controller import (
     smeared,
 )
 from deadtime.logs.latencies._filters import FilterDelay, filters_of
+from deadtime.logs.latencies._live import around_the_vehicle
 from deadtime.logs.latencies._relation import LoopLatency, doubted_by_clocks, relation_of
 from deadtime.logs.latencies._windows import (
     Window,
@@ -185,10 +186,29 @@ class Latency(ReadOnlyArrays, Pictured):
 
         Needs matplotlib.
         """
-        from deadtime._base.page import write_page
-        from deadtime.logs.latencies._page import render
+        from deadtime._base.page import page, write_page
+        from deadtime.logs.latencies._page import budget_of, fit_of, row_of, sentence
 
-        return write_page(render(self), Path(path))
+        told = self.estimated
+        text = page(
+            "logs/latencies/page.html",
+            title=f"Latencies in {self.source}",
+            described=self.vehicle,
+            verdict=self.headline(),
+            rows=[row_of(one) for one in told],
+            all=self._picture(),
+            budget=budget_of(self.stages),
+            filters=[
+                (one.name, one.path, stated(one.delay, 0.0, "s"), one.source)
+                for one in self.filters
+            ],
+            link="" if self.link is None else sentence(self.link.summary()),
+            fits=[fit_of(one) for one in told],
+            refused=[one for one in self.loops if one.estimate is None],
+            remarks=self.remarks,
+            around=around_the_vehicle(told),
+        )
+        return write_page(text, Path(path))
 
     def __repr__(self) -> str:
         return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops told>"
