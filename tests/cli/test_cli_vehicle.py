@@ -61,7 +61,7 @@ def test_a_watched_link_with_a_key_believes_signed_messages_only():
 
     thread = threading.Thread(target=send)
     thread.start()
-    rows = heard_rows(LinkAddress("udp", "127.0.0.1", port), "z", 5.0, KEY)
+    rows = heard_rows(LinkAddress("udp", "127.0.0.1", port), "z", 5.0, KEY, system=1)
     heights = {next(rows).output for _ in range(20)}
     done.set()
     thread.join()

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import codecs
 import json
+import math
+import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 import urllib.error
@@ -14,6 +20,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from browser import check_tab, chromium
+from command_line import run
 from deadtime._cli.watch import recorded_rows
 from deadtime._cli.watch_page import WatchPage
 from deadtime.estimation import online
@@ -77,6 +84,100 @@ def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
         list(growing_rows(path, COLUMNS, 0.1))
 
 
+CONTENT = "time;ö;command\n0,0;1,25;-0,5\n0,1;1,5;0\n"
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        CONTENT.encode(),
+        codecs.BOM_UTF8 + CONTENT.encode(),
+        CONTENT.encode("utf-16"),
+        CONTENT.encode("latin-1"),
+        CONTENT.replace("\n", "\r\n").encode("utf-16"),
+        CONTENT.replace("\n", "\r").encode("latin-1"),
+        CONTENT.replace(",", ".").replace(";", ",").encode("utf-16"),
+        CONTENT.replace(",", ".").replace(";", "  ").encode("latin-1"),
+        CONTENT.replace("\n0,1", "\n# a remark\n\n0,1").encode(),
+        b'time,\xf6,command\n"0,0","1,25","-0,5"\n"0,1","1,5",0\n',
+    ],
+)
+def test_a_growing_table_may_be_in_every_encoding_and_with_every_separator(
+    tmp_path, monkeypatch, raw
+):
+    """Marks, UTF-16, Latin-1, and semicolons with decimal commas were refused."""
+    path, columns = tmp_path / "log.csv", ("time", "ö", "command")
+    path.write_bytes(raw[:7])
+
+    def write():
+        with path.open("ab") as file:
+            file.write(raw[7:])
+
+    monkeypatch.setattr(_growing, "time", Clock(write))
+    rows = list(growing_rows(path, columns, 5.0))
+    assert rows == [Row(0.0, 1.25, -0.5), Row(0.1, 1.5, 0.0)]
+    assert rows == list(growing_rows(path, columns, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("raw", "said"),
+    [
+        (b"time,output,command\n0.0,1.0,0.5" + b"0" * 200_000, "line 2 .*more than 100000 char"),
+        (b"0" * 200_000, "line 1 .*more than 100000 char"),
+        (b"time,output,command\n0.0,1.0,x" + b"0" * 90_000, r"line 2 .{,200}give a finite number"),
+        (b"time,output,command\n0.0,inf,0.5\n", "line 2 .*give a finite number"),
+        (b"time,output,command\nnan,1.0,0.5\n", "line 2 .*give a finite number"),
+        (b'time,output,command\n0.0,"1.0,0.5\n', "line 2 .*give a finite number"),
+        (b"time;output;command\n1,234;1;1\n", "line 2 .*write a decimal point"),
+        (b"time;output;command\n0,5;1.5;1\n", "line 2 .*write a decimal point"),
+        (b"\x1f\x8b\x08\x00", "only a text can be followed"),
+        (b"\x00\x01\x02", "is not a text file"),
+        (b"\xa3\x95\x80", "open_log"),
+    ],
+)
+def test_what_is_no_growing_table_is_refused_in_a_short_line(tmp_path, raw, said):
+    """A line of 131 073 characters was a traceback."""
+    path = tmp_path / "log.csv"
+    path.write_bytes(raw)
+    with pytest.raises(dtm.RecordingError, match=said) as refusal:
+        list(growing_rows(path, COLUMNS, 0.0))
+    assert len(str(refusal.value)) < 400 + len(str(path))
+
+
+def table(tmp_path, end=""):
+    rows = "".join(f"{0.1 * k!r},{0.01 * k!r},0.1\n" for k in range(30))
+    path = tmp_path / "log.csv"
+    path.write_text("time,output,command\n" + rows + end)
+    return path
+
+
+def test_an_error_loses_no_row_that_came_before(tmp_path):
+    """One wrong line ended the command without the summary of all others."""
+    path = table(tmp_path, "3.0,inf,0.1\n")
+    done = run("watch", path, "--follow", "--noise", 0.01, "--silence", 0.1)
+    assert done.returncode == 1
+    assert "line 32" in done.stderr
+    assert "30 rows; of those that are printed above:" in done.stdout
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGTERM to catch")
+def test_sigterm_ends_as_ctrl_c_does(tmp_path):
+    """The summary was lost."""
+    command = ["watch", str(table(tmp_path)), "--follow", "--noise", "0.01"]
+    program = "from deadtime._cli.app import run; run()"
+    with subprocess.Popen(
+        [sys.executable, "-uc", program, *command], stdout=subprocess.PIPE, text=True
+    ) as watching:
+        assert watching.stdout is not None
+        for line in watching.stdout:
+            if line.startswith("2."):  # the last row that is printed
+                break
+        watching.send_signal(signal.SIGTERM)
+        rest = watching.stdout.read()
+    assert watching.returncode == 0
+    assert "30 rows; of those that are printed above:" in rest
+
+
 def is_free(port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
         try:
@@ -86,14 +187,15 @@ def is_free(port):
         return True
 
 
-def test_a_link_is_listened_to_and_never_answered():
-    messages, codec = dialect(), Codec(1, 1)
+def listened(frames, system=None):
+    """What is heard of frames on a link, by their order; nothing may be sent to their sender."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     found = []
+    address = LinkAddress("udp", "127.0.0.1", port)
     listener = threading.Thread(
-        target=lambda: found.extend(heard_rows(LinkAddress("udp", "127.0.0.1", port), "z", 2.0))
+        target=lambda: found.extend(heard_rows(address, "z", 2.0, system=system))
     )
     listener.start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
@@ -101,27 +203,53 @@ def test_a_link_is_listened_to_and_never_answered():
         vehicle.settimeout(0.1)
         while is_free(port):
             time.sleep(0.005)
-        target = (1, 1, messages.MAV_FRAME_LOCAL_NED)
-        sent = [
-            messages.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3),
-            messages.MAVLink_set_position_target_local_ned_message(
-                0, *target, 0b110111000111, 0, 0, 0, 0, 0, -0.5, 0, 0, 0, 0, 0
-            ),
-            messages.MAVLink_local_position_ned_message(0, 0, 0, -3.0, 0, 0, 0),
-            messages.MAVLink_set_position_target_local_ned_message(
-                0, *target, 0b111111111000, 0, 0, 0, 0, 0, -9.0, 0, 0, 0, 0, 0
-            ),
-        ]
-        for message in sent:
-            vehicle.sendto(codec.encode(message), ("127.0.0.1", port))
-        vehicle.sendto(b"\xfd\x09nonsense", ("127.0.0.1", port))
+        for frame in frames:
+            vehicle.sendto(frame, ("127.0.0.1", port))
         with pytest.raises(TimeoutError):
             vehicle.recv(2048)
     listener.join()
-    assert [type(one) for one in found] == [Sent, Row]
+    return found
+
+
+def heartbeat():
+    return dialect().MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3)
+
+
+def position(height):
+    return dialect().MAVLink_local_position_ned_message(0, 0, 0, -height, 0, 0, 0)
+
+
+def set_point(climb, mask=0b110111000111, system=1):
+    target = (system, 1, dialect().MAV_FRAME_LOCAL_NED)
+    return dialect().MAVLink_set_position_target_local_ned_message(
+        0, *target, mask, 0, 0, 0, 0, 0, -climb, 0, 0, 0, 0, 0
+    )
+
+
+def test_a_link_is_listened_to_and_never_answered():
+    sent = [heartbeat(), set_point(0.5), position(3.0), set_point(9.0, 0b111111111000)]
+    codec = Codec(1, 1)
+    found = listened([*map(codec.encode, sent), b"\xfd\x09nonsense"])
+    assert [type(event) for event in found] == [Sent, Row]
     assert found[0].value == 0.5
     assert found[1].output == 3.0
     assert found[1].time > found[0].time
+
+
+@pytest.mark.parametrize("system", [None, 1])
+def test_only_the_vehicle_counts_on_a_link_and_only_finite_numbers(system):
+    """One position of infinity from any sender ended the command, and all senders were believed."""
+    own, other, camera = Codec(1, 1), Codec(7, 1), Codec(1, 100)
+    first = [other.encode(heartbeat())] if system else []
+    frames = [own.encode(heartbeat()), own.encode(position(3.0))]
+    for value in (5.0, math.inf, math.nan):
+        frames += [sender.encode(position(value)) for sender in (other, camera)]
+        frames += [other.encode(heartbeat()), other.encode(set_point(value, system=7))]
+    for value in (math.inf, -math.inf, math.nan):
+        frames += [own.encode(position(value)), other.encode(set_point(value))]
+    frames += [other.encode(set_point(0.5)), own.encode(position(4.0))]
+    found = listened([*first, *frames], system)
+    assert [event[1] for event in found] == [3.0, 0.5, 4.0]
 
 
 def test_a_link_that_would_be_sent_to_is_refused():

@@ -13,6 +13,7 @@ from deadtime._base.errors import RecordingError
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.fills import Fills, Given, filled
+from deadtime._cli.interruption import sigterm_as_ctrl_c
 from deadtime._cli.show import print_json, print_text
 from deadtime._cli.watch_page import WatchPage
 from deadtime.estimation import DelayTrack, OnlineEstimate, OnlineEstimator
@@ -37,6 +38,7 @@ def command(
     follow: bool = False,
     axis: Literal["x", "y", "z"] = "z",
     key: Path | None = None,
+    system: Annotated[int | None, typer.Option(min=1, max=255)] = None,
     silence: float = math.inf,
     every: float = 1.0,
     page: bool = False,
@@ -63,6 +65,9 @@ def command(
     key
         File with the signing key of the link: 32 bytes, or 64 hexadecimal digits. What is not
         signed is refused then.
+    system
+        MAVLink system of the vehicle on a link. Without: that of the first heartbeat of an
+        autopilot. What others send is ignored.
     silence
         End after so many seconds without a line or message.
     every
@@ -80,25 +85,31 @@ def command(
     if shown is not None and not as_json:
         print_text(f"page: {shown.address}")
     found: list[OnlineEstimate] = []
-    events = _events(source, (time, output, command), follow, axis, silence, key)
+    events = _events(source, (time, output, command), follow, axis, silence, key, system)
     rows = 0
     try:
-        for estimate in _estimates(estimator, events):
-            rows += 1
-            if shown is not None:
-                shown.show(estimate)
-            if not found or _is_told(estimate, found[-1], every):
-                found.append(estimate)
-                if not as_json:
-                    print_text(_said(estimate))
+        with sigterm_as_ctrl_c():
+            for estimate in _estimates(estimator, events):
+                rows += 1
+                if shown is not None:
+                    shown.show(estimate)
+                if not found or _is_told(estimate, found[-1], every):
+                    found.append(estimate)
+                    if not as_json:
+                        print_text(_said(estimate))
     except KeyboardInterrupt:
         if not found:
             raise
     finally:
         if shown is not None:
             shown.close()
+        if found:  # an error loses no row that was printed
+            _print_summary(source, found, rows, as_json)
     if not found:
         raise RecordingError(f"{source}: no row has come")
+
+
+def _print_summary(source: str, found: list[OnlineEstimate], rows: int, as_json: bool) -> None:
     track = DelayTrack.of(found)
     if as_json:
         print_json("watch", {"source": source, **track.to_dict()})
@@ -114,12 +125,15 @@ def _events(
     axis: str,
     silence: float,
     key: Path | None,
+    system: int | None,
 ) -> Iterator[Row | Sent]:
     if source.startswith(("udp:", "udpout:", "tcp:")):
         secret = None if key is None else read_key(key)
-        return heard_rows(LinkAddress.of(source), axis, silence, secret)
+        return heard_rows(LinkAddress.of(source), axis, silence, secret, system)
     if key is not None:
         raise ValueError(f"--key signs a link, and {source} is a file")
+    if system is not None:
+        raise ValueError(f"--system is on a link, and {source} is a file")
     if follow:
         return growing_rows(Path(source), columns, silence)
     return recorded_rows(Path(source), columns)

@@ -18,6 +18,9 @@ from deadtime.recordings.readers._limits import largest
 #: Separators, the likelier ones first.
 DELIMITERS = (",", ";", "\t", " ")
 
+#: Marks at the begin of a text in UTF-16.
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -78,7 +81,7 @@ def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | 
         elif line.strip():
             if _CONTROL.search(line):
                 raise not_text(path)
-            header, delimiter = _header(path, line, wanted, delimiter)
+            header, delimiter = header_of(path, line, wanted, delimiter)
             return Text(path, tuple(comments), header, delimiter, text, start, encoding, number + 1)
     raise RecordingError(f"{path} is empty: a header line and samples are needed")
 
@@ -98,7 +101,7 @@ def _decodable(path: object, raw: bytes) -> tuple[bytes, str]:
         if format_of(path, raw[:HEAD], "read_recording") not in (None, "text"):
             raise RecordingError(f"{path} is packed by gzip and holds no text: unpack it")
     encoding = "utf-8"
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if raw.startswith(UTF_16):
         try:
             raw = raw.decode("utf-16").encode()
         except UnicodeError:
@@ -131,7 +134,7 @@ def _unpacked(path: object, raw: bytes) -> bytes:
     return text
 
 
-def _header(
+def header_of(
     path: object, line: str, wanted: Collection[str], delimiter: str | None
 ) -> tuple[list[str], str]:
     """Names of the columns, and the separator: where none is given, one that finds most of them."""
