@@ -18,6 +18,9 @@ from deadtime.logs._windows import changes_of
 #: Seconds of one count of the clock.
 MICROSECOND = 1e-6
 
+#: Bytes of an unwritten tail that are kept: longer than the longest message, which has 65 538.
+TAIL = 70_000
+
 
 def read_ulog(data: bytes, source: str) -> LogContents:
     """All topics of a ULog file.
@@ -39,7 +42,7 @@ def read_ulog(data: bytes, source: str) -> LogContents:
     pyulog = library("pyulog.core", "reading ULog files", "'deadtime[logs]'")
     with contextlib.redirect_stdout(io.StringIO()):  # the library prints what it finds damaged
         try:
-            log = pyulog.ULog(_Endless(data))
+            log = pyulog.ULog(_Endless(without_tail(data)))
         except pyulog.ULogException as error:
             raise RecordingError(f"{source} is a damaged ULog file: {error}") from None
     topics: dict[str, Topic] = {}
@@ -72,6 +75,16 @@ def read_ulog(data: bytes, source: str) -> LogContents:
             for one in log.dropouts
         ),
     )
+
+
+def without_tail(data: bytes) -> bytes:
+    """A file without the bytes at its end that a card had allocated and nobody has written.
+
+    They are all 0 or all 255. The library looks for a message at each of them, at 1.4 and 4 s for
+    a megabyte. `TAIL` of them stay, because the last message may end in such bytes.
+    """
+    end = min(len(data.rstrip(b"\0")), len(data.rstrip(b"\xff"))) + TAIL
+    return data if end >= len(data) else data[:end]
 
 
 class _Endless(io.BytesIO):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 from collections.abc import Callable
 from dataclasses import dataclass
 from io import FileIO
@@ -15,6 +16,9 @@ Opener = Literal["read_recording", "open_log"]
 
 #: So many bytes tell the format.
 HEAD = 8192
+
+#: Most bytes that are read of a file, a pipe or a device, and how many at once of the last two.
+LARGEST_FILE, PIECE = 1_000_000_000, 1 << 20
 
 #: A line of a DataFlash log in text form, which defines a message; lines before it may be damaged.
 _FMT = re.compile(rb"^FMT, *\d+, *\d+, *\w+, *\w+,", re.MULTILINE)
@@ -112,13 +116,23 @@ KINDS = _kinds()
 def opened(path: str | os.PathLike[str]) -> FileIO:
     """Open a file for its bytes, or say why it cannot be."""
     try:
-        return open(path, "rb", buffering=0)
+        stream = open(path, "rb", buffering=0)  # noqa: SIM115 - given to the caller
     except FileNotFoundError:
         raise RecordingError(f"there is no file {path}") from None
     except IsADirectoryError:
         raise RecordingError(f"{path} is a folder: give a file") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror}") from None
+    if os.fstat(stream.fileno()).st_size > LARGEST_FILE:
+        stream.close()
+        raise _too_large(path)
+    return stream
+
+
+def _too_large(path: object) -> RecordingError:
+    return RecordingError(
+        f"{path} has more than {LARGEST_FILE} bytes, or no end: give a part of it"
+    )
 
 
 def whole(stream: FileIO, head: bytes) -> bytes:
@@ -126,8 +140,17 @@ def whole(stream: FileIO, head: bytes) -> bytes:
     if stream.seekable():  # a long file is not copied to put its head before it
         stream.seek(0)
         head = b""
-    rest = stream.readall()
-    return head + rest if head else rest
+    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        rest = stream.readall()  # its size was checked when it was opened
+        return head + rest if head else rest
+    # A device or a pipe has no size; it may also be without an end.
+    pieces, size = [head], len(head)
+    while piece := stream.read(PIECE):
+        pieces.append(piece)
+        size += len(piece)
+        if size > LARGEST_FILE:
+            raise _too_large(stream.name)
+    return b"".join(pieces)
 
 
 def format_of(path: object, head: bytes, opener: Opener) -> str | None:

@@ -6,15 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from deadtime._base.errors import DeadtimeError, RecordingError
+from deadtime.recordings._first_bytes import LARGEST_FILE
 
-#: Largest size of what a file unpacks to, bytes: this much, and so many times the size of the file.
+#: Largest size of what a file unpacks to, bytes: this much, and so many times the size of the file,
+#: at most as much as the largest file.
 #: Columns that hold still are packed a hundredfold; a file that promises more is damaged.
 UNPACKED, FACTOR = 50_000_000, 100
 
 
 def largest(size: int) -> int:
     """How many bytes a file of `size` bytes may hold unpacked."""
-    return UNPACKED + FACTOR * size
+    return min(UNPACKED + FACTOR * size, LARGEST_FILE)
 
 
 def check_numbers(path: object, size: int, count: int) -> None:

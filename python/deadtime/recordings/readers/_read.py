@@ -16,7 +16,7 @@ from deadtime.recordings.readers._csv import read_csv
 from deadtime.recordings.readers._mat import mat_file
 from deadtime.recordings.readers._mat73 import mat73_file
 from deadtime.recordings.readers._tables import LABEL, table_in_memory
-from deadtime.recordings.readers._text import as_text
+from deadtime.recordings.readers._text import as_text, not_text
 
 
 def read_recording(
@@ -129,6 +129,8 @@ def _from_file(path: Path, names: dict[str, str], ends: Range, delimiter: str | 
     with opened(path) as stream:
         head = stream.read(HEAD)
         kind = format_of(path, head, "read_recording")
+        if kind is None and b"\0" in head:  # not even in part: it may have no end
+            raise not_text(path)
         if kind in (None, "text", "gzip"):
             return read_csv(as_text(path, whole(stream, head), wanted, delimiter), names, ends)
     if delimiter is not None:
