@@ -38,6 +38,7 @@ def test_help_and_version_load_neither_numerics_nor_drawing(argument):
     assert own == {
         "deadtime",
         "deadtime._base",
+        "deadtime._base.printable",
         "deadtime._base.errors",
         "deadtime._cli",
         "deadtime._cli.app",

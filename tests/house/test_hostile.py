@@ -44,7 +44,7 @@ def test_whole_numbers_beyond_the_range_of_doubles_are_refused():
 @pytest.mark.parametrize("loop", [LOOP, SAMPLED])
 @pytest.mark.parametrize("n", ["x", 2.5, None])
 def test_the_number_of_poles_is_whole(loop, n):
-    with pytest.raises(TypeError, match="integer"):
+    with pytest.raises(TypeError, match="whole number"):
         loop.rightmost(n)
 
 

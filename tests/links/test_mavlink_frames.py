@@ -185,8 +185,10 @@ def test_copies_and_overtaken_positions_are_ignored():
         d.MAVLink_heartbeat_message(2, 3, 1, 4, 4, 3),
         d.MAVLink_extended_sys_state_message(0, 2),
     ):
-        message.pack(mav)
-        reader.take(message, 0.0)
+        for _ in range(2):  # one alone is not believed
+            message.pack(mav)
+            mav.seq += 1
+            reader.take(message, 0.0)
     assert reader.take(position(1000, -1.0), 1.0).height == 1.0
     assert reader.take(position(1000, -2.0), 1.1) is None
     assert reader.take(position(980, -2.0), 1.1) is None

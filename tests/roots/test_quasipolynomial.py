@@ -263,7 +263,7 @@ def test_not_a_number_stays_so():
 
 def test_orders_of_derivatives():
     for bad in (-1, 2**40):
-        with pytest.raises(ValueError, match="order"):
+        with pytest.raises(ValueError, match=f"n={bad}"):
             s.derivative(bad)
     with pytest.raises(TypeError):
         s.derivative(0.5)
