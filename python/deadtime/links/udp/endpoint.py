@@ -13,6 +13,7 @@ from typing import Any, cast
 from deadtime._base.errors import LinkError, PacketError
 from deadtime.links.addresses import Address, canonical, for_socket, is_loopback
 from deadtime.links.udp.classifier import REMEMBERED, Classifier, Verdict
+from deadtime.links.udp.judgement import Judgement
 from deadtime.links.udp.packets import LoopPacket
 from deadtime.links.udp.statistics import LinkStatistics
 from deadtime.links.udp.wires import SAFE, Wire
@@ -140,6 +141,7 @@ class Endpoint:
     ) -> None:
         self.statistics = LinkStatistics()
         self._classifier = Classifier(remembered)
+        self._judgement = Judgement()
         self._answers_only = answers_only and wire.has_times
         self._wire, self._take = wire, take
         self._fixed_peer = peer
@@ -167,6 +169,7 @@ class Endpoint:
         """Accept another peer, or the same one after a restart."""
         self.peer = self._fixed_peer
         self.statistics.restart()
+        self._judgement.restart()
 
     def send(self, packet: LoopPacket) -> None:
         """Send a packet to the peer, if there is one."""
@@ -215,10 +218,15 @@ class Endpoint:
         if verdict is Verdict.IMPOSSIBLE or (self._answers_only and not answers):
             self.statistics.invalid += 1
             return
+        # A safe command answers one packet again and again: its times are no exchange.
+        is_exchange = answers and not packet.flags & SAFE
+        if not self._judgement.accepts(packet, now, is_exchange):
+            self.statistics.invalid += 1
+            return
         self.peer = address
         if not self.statistics.arrived(packet):
             return
-        if answers and not packet.flags & SAFE:
+        if is_exchange:
             self.statistics.exchanged(packet, now)
         self._batch.append((packet, now))
         if len(self._batch) == 1:
