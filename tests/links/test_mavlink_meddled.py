@@ -91,6 +91,9 @@ def test_no_few_messages_leave_a_vehicle_in_the_air_without_its_failsafes_or_arm
 
 
 @pytest.mark.survey
-def test_of_200_meddled_flights_none_ends_in_the_air_or_with_other_parameters():
-    """Most of them are not ended by it either."""
-    assert survey(range(200)) < 150
+@pytest.mark.parametrize(
+    "first", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(20, 200, 20))]
+)
+def test_of_200_meddled_flights_none_ends_in_the_air_or_with_other_parameters(first):
+    """Few of them are ended by it."""
+    assert survey(range(first, first + 20)) <= 10
