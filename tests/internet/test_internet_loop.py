@@ -201,7 +201,7 @@ def test_over_udp_in_three_processes_the_estimate_is_the_measured_delay():
     (run,) = found.runs
     busy = unsteadiness(found)
     # A process wakes up some tenths of a millisecond late, and later on a busy machine.
-    assert 0.100 <= run.round_trip["p50"] <= 0.106
+    assert 0.100 <= run.round_trip["p50"] <= 0.106 + busy
     assert run.plant["link"]["lost"] <= 5
     for method in ("dominant", "exact"):
         assert 0.100 <= run.delay(method) <= 0.118 + busy
