@@ -175,7 +175,8 @@ def test_sigterm_ends_as_ctrl_c_does(tmp_path):
         watching.send_signal(signal.SIGTERM)
         rest = watching.stdout.read()
     assert watching.returncode == 0
-    assert "30 rows; of those that are printed above:" in rest
+    # The signal may come before the last rows are read.
+    assert " rows; of those that are printed above:" in rest
 
 
 def is_free(port):
