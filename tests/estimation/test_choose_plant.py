@@ -29,7 +29,7 @@ def test_two_lags_are_found_and_a_third_is_not():
     assert choice.to_dict()["chosen"] == "2 lags"
 
 
-@pytest.mark.parametrize("seed", [0, 2, 5])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.survey) for k in (2, 5))])
 def test_a_zero_is_found(seed):
     choice = choose_plant(record_attitude(seed, **VEHICLE, zero=0.3), FLAT, most_lags=2)
     assert choice.chosen == "2 lags, zero"

@@ -40,7 +40,7 @@ def estimate(recording, known, **options):
     )
 
 
-@pytest.mark.parametrize("known", [PT1, BIQUAD])
+@pytest.mark.parametrize("known", [PT1, pytest.param(BIQUAD, marks=pytest.mark.survey)])
 def test_without_noise_the_filter_takes_no_part(known):
     found = estimate(rows(known), known)
     assert found.delay == pytest.approx(DELAY, abs=1e-4)

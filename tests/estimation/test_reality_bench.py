@@ -205,8 +205,16 @@ def test_the_noise_of_unlogged_rows_moves_the_output_as_the_bound_says(name):
         assert np.std(run.path - without - moved) < 0.3 * np.std(moved)
 
 
+#: Conditions whose bound is known, every fourth of them in each run and the others in the survey.
+KNOWN = [one for one in CONDITIONS if bound.is_defined(one, one.free) and not one.quantum]
+
+
 @pytest.mark.parametrize(
-    "condition", [one for one in CONDITIONS if bound.is_defined(one, one.free) and not one.quantum]
+    "condition",
+    [
+        pytest.param(one, id=one.name, marks=[pytest.mark.survey] if number % 4 else [])
+        for number, one in enumerate(KNOWN)
+    ],
 )
 def test_what_is_not_the_mean_has_the_covariance_of_the_bound(condition):
     squares, rows = 0.0, 0
@@ -274,6 +282,7 @@ def test_rows_and_free_parameters_are_chosen_by_name():
         table.free_of("limit")
 
 
+@pytest.mark.survey  # as `benches/estimation.py --reality --quick`
 def test_every_condition_is_estimated():
     for condition in CONDITIONS:
         (one,) = table.outcomes(condition, range(1), condition.free)

@@ -354,13 +354,13 @@ def test_link_delay_and_vehicle_lag_are_estimated_from_reported_setpoint_and_cli
     time += random.uniform(0.0, 0.002, time.size)
     rows = np.searchsorted(command_time, time - 0.1234, side="right") - 1
     setpoint = np.where(rows >= 0, command[np.maximum(rows, 0)], 0.0)
-    fine = np.arange(0.0, command_time[-1], 1e-4)
+    fine = np.arange(0.0, command_time[-1], 5e-4)
     at = np.searchsorted(command_time, fine - 0.1234, side="right") - 1
     driven = np.where(at >= 0, command[np.maximum(at, 0)], 0.0)
     speed, speeds = 0.0, np.empty(fine.size)
     for k, value in enumerate(driven):
         speeds[k] = speed
-        speed += 1e-4 * (0.8 * value - speed) / 0.15
+        speed += 5e-4 * (0.8 * value - speed) / 0.15
     climb = np.interp(time, fine, speeds) + random.normal(0.0, 0.01, time.size)
     split = split_delay([telemetry_of((time, setpoint, climb, climb), command_time, command)])
     # The setpoint is seen in the first message after its change, by up to 5 ms later.

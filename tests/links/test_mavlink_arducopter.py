@@ -1,7 +1,6 @@
 """ArduPilot's Copter itself: a flight, another station that lands it, a station that is killed."""
 
 import json
-import os
 
 import pytest
 
@@ -96,14 +95,10 @@ def test_a_flight_goes_on_over_the_second_of_two_links():
     assert flown["landed"]
 
 
-#: The long form of the flights below: `DEADTIME_LONG_FLIGHTS=1`.
-LONG = bool(os.environ.get("DEADTIME_LONG_FLIGHTS"))
-
-
-def test_after_a_kill_or_a_cut_link_every_parameter_is_as_before_the_first_run():
+@pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.long)])
+def test_after_a_kill_or_a_cut_link_every_parameter_is_as_before_the_first_run(count):
     """At random moments (seed 44): the next run, or `restore`, puts back and says so."""
-    count = 20 if LONG else 3
-    told = told_by("arducopter_killed.py", str(count), "44", timeout=120.0 + 70.0 * count)
+    told = told_by("arducopter_killed.py", str(count), "44", timeout=400.0 + 90.0 * count)
     result = json.loads(told.splitlines()[-1])
     before = result["before"]
     for flight in result["flights"]:
@@ -114,10 +109,10 @@ def test_after_a_kill_or_a_cut_link_every_parameter_is_as_before_the_first_run()
     assert any(flight["flew"] for flight in result["flights"])
 
 
-def test_no_few_messages_leave_it_in_the_air_without_its_failsafes_or_armed():
+@pytest.mark.parametrize("count", [2, pytest.param(24, marks=pytest.mark.long)])
+def test_no_few_messages_leave_it_in_the_air_without_its_failsafes_or_armed(count):
     """Forged, late, repeated and missing ones of every kind (seeds from 100)."""
-    count = 24 if LONG else 2
-    told = told_by("arducopter_meddled.py", str(count), "100", timeout=120.0 + 70.0 * count)
+    told = told_by("arducopter_meddled.py", str(count), "100", timeout=400.0 + 90.0 * count)
     result = json.loads(told.splitlines()[-1])
     before = result["before"]
     for flight in result["flights"]:

@@ -161,7 +161,7 @@ def ready(station):
 def main(count, seed):
     draw = random.Random(seed)
     with (
-        firmware(*PORTS, longest=120 + 70 * count),
+        firmware(*PORTS, longest=400 + 90 * count),
         tempfile.TemporaryDirectory() as folder,
     ):
         station, relay = Station(), Relay()

@@ -157,7 +157,7 @@ def meddled(station, folder, seed):
 
 def main(count, seed):
     with (
-        firmware(*PORTS, longest=120 + 70 * count),
+        firmware(*PORTS, longest=400 + 90 * count),
         tempfile.TemporaryDirectory() as folder,
     ):
         station = Station()
