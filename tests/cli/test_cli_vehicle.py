@@ -87,3 +87,11 @@ def test_nothing_foreign_reaches_a_terminal_unescaped(capsys, tmp_path, foreign)
         done = run("estimate", f"{foreign}.csv", "--kp", 1, cwd=tmp_path)
         assert done.returncode != 0
         assert foreign not in done.stdout + done.stderr
+
+
+def test_an_error_is_one_line_of_bounded_length():
+    """What a user gave stood in it at any length."""
+    done = run("estimate", "/".join(["folder"] * 400) + ".csv", "--kp", 1)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert len(done.stderr) < 700

@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from deadtime._base.errors import DeadtimeError
-from deadtime._base.printable import printable
+from deadtime._base.printable import one_line, printable
 from deadtime._cli.interruption import INTERRUPTED, ended_by_ctrl_c
 
 #: Errors that end a command with one line; any other is a defect and prints its traceback.
@@ -104,7 +104,7 @@ for _name, _help in COMMANDS.items():
 
 def _show_warning(message: Warning | str, *place: object, **more: object) -> None:
     """Print a warning as a line, as an error is."""
-    print(f"deadtime: {printable(' '.join(str(message).split()))}", file=sys.stderr)
+    print(f"deadtime: {one_line(str(message))}", file=sys.stderr)
 
 
 def run() -> None:
@@ -133,7 +133,7 @@ def run() -> None:
             )
         elif isinstance(error, MemoryError):
             message = f"out of memory: {message or 'ask for less at once'}"
-        print(f"deadtime: {printable(' '.join(message.split()))}", file=sys.stderr)
+        print(f"deadtime: {one_line(message)}", file=sys.stderr)
         raise SystemExit(1) from None
     except Exception as error:
         import traceback

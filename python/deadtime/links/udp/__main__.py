@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.plain import plain
+from deadtime._base.printable import one_line
 from deadtime.links.addresses import Address
 from deadtime.links.parent_watch import parent_ended
 from deadtime.links.udp.controller import Controller, ControllerOptions
@@ -38,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         asyncio.run(_until_stopped(given.run(given), given.until_input_ends))
     except (DeadtimeError, OSError, ValueError) as error:
-        print(f"deadtime.links.udp: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"deadtime.links.udp: {one_line(str(error))}", file=sys.stderr)
         return 1
     return 0
 
