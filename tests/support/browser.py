@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+#: How long a page may take on a busy machine, ms.
+PATIENCE = 300_000
+
+
+def patient(make: Callable[..., Any]) -> Callable[..., Any]:
+    """The same maker of pages or contexts, whose pages may take as long as that."""
+
+    def made(**given: Any) -> Any:
+        page = make(**given)
+        page.set_default_timeout(PATIENCE)
+        return page
+
+    return made
 
 
 @contextmanager
@@ -20,6 +34,10 @@ def chromium() -> Iterator[Any]:
         pytest.skip("there is no chromium on this machine")
     with playwright.sync_playwright() as run:
         started = run.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        started.new_context, started.new_page = (
+            patient(started.new_context),
+            patient(started.new_page),
+        )
         yield started
         started.close()
 
