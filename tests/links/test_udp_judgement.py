@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from deadtime.links.udp.endpoint import Endpoint
 from deadtime.links.udp.packets import LoopPacket
+from deadtime.links.udp.statistics import LinkStatistics
 from deadtime.links.udp.wires import wire_of
 
 PEER = ("127.0.0.1", 9)
@@ -49,3 +50,30 @@ def test_one_forged_packet_of_the_peer_moves_neither_counts_nor_clock(forged, an
     assert report.offset == pytest.approx(50.0, abs=1e-6)
     assert report.offset_uncertainty == pytest.approx(0.001, abs=1e-6)
     assert report.round_trip == report_of(None, answers_only).round_trip
+
+
+def exchanges(statistics, offset, numbers, drift=0.0):
+    for number in numbers:
+        sent = 0.01 * number
+        there = sent + 0.001 + offset + drift * number
+        statistics.exchanged(LoopPacket(number, there, number, sent), sent + 0.002)
+
+
+def test_an_end_that_restarts_with_another_clock_has_the_offset_of_the_new_one():
+    """Bounds of two clocks met nowhere, which a report showed as "± 0.0"."""
+    statistics = LinkStatistics()
+    exchanges(statistics, 50.0, range(100))
+    exchanges(statistics, -7.0, range(100, 110))
+    report = statistics.report()
+    assert report.offset == pytest.approx(-7.0, abs=1e-6)
+    assert report.offset_uncertainty == pytest.approx(0.001, abs=1e-6)
+    assert report.forward_delay == pytest.approx((0.0, 0.002), abs=1e-6)
+
+
+def test_a_clock_that_drifts_has_the_offset_of_the_newest_exchange():
+    statistics = LinkStatistics()
+    exchanges(statistics, 50.0, range(1000), drift=1e-5)
+    report = statistics.report()
+    newest = 50.0 + 999e-5
+    assert report.offset_uncertainty > 0.0
+    assert abs(report.offset - newest) <= 0.002

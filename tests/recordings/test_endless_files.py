@@ -73,3 +73,14 @@ def test_a_device_of_zeros_is_refused(device, reader):
 
 def test_nothing_unpacks_to_more_than_the_largest_file():
     assert largest(10**9) == _first_bytes.LARGEST_FILE
+
+
+def test_a_file_that_grows_while_it_is_read_is_refused_at_the_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(_first_bytes, "LARGEST_FILE", 5_000)
+    path = tmp_path / "table.csv"
+    path.write_bytes(b"time,reference\n")
+    with _first_bytes.opened(path) as stream, path.open("ab") as other:
+        other.write(b"0,0\n" * 2_000)
+        other.flush()
+        with pytest.raises(dtm.RecordingError, match="has more than 5000 bytes"):
+            _first_bytes.whole(stream, b"")

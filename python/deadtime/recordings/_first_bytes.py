@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass
 from io import FileIO
@@ -140,17 +139,14 @@ def whole(stream: FileIO, head: bytes) -> bytes:
     if stream.seekable():  # a long file is not copied to put its head before it
         stream.seek(0)
         head = b""
-    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-        rest = stream.readall()  # its size was checked when it was opened
-        return head + rest if head else rest
-    # A device or a pipe has no size; it may also be without an end.
-    pieces, size = [head], len(head)
-    while piece := stream.read(PIECE):
-        pieces.append(piece)
-        size += len(piece)
+    # A device or a pipe has no size and perhaps no end; a file may have grown since it was opened.
+    pieces, size = [head, stream.read(os.fstat(stream.fileno()).st_size)], 0
+    while pieces[-1] or len(pieces) == 2:
+        size += len(pieces[-1])
         if size > LARGEST_FILE:
             raise _too_large(stream.name)
-    return b"".join(pieces)
+        pieces.append(stream.read(PIECE))
+    return b"".join(filter(None, pieces))
 
 
 def format_of(path: object, head: bytes, opener: Opener) -> str | None:

@@ -45,20 +45,25 @@ class Judgement:
             bounds = packet.sent - now, packet.sent - packet.held - packet.echo_sent
         number, before = packet.sequence, self._highest
         agrees = before is None or number <= before + AHEAD
-        if not (agrees and _meet(bounds, self._bounds)):
+        if not (agrees and meet(bounds, self._bounds)):
             doubted, self._doubted = self._doubted, (number, bounds)
             if doubted is None or not (
-                0 < number - doubted[0] <= AHEAD and _meet(bounds, doubted[1])
+                0 < number - doubted[0] <= AHEAD and meet(bounds, doubted[1])
             ):
                 return False
             self._highest, self._bounds = None, (-math.inf, math.inf)
         self._doubted = None
         self._highest = max(number, self._highest or 0)
-        low, high = max(bounds[0], self._bounds[0]), min(bounds[1], self._bounds[1])
-        # Bounds of a clock that drifts no longer meet: those of the newest packet are kept.
-        self._bounds = (low, high) if low <= high else bounds
+        self._bounds = narrowed(self._bounds, bounds)
         return True
 
 
-def _meet(bounds: tuple[float, float], other: tuple[float, float]) -> bool:
+def meet(bounds: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether two pairs of bounds can be of one clock."""
     return max(bounds[0], other[0]) <= min(bounds[1], other[1]) + DRIFT
+
+
+def narrowed(before: tuple[float, float], newest: tuple[float, float]) -> tuple[float, float]:
+    """What both pairs of bounds allow; the newest if a clock has drifted out of those before."""
+    low, high = max(newest[0], before[0]), min(newest[1], before[1])
+    return (low, high) if low <= high else newest

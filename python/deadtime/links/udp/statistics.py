@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from deadtime.links.udp.classifier import REMEMBERED
+from deadtime.links.udp.judgement import meet, narrowed
 from deadtime.links.udp.packets import LoopPacket
 
 #: Number of newest packets whose times are kept (bounds memory in runs of days).
@@ -76,7 +77,7 @@ class ClockOffset:
 
     As in MAVLink's TIMESYNC, but with a bound: ``other clock = this clock + offset``. Each exchange
     shows that the offset is at most ``t1 - t0`` and at least ``t2 - t3``; the intersection is kept.
-    With a drifting clock it becomes empty: use it over minutes, not days.
+    With a clock that drifts it becomes empty: then the bounds of the newest exchange are kept.
 
     Examples
     --------
@@ -94,8 +95,11 @@ class ClockOffset:
 
     def add(self, t0: float, t1: float, t2: float, t3: float) -> None:
         """Add an exchange: sent, received there, answered there, received here."""
-        self.most = min(self.most, t1 - t0)
-        self.least = max(self.least, t2 - t3)
+        self.least, self.most = narrowed((self.least, self.most), (t2 - t3, t1 - t0))
+
+    def agrees(self, t0: float, t1: float, t2: float, t3: float) -> bool:
+        """Whether an exchange can be of the same clock as those before."""
+        return meet((self.least, self.most), (t2 - t3, t1 - t0))
 
     @property
     def offset(self) -> float:
@@ -244,6 +248,11 @@ class LinkStatistics:
         """Add the times of a packet that answers one of this end."""
         received_there = packet.sent - packet.held
         forward, returning = received_there - packet.echo_sent, now - packet.sent
+        times = packet.echo_sent, received_there, packet.sent, now
+        if not self.clock.agrees(*times):  # the other end has restarted, with another clock
+            self.clock = ClockOffset()
+            self._forward.clear()
+            self._return.clear()
         if self._return:
             change = abs(returning - self._return[-1])
             self._jitter += JITTER_PART * (change - self._jitter)
@@ -252,7 +261,7 @@ class LinkStatistics:
         self.held.append(packet.held)
         # Not the sum of both delays, which has the rounding error of a large clock offset.
         self.round_trips.append((now - packet.echo_sent) - packet.held)
-        self.clock.add(packet.echo_sent, received_there, packet.sent, now)
+        self.clock.add(*times)
 
     def came_late(self, by: float) -> None:
         """Count a packet that could not be used, with its lateness in s."""
