@@ -9,7 +9,7 @@ use deadtime::Task;
 use deadtime::lambertw;
 use deadtime::quasipoly::QuasiPolynomial;
 use deadtime::roots::matrix::{self, CharacteristicMatrix};
-use deadtime::roots::{Region, count, count_right_of, rightmost, roots};
+use deadtime::roots::{Edge, Region, count, count_right_of, rightmost, roots};
 use num_complex::Complex64;
 
 struct Case {
@@ -157,7 +157,7 @@ fn matrix_roots(c: &mut Criterion) {
             im: (-20.0, 20.0),
         };
         group.bench_function(format!("count/{n}"), |b| {
-            b.iter(|| matrix::count(black_box(&system), &region, &task));
+            b.iter(|| matrix::count(black_box(&system), &region, Edge::Refused, &task));
         });
         group.bench_function(format!("count_right_of_0/{n}"), |b| {
             b.iter(|| matrix::count_right_of(black_box(&system), 0.0, &task));

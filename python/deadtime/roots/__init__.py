@@ -21,13 +21,15 @@ from deadtime.roots._crossings import (
     margin_of_family as margin_of_family,
 )
 from deadtime.roots._determinant import (
-    LARGEST as LARGEST,
-    NotExpandedError as NotExpandedError,
     expanded as expanded,
+    expanded_and_exact as expanded_and_exact,
 )
 from deadtime.roots._expansion import Expansion
 from deadtime.roots._family import HasFamily as HasFamily, family_of as family_of
-from deadtime.roots._matrix_roots import MatrixDeterminant as MatrixDeterminant
+from deadtime.roots._matrix_roots import (
+    MatrixDeterminant as MatrixDeterminant,
+    RoundedExpansion as RoundedExpansion,
+)
 from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime.roots._plots import plot_root_set as plot_root_set
 from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, is_number as is_number, s

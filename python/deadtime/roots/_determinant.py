@@ -54,9 +54,15 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
     """Determinant of a matrix of quasi-polynomials; NotExpandedError if it would be inaccurate.
 
     With `bordered` the last row and column belong to an output and an input, and the determinant
-    may be zero. Only this function decides whether a determinant is expanded: the roots of one that
-    is refused are found by factorising the matrix.
+    may be zero.
     """
+    return expanded_and_exact(entries, bordered)[0]
+
+
+def expanded_and_exact(
+    entries: Sequence[Sequence[Entry]], bordered: bool = False
+) -> tuple[QuasiPolynomial, bool]:
+    """The same, and whether no coefficient and no delay had to be rounded."""
     size = len(entries)
     states = size - int(bordered)
     if states > LARGEST:
@@ -76,12 +82,18 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
     exact = _determinant(whole)
     if not exact:
         if bordered:
-            return QuasiPolynomial([[0.0]], [0.0])
+            return QuasiPolynomial([[0.0]], [0.0]), True
         raise ValueError(
             "the determinant of the characteristic matrix is zero for every s: the equations do "
             "not determine the state, look for a row of E, N and A that is zero or repeated"
         )
     h = _rounded(exact, shift**size)
+    terms = {
+        (k, Fraction(tau)): Fraction(value) * shift**size
+        for tau, row in zip(h.delays.tolist(), h.coefficients.tolist(), strict=True)
+        for k, value in enumerate(row)
+        if value
+    }
     growth = _growth(entries, h)
     if growth > _MOST_GROWTH:
         raise NotExpandedError(
@@ -90,7 +102,7 @@ def expanded(entries: Sequence[Sequence[Entry]], bordered: bool = False) -> Quas
             "the states so that the entries are of similar size, or ask for poles(), rightmost() "
             "and frequency_response(), which do without"
         )
-    return h
+    return h, terms == exact
 
 
 def _determinant(rows: Sequence[Sequence[_Exact]]) -> _Exact:

@@ -5,35 +5,35 @@ r"""Linear systems with delays in state, input and output, of any order.
 
 With the characteristic matrix M(s) = s E + sum (s N_j - A_j) e^{-s tau_j}, the poles are the
 roots of det M, and C M^{-1} B + D = det [[M, B], [-C, D]] / det M. Values are taken from the
-matrices, for any order; roots from the expanded determinant while that is safe, and otherwise
-from factorisations of M along contours.
+matrices, for any order; roots from factorisations of M along contours, block by block.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime._base.errors import ContourError
 from deadtime._base.validation import OpenRange
 from deadtime.roots import (
-    LARGEST,
     MatrixDeterminant,
-    NotExpandedError,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
     RootSet,
+    RoundedExpansion,
     expanded,
+    expanded_and_exact,
     family_of,
     margin_of_family,
 )
 from deadtime.systems._delay_matrices import DelayMatrices
 from deadtime.systems._margins import Margins
-from deadtime.systems._poles import HasPoles
+from deadtime.systems._poles import Determinant, HasPoles, T
 from deadtime.systems._realisation import Realisable, Realisation, of_matrices
 from deadtime.systems._responses import HasResponses
 from deadtime.systems._scaled_delays import scaled_family, smallest_delay
@@ -104,8 +104,9 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
 
     __slots__ = ("_expansion", "_realisation")
 
-    #: The expanded determinant, or why there is none; from when it is asked for.
-    _expansion: QuasiPolynomial | ValueError
+    #: The expanded determinant, and whether it is exact, or why there is none; from when it is
+    #: asked for.
+    _expansion: tuple[QuasiPolynomial, bool] | ValueError
     #: The form that is simulated; from when it is asked for.
     _realisation: Realisation
 
@@ -154,17 +155,21 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         >>> dtm.DelaySystem({0.0: [[0, 1], [-4, -0.4]], 0.5: [[0, 0], [1.5, 0]]}).characteristic()
         4 + 0.4 s + s^2 - 1.5 exp(-0.5 s)
         """
+        return self._expanded()[0]
+
+    def _expanded(self) -> tuple[QuasiPolynomial, bool]:
+        """Give det M, and whether no coefficient was rounded."""
         if not hasattr(self, "_expansion"):
             try:
-                found: QuasiPolynomial | ValueError = expanded(
+                found: tuple[QuasiPolynomial, bool] | ValueError = expanded_and_exact(
                     [[self._entry(i, j) for j in self._states] for i in self._states]
                 )
             except ValueError as error:
                 found = error.with_traceback(None)
             object.__setattr__(self, "_expansion", found)
-        if isinstance(self._expansion, QuasiPolynomial):
-            return self._expansion
-        raise type(self._expansion)(*self._expansion.args)
+        if isinstance(self._expansion, ValueError):
+            raise type(self._expansion)(*self._expansion.args)
+        return self._expansion
 
     def transfer_function(self, output: int = 0, input: int = 0) -> TransferFunction:  # noqa: A002
         """Transfer function from one input to one output, while that is numerically safe.
@@ -353,36 +358,35 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         except np.linalg.LinAlgError:
             return None
 
-    def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
-        """Give det M, expanded if that is safe."""
-        try:
-            return self.characteristic()
-        except NotExpandedError:
-            return self._matrix()
-
-    def _robust_determinant(self) -> QuasiPolynomial | MatrixDeterminant:
-        """Give det M in the form that knows better where the chains of a neutral system end.
-
-        The coefficients of an expansion do not tell that tau_1 + tau_2 is no delay of its own.
-        """
-        determinant = self._determinant()
-        if isinstance(determinant, MatrixDeterminant) or not self._N or self.n_states == 1:
-            return determinant
+    def _ask(self, question: Callable[[Determinant], T]) -> T:
+        """Ask the matrices, and the expanded determinant where they do not answer."""
         matrix = self._matrix()
-        return matrix if matrix.is_invertible else determinant
-
-    def _leading(self, n: int) -> RootSet | None:
-        """Locate the rightmost poles with the matrices, before any determinant is expanded.
-
-        Neutral systems and more states than are ever expanded are left to `_robust_determinant`.
-        """
-        number = operator.index(n)
-        if number < 1 or self._N or not 1 < self.n_states <= LARGEST:
-            return None
         try:
-            return self._matrix().rightmost_from_guesses(number)
+            return question(matrix)
+        except (ValueError, ContourError) as error:
+            # E cannot be inverted, a pole lies on the edge, or delays are taken as exact.
+            try:
+                h, exact = self._expanded()
+            except ValueError:
+                raise error from None
+            if exact:
+                return question(h)
+            if isinstance(error, ContourError):
+                raise
+            return question(RoundedExpansion(h, matrix, error))
+
+    def _exactly(self) -> QuasiPolynomial:
+        try:
+            h, exact = self._expanded()
         except ValueError:
-            return None
+            exact = False
+        if not exact:
+            raise ValueError(
+                "a certificate needs an expanded determinant without rounded coefficients, which "
+                "this system does not have: count() proves the same number without writing the "
+                "proof down"
+            )
+        return h
 
     def _matrix(self) -> MatrixDeterminant:
         return MatrixDeterminant(self._E, self._N, self._A)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
-from typing import SupportsFloat
+from collections.abc import Callable, Collection, Mapping
+from typing import SupportsFloat, TypeAlias, TypeVar
 
 from deadtime._base.validation import OpenRange, Range
 from deadtime.roots import (
@@ -15,26 +15,28 @@ from deadtime.roots import (
     ParametricQuasiPolynomial,
     QuasiPolynomial,
     RootSet,
+    RoundedExpansion,
     crossings,
 )
 
+T = TypeVar("T")
+
+#: What answers the questions.
+Determinant: TypeAlias = QuasiPolynomial | MatrixDeterminant | RoundedExpansion
+
 
 class HasPoles(ABC):
-    """Base of systems; the poles are the roots of `_determinant`, hidden ones included."""
+    """Base of systems; the poles are the roots of what is asked, hidden ones included."""
 
     __slots__ = ()
 
     @abstractmethod
-    def _determinant(self) -> QuasiPolynomial | MatrixDeterminant:
-        """Give the characteristic function."""
+    def _ask(self, question: Callable[[Determinant], T]) -> T:
+        """Ask the characteristic function."""
 
-    def _robust_determinant(self) -> QuasiPolynomial | MatrixDeterminant:
-        """Give it in the form in which strong stability is judged."""
-        return self._determinant()
-
-    def _leading(self, n: int) -> RootSet | None:
-        """Locate the rightmost poles sooner than by the characteristic function, if possible."""
-        return None
+    @abstractmethod
+    def _exactly(self) -> QuasiPolynomial:
+        """Give the characteristic function without rounding."""
 
     @abstractmethod
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:
@@ -65,10 +67,10 @@ class HasPoles(ABC):
 
         Notes
         -----
-        Of a `DelaySystem` whose determinant cannot be expanded safely, the matrix is factorised at
-        points along the contour, so close to one another that bounds on its change and on all
-        rounding prove how far the argument of the determinant turns between them. Sides that are
-        open then need an E that can be inverted.
+        A `DelaySystem` is split into blocks of states that depend on one another. For each, the
+        matrix is factorised at points along the contour, so close to one another that bounds on its
+        change and on all rounding prove how far the argument of the determinant turns between them.
+        Only with an E that cannot be inverted is the determinant expanded for open sides.
 
         Examples
         --------
@@ -77,7 +79,7 @@ class HasPoles(ABC):
         >>> dtm.DelaySystem({1.0: -np.eye(12)}).count(re=(-3, 1), im=(0, 20))
         36
         """
-        return self._determinant().count(re, im, edge=edge)
+        return self._ask(lambda h: h.count(re, im, edge=edge))
 
     def poles(
         self, re: OpenRange | None = None, im: OpenRange | None = None, *, edge: Edge = "error"
@@ -107,7 +109,7 @@ class HasPoles(ABC):
         >>> [complex(round(p.real, 4), round(p.imag, 4)) for p in T.poles(re=(-5, 0), im=(0, 10))]
         [(-1.5154+3.1005j)]
         """
-        return self._determinant().roots(re, im, edge=edge)
+        return self._ask(lambda h: h.roots(re, im, edge=edge))
 
     def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
         """Count the poles in a region and write the proof down.
@@ -124,9 +126,10 @@ class HasPoles(ABC):
         Raises
         ------
         ContourError, ValueError
-            As in `count`; ValueError also where the determinant cannot be expanded safely.
+            As in `count`; ValueError also where the determinant cannot be expanded without
+            rounding.
         """
-        return self._determinant().certify(re, im)
+        return self._exactly().certify(re, im)
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost poles and prove that nothing else lies that far right.
@@ -151,10 +154,9 @@ class HasPoles(ABC):
         Of a `DelaySystem`, guesses of the rightmost poles are eigenvalues of a linearisation of the
         characteristic matrix; Newton's method for a bordered matrix encloses each in a disc, and
         the matrix is factorised along one vertical line to count the poles right of it, as in
-        `count`. Only where this proves nothing is the determinant expanded or the plane searched.
+        `count`. Only where this proves nothing is the plane searched.
         """
-        leading = self._leading(n)
-        return self._robust_determinant().rightmost(n) if leading is None else leading
+        return self._ask(lambda h: h.rightmost(n))
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a pole in 1/s, or `chain_abscissa` if that is larger.
@@ -174,11 +176,7 @@ class HasPoles(ABC):
             As in `rightmost`; for ``strong=False`` also where only an expanded determinant could
             tell, and there is none.
         """
-        leading = self._leading(1)
-        if leading is not None:
-            return float(leading.roots[0].real)
-        found = self._robust_determinant().spectral_abscissa()
-        return found if strong else min(found, self._determinant().spectral_abscissa(strong=False))
+        return self._ask(lambda h: h.spectral_abscissa(strong))
 
     def chain_abscissa(self, strong: bool = True) -> float:
         """Give the real part that the chains of poles of a neutral system can come to, in 1/s.
@@ -198,8 +196,7 @@ class HasPoles(ABC):
         ValueError
             As in `spectral_abscissa`.
         """
-        found = self._robust_determinant().chain_abscissa()
-        return found if strong else min(found, self._determinant().chain_abscissa(strong=False))
+        return self._ask(lambda h: h.chain_abscissa(strong))
 
     def is_stable(self, strong: bool = True) -> bool:
         """Tell whether every pole is proved to lie left of the imaginary axis.
@@ -218,9 +215,7 @@ class HasPoles(ABC):
         ValueError
             As in `spectral_abscissa`.
         """
-        if not strong and self._determinant().is_stable(strong=False):
-            return True
-        return self._robust_determinant().is_stable()
+        return self._ask(lambda h: h.is_stable(strong))
 
     def crossings(
         self, ranges: Mapping[str, Range], *, at: Mapping[str, SupportsFloat] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
@@ -30,7 +30,7 @@ from deadtime.systems._parts import (
     without_common_delay,
     without_common_powers,
 )
-from deadtime.systems._poles import HasPoles
+from deadtime.systems._poles import Determinant, HasPoles, T
 from deadtime.systems._realisation import Realisable, Realisation, of_ratio
 from deadtime.systems._responses import HasResponses
 
@@ -290,7 +290,10 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
             return TransferFunction(0.0)
         return TransferFunction(*without_common_powers(self._num, self._den))
 
-    def _determinant(self) -> QuasiPolynomial:
+    def _ask(self, question: Callable[[Determinant], T]) -> T:
+        return question(self._den)
+
+    def _exactly(self) -> QuasiPolynomial:
         return self._den
 
     def _family_of(self, names: Collection[str]) -> ParametricQuasiPolynomial:

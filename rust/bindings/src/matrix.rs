@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::rows;
 use crate::errors::to_python;
-use crate::quasipoly::RootSet;
+use crate::quasipoly::{Range, RootSet, side};
 use crate::runtime::{run, run_here};
 
 type ByDelay<'py> = Vec<(f64, PyReadonlyArray2<'py, f64>)>;
@@ -44,15 +44,17 @@ impl CharacteristicMatrix {
         matrix::is_invertible(&self.core)
     }
 
-    fn count(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<u64> {
+    fn count(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<u64> {
+        let edge = side(edge)?;
         run(py, None, None, |task: &Task| {
-            matrix::count(&self.core, &Region { re, im }, task)
+            matrix::count(&self.core, &Region { re, im }, edge, task)
         })
     }
 
-    fn roots(&self, py: Python<'_>, re: (f64, f64), im: (f64, f64)) -> PyResult<RootSet> {
+    fn roots(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<RootSet> {
+        let edge = side(edge)?;
         let set = run(py, None, None, |task: &Task| {
-            matrix::roots(&self.core, &Region { re, im }, task)
+            matrix::roots(&self.core, &Region { re, im }, edge, task)
         })?;
         Ok(RootSet::new(py, set))
     }
@@ -62,30 +64,22 @@ impl CharacteristicMatrix {
         Ok(RootSet::new(py, set))
     }
 
-    /// None where guesses do not lead to a proof.
-    fn rightmost_from_guesses(&self, py: Python<'_>, n: usize) -> PyResult<Option<RootSet>> {
-        let set = run_here(py, |task: &Task| {
-            matrix::rightmost_from_guesses(&self.core, n, task)
-        })?;
-        Ok(set.map(|set| RootSet::new(py, set)))
-    }
-
-    fn spectral_abscissa(&self, py: Python<'_>) -> PyResult<f64> {
+    fn spectral_abscissa(&self, py: Python<'_>, strong: bool) -> PyResult<f64> {
         run_here(py, |task: &Task| {
-            matrix::spectral_abscissa(&self.core, task)
+            matrix::spectral_abscissa(&self.core, strong, task)
         })
     }
 
     /// Lower and upper bound.
-    fn chain_abscissa(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
+    fn chain_abscissa(&self, py: Python<'_>, strong: bool) -> PyResult<(f64, f64)> {
         run(py, None, None, |task: &Task| {
-            matrix::chain_abscissa(&self.core, task)
+            matrix::chain_abscissa(&self.core, strong, task)
         })
     }
 
-    fn is_stable(&self, py: Python<'_>) -> PyResult<bool> {
+    fn is_stable(&self, py: Python<'_>, strong: bool) -> PyResult<bool> {
         run(py, None, None, |task: &Task| {
-            matrix::is_stable(&self.core, task)
+            matrix::is_stable(&self.core, strong, task)
         })
     }
 }

@@ -15,7 +15,7 @@ use crate::runtime::{run, run_here};
 /// Fewer values than this are computed on the calling thread.
 const FEW_VALUES: usize = 2048;
 
-type Range = (f64, f64);
+pub(crate) type Range = (f64, f64);
 type Points<'py> = PyReadonlyArrayDyn<'py, Complex64>;
 type Values<'py> = Bound<'py, PyArray1<Complex64>>;
 
@@ -280,7 +280,7 @@ fn at_all<'py>(
 }
 
 /// To which side roots on an edge belong.
-fn side(edge: &str) -> PyResult<Edge> {
+pub(crate) fn side(edge: &str) -> PyResult<Edge> {
     match edge {
         "error" => Ok(Edge::Refused),
         "inside" => Ok(Edge::Inside),

@@ -3,6 +3,7 @@
 //! * Real: `lu` solves and inverts, `cholesky` inverts what is positive definite, `triangle` is R of
 //!   X = Q R, `balance` scales a matrix to a small norm, `eigenvalues` finds those of the form of
 //!   `hessenberg` by the double-shift QR algorithm.
+//! * `block_triangular` splits a matrix by its pattern of zeros.
 //! * Complex: `elimination` factors and inverts `rows`, `banded` has factors near the diagonal.
 //!
 //! Matrices are row-major. Only sums, products, quotients and roots are taken, so that results have
@@ -11,6 +12,7 @@
 
 pub(crate) mod balance;
 pub(crate) mod banded;
+pub(crate) mod block_triangular;
 pub(crate) mod cholesky;
 pub(crate) mod eigenvalues;
 pub(crate) mod elimination;

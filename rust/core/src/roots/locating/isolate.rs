@@ -127,6 +127,10 @@ impl<'w, W: Seek> Search<'w, W> {
         }
     }
 
+    pub(crate) fn walker(&self) -> &W {
+        self.walker
+    }
+
     /// A search for what is left of a cell after chains of roots have been followed.
     pub(crate) fn after_chains(walker: &'w mut W, cell: &Cell) -> Result<Self, Error> {
         let known = walker.along_chains(cell)?;

@@ -12,7 +12,7 @@ use std::f64::consts::LN_2;
 
 use num_complex::Complex64;
 
-use super::system::{CharacteristicMatrix, Term};
+use super::system::{Irreducible, Term};
 use crate::elementary::log;
 use crate::quasipoly::modulus;
 
@@ -46,7 +46,7 @@ pub(super) struct Balanced {
 impl Balanced {
     /// Is the scaling good enough at `s`? `farthest` is the largest change of Re s, in units of one
     /// over the longest delay.
-    pub(super) fn suits(&self, system: &CharacteristicMatrix, s: Complex64, farthest: f64) -> bool {
+    pub(super) fn suits(&self, system: &Irreducible, s: Complex64, farthest: f64) -> bool {
         let least = LEAST_SIZE * system.rate();
         let (here, there) = (modulus(s).max(least), modulus(self.place).max(least));
         (s.re - self.place.re).abs() * system.longest() <= farthest
@@ -55,7 +55,7 @@ impl Balanced {
 }
 
 /// Scale M at `s`; `None` where its determinant is zero because of its pattern of zeros.
-pub(super) fn balance(system: &CharacteristicMatrix, s: Complex64) -> Option<Balanced> {
+pub(super) fn balance(system: &Irreducible, s: Complex64) -> Option<Balanced> {
     let n = system.size();
     let distance = modulus(s);
     let mut costs = vec![FORBIDDEN; n * n];

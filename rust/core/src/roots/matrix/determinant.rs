@@ -1,15 +1,19 @@
-//! Counts, roots, rightmost roots and stability of det M.
+//! Counts, roots, rightmost roots and stability of det M for one block.
+
+use num_complex::Complex64;
 
 use super::leading::{Found, from_guesses};
 use super::local_enclosure::check_regular;
 use super::outer::Leading;
-use super::prepared::{LEAST_RADIUS, Prepared};
-use super::system::CharacteristicMatrix;
-use super::walker::{MAX_EVALUATIONS, MatrixWalker};
-use crate::quasipoly::QuasiPolynomial;
+use super::prepared::{EVALUATIONS_BESIDE_CLUSTERS, EVALUATIONS_PER_LINE, LEAST_RADIUS, Prepared};
+use super::starts::starts;
+use super::system::Irreducible;
+use super::walker::{MAX_EVALUATIONS, MOST_WITH_CLUSTERS, MatrixWalker};
+use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::counting::{Cell, Closed, EDGE_MARGIN};
 use crate::roots::locating::{
-    all_discs, balances, first, half_plane_discs, is_none, leading, leads_right, rightmost_first,
+    Seek, Spectrum, all_discs, balances, first, half_plane_discs, is_none, leading, leads_right,
+    rightmost_first,
 };
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
@@ -25,11 +29,7 @@ const AT_A_GLANCE: u64 = 2_000;
 ///
 /// # Errors
 /// [`Error::Argument`] where an open side cannot be closed, or the determinant is zero.
-fn close(
-    system: &CharacteristicMatrix,
-    region: &Region,
-    task: &Task,
-) -> Result<Option<Closed>, Error> {
+fn close(system: &Irreducible, region: &Region, task: &Task) -> Result<Option<Closed>, Error> {
     region.check()?;
     check_regular(system)?;
     let mirrored = region.im.1 + region.im.0 < 0.0;
@@ -58,17 +58,7 @@ fn close(
 /// [`Error::Argument`] for a bad region, one that cannot be shown to hold finitely many roots, or a
 /// determinant that is zero everywhere; [`Error::Contour`] where a root lies on the edge, or so
 /// close to it that its side cannot be decided; [`Error::TooMuch`]; [`Error::Interrupted`].
-///
-/// ```
-/// use deadtime::{Task, roots::{Region, matrix::{CharacteristicMatrix, count}}};
-/// let unit = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
-/// let late = vec![(1.0, vec![vec![-1.0, 0.0], vec![0.0, -1.0]])];
-/// let system = CharacteristicMatrix::new(unit, vec![], late)?;
-/// let region = Region::new((-12.0, 2.0), (0.0, 100.0))?;
-/// assert_eq!(count(&system, &region, &Task::new())?, 2 * 16);
-/// # Ok::<(), deadtime::Error>(())
-/// ```
-pub fn count(system: &CharacteristicMatrix, region: &Region, task: &Task) -> Result<u64, Error> {
+pub(super) fn count(system: &Irreducible, region: &Region, task: &Task) -> Result<u64, Error> {
     let Some(closed) = close(system, region, task)? else {
         return Ok(0);
     };
@@ -76,7 +66,11 @@ pub fn count(system: &CharacteristicMatrix, region: &Region, task: &Task) -> Res
         // The discs tell which roots are real.
         return Ok(roots(system, region, task)?.counted);
     }
-    let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
+    counted(&closed, MatrixWalker::new(system, task, MAX_EVALUATIONS))
+}
+
+/// The number of roots in a closed region.
+fn counted(closed: &Closed, mut walker: MatrixWalker<'_>) -> Result<u64, Error> {
     let mut total = 0;
     if let Some(height) = closed.symmetric {
         total += Cell::new(&mut walker, closed.re, (0.0, height), true)?.count;
@@ -92,42 +86,20 @@ pub fn count(system: &CharacteristicMatrix, region: &Region, task: &Task) -> Res
 /// # Errors
 /// As [`count`]; [`Error::CountMismatch`] where double precision does not suffice to locate what
 /// was counted.
-///
-/// ```
-/// use deadtime::{Task, roots::{Region, matrix::{CharacteristicMatrix, roots}}};
-/// let system = CharacteristicMatrix::new(
-///     vec![vec![1.0]], vec![], vec![(1.0, vec![vec![-1.0]])],
-/// )?;
-/// let set = roots(&system, &Region::new((-3.0, 2.0), (0.0, 20.0))?, &Task::new())?;
-/// assert_eq!(set.counted, 3);
-/// assert!((set.roots[0].re + 0.318_131_505_204_764_1).abs() <= set.radii[0]);
-/// # Ok::<(), deadtime::Error>(())
-/// ```
-pub fn roots(
-    system: &CharacteristicMatrix,
-    region: &Region,
-    task: &Task,
-) -> Result<RootSet, Error> {
+pub(super) fn roots(system: &Irreducible, region: &Region, task: &Task) -> Result<RootSet, Error> {
     let discs = match close(system, region, task)? {
-        Some(closed) => all_discs(
-            &mut MatrixWalker::new(system, task, MAX_EVALUATIONS),
-            &closed,
-        )?,
+        Some(closed) => {
+            let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
+            all_discs(&mut walker, &closed).map_err(|error| {
+                // Lines take the shortest steps, and are given up, next to such roots.
+                let last = || walker.balanced.as_ref().map(|scaling| scaling.place);
+                let place = walker.stalled.first().copied().or_else(last);
+                explained(system, place, error, task)
+            })?
+        }
         None => Vec::new(),
     };
     Ok(RootSet::new(discs, *region))
-}
-
-/// The number of roots of det M right of the line Re s = `sigma`.
-///
-/// # Errors
-/// As [`count`].
-pub fn count_right_of(
-    system: &CharacteristicMatrix,
-    sigma: f64,
-    task: &Task,
-) -> Result<u64, Error> {
-    count(system, &Region::right_of(sigma), task)
 }
 
 /// The `n` rightmost roots, not counting those with Im < 0, together with their mirror images.
@@ -136,13 +108,13 @@ pub fn count_right_of(
 ///
 /// # Errors
 /// [`Error::Argument`] for n = 0 or an E that cannot be inverted; those of [`roots`].
-pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result<RootSet, Error> {
+pub(super) fn rightmost(system: &Irreducible, n: usize, task: &Task) -> Result<RootSet, Error> {
     refuse_if!(
         n == 0 || n > MAX_WANTED,
         "n={n}: ask for at least 1 and at most {MAX_WANTED} rightmost roots of a matrix"
     );
     check_regular(system)?;
-    let prepared = Prepared::new(system)?;
+    let mut prepared = Prepared::new(system)?;
     if system.longest() == 0.0 {
         let everywhere = f64::NEG_INFINITY;
         return Ok(first(
@@ -154,40 +126,48 @@ pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result
     let (_, chain) = prepared.leading.difference.enclosure(task)?;
     match from_guesses(&prepared, n, chain, task)? {
         Found::Proved(set) => Ok(set),
-        Found::Open(line) => leading(&prepared, n, line, chain, task, |discs, _| discs),
+        Found::Open(line, stalled) => {
+            if stalled.is_some() {
+                prepared.limit = EVALUATIONS_BESIDE_CLUSTERS;
+            }
+            let guess = || {
+                let mut walker = prepared.walker(task, EVALUATIONS_BESIDE_CLUSTERS);
+                starts(system, &mut walker).first().copied()
+            };
+            leading(&prepared, n, line, chain, task, |discs, _| discs)
+                .map_err(|error| explained(system, stalled.or_else(guess), error, task))
+        }
     }
 }
 
-/// [`rightmost`] for a system with delays but without delayed derivatives, as far as guesses lead
-/// to simple roots other than 0 and one line proves that these are the rightmost: `None` where they
-/// do not, and another form of the determinant may do better.
-///
-/// # Errors
-/// [`Error::Interrupted`].
-pub fn rightmost_from_guesses(
-    system: &CharacteristicMatrix,
-    n: usize,
-    task: &Task,
-) -> Result<Option<RootSet>, Error> {
-    if n == 0 || n > MAX_WANTED || system.longest() == 0.0 || system.is_neutral() {
-        return Ok(None);
+/// The error of a search that has met roots too close together to be enclosed, next to `place` if
+/// there are any: it says how many there are.
+fn explained(system: &Irreducible, place: Option<Complex64>, error: Error, task: &Task) -> Error {
+    let Some(place) = place.filter(|_| !error.ends_all()) else {
+        return error;
+    };
+    let mut walker = MatrixWalker::new(system, task, MOST_WITH_CLUSTERS);
+    match walker.cluster(place, modulus(place) + system.rate()) {
+        Ok(Some(disc)) if disc.multiplicity > 1 => Error::CountMismatch {
+            counted: disc.multiplicity.into(),
+            found: Vec::new(),
+            advice: format!(
+                "so many roots within {:.1e} of {:.6} are too close together for double precision, \
+                 because rounding the matrices moves them as far; is_stable() and count() do not \
+                 need each of them",
+                disc.radius, disc.center
+            ),
+        },
+        Err(other) if other.ends_all() => other,
+        _ => error,
     }
-    let Ok(prepared) = Prepared::new(system) else {
-        return Ok(None);
-    };
-    let Found::Proved(set) = from_guesses(&prepared, n, f64::NEG_INFINITY, task)? else {
-        return Ok(None);
-    };
-    let mut discs = set.roots.iter().zip(&set.radii);
-    let apart = discs.all(|(root, radius)| root.norm() > *radius);
-    Ok((apart && set.roots.len() >= n).then_some(set))
 }
 
 /// The largest real part of a root, or the upper bound of the chains if that is larger.
 ///
 /// # Errors
 /// As [`rightmost`]; [`Error::Argument`] where no root was found.
-pub fn spectral_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<f64, Error> {
+pub(super) fn spectral_abscissa(system: &Irreducible, task: &Task) -> Result<f64, Error> {
     let set = rightmost(system, 1, task)?;
     let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
     let abscissa = isolated.max(chain_abscissa(system, task)?.1);
@@ -206,17 +186,7 @@ pub fn spectral_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<f
 ///
 /// # Errors
 /// [`Error::Argument`] for an E that cannot be inverted; [`Error::Interrupted`].
-///
-/// ```
-/// use deadtime::{Task, roots::matrix::{CharacteristicMatrix, chain_abscissa}};
-/// let one = || vec![vec![1.0]];
-/// let system = CharacteristicMatrix::new(one(), vec![(0.36, vec![vec![0.3]])], vec![(0.0, one())])?;
-/// let (low, high) = chain_abscissa(&system, &Task::new())?;
-/// let exact = 0.3f64.ln() / 0.36;
-/// assert!(low <= exact && exact <= high && high - low < 1e-6);
-/// # Ok::<(), deadtime::Error>(())
-/// ```
-pub fn chain_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<(f64, f64), Error> {
+pub(super) fn chain_abscissa(system: &Irreducible, task: &Task) -> Result<(f64, f64), Error> {
     if !system.is_neutral() {
         return Ok((f64::NEG_INFINITY, f64::NEG_INFINITY));
     }
@@ -224,7 +194,7 @@ pub fn chain_abscissa(system: &CharacteristicMatrix, task: &Task) -> Result<(f64
 }
 
 /// Can the inverse of E be verified? Half planes and chains need it.
-pub fn is_invertible(system: &CharacteristicMatrix) -> bool {
+pub(super) fn is_invertible(system: &Irreducible) -> bool {
     Leading::new(system).is_ok()
 }
 
@@ -235,7 +205,7 @@ pub fn is_invertible(system: &CharacteristicMatrix) -> bool {
 /// # Errors
 /// [`Error::Argument`] for an E that cannot be inverted; [`Error::TooMuch`];
 /// [`Error::Interrupted`].
-pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Error> {
+pub(super) fn is_stable(system: &Irreducible, task: &Task) -> Result<bool, Error> {
     if chain_abscissa(system, task)?.1 >= 0.0 {
         return Ok(false);
     }
@@ -252,19 +222,38 @@ pub fn is_stable(system: &CharacteristicMatrix, task: &Task) -> Result<bool, Err
         Err(_) => {
             let mut starts = rightmost_first(glance.hints);
             starts.extend(balances(&by_norms(system)?));
-            let mut walker = MatrixWalker::new(system, task, MAX_EVALUATIONS);
-            if leads_right(&mut walker, &starts)? {
-                return Ok(false);
+            let mut walker = MatrixWalker::new(system, task, MOST_WITH_CLUSTERS);
+            match leads_right(&mut walker, &starts) {
+                Ok(true) => return Ok(false),
+                Err(error) if error.ends_all() => return Err(error),
+                _ => {}
             }
-            count_right_of(system, 0.0, task)
+            // Next to a cluster a line takes very short steps; discs of all its roots do without.
+            match rightmost(system, 1, task) {
+                Ok(set) => return Ok(is_left(&set)),
+                Err(error) if error.ends_all() => return Err(error),
+                Err(error @ Error::CountMismatch { .. }) => return Err(error),
+                Err(_) => close(system, &Region::right_of(0.0), task)?.map_or(Ok(0), |closed| {
+                    counted(
+                        &closed,
+                        MatrixWalker::new(system, task, EVALUATIONS_PER_LINE),
+                    )
+                }),
+            }
         }
     };
     is_none(number)
 }
 
+/// Does the set show that no root lies right of the axis, or on it?
+fn is_left(set: &RootSet) -> bool {
+    let mut discs = set.roots.iter().zip(&set.radii);
+    set.region.re.0 <= 0.0 && discs.all(|(root, radius)| root.re + radius < 0.0)
+}
+
 /// A function whose coefficients are the norms of the matrices. Its roots have about the size of
 /// those of det M.
-fn by_norms(system: &CharacteristicMatrix) -> Result<QuasiPolynomial, Error> {
+fn by_norms(system: &Irreducible) -> Result<QuasiPolynomial, Error> {
     let norm = |matrix: &[Vec<f64>]| {
         let sums = matrix.iter().map(|row| row.iter().map(|x| x.abs()).sum());
         sums.fold(0.0, f64::max)

@@ -5,9 +5,11 @@
 //! Otherwise the points where the line comes closest to a root are further guesses. Where this does
 //! not lead to an agreement, the line is handed to the search by lines (`locating::lines`).
 
+use num_complex::Complex64;
+
 use super::prepared::Prepared;
 use super::starts::starts;
-use super::walker::MatrixWalker;
+use super::walker::{MOST_WITH_CLUSTERS, MatrixWalker};
 use crate::order::sort_down;
 use crate::roots::disc::Disc;
 use crate::roots::locating::{Effort, Line, Search, Spectrum, first};
@@ -37,8 +39,9 @@ const WIDE: f64 = 0.3;
 /// The outcome of a search from guesses.
 pub(super) enum Found {
     Proved(RootSet),
-    /// Not proved; a line that was counted on the way, if there is one.
-    Open(Option<Line>),
+    /// Not proved; a line that was counted on the way, and a place where roots are too close together
+    /// to be enclosed, if there are such.
+    Open(Option<Line>, Option<Complex64>),
 }
 
 /// The `n` rightmost roots right of `chain`.
@@ -68,20 +71,26 @@ pub(super) fn from_guesses(
             }
             match search.iterate_from(&[*guess], |s| s.is_finite()) {
                 Err(error) if error.ends_all() => return Err(error),
-                Err(_) => return Ok(Found::Open(last)),
+                Err(_) => return Ok(open(last, &search)),
                 Ok(()) => {}
             }
         }
         let Some(sigma) = line_beside(search.found(), n, &ahead, chain, step) else {
-            return Ok(Found::Open(last));
+            return Ok(open(last, &search));
         };
+        // Steps are short near clusters, but what encloses them does not count the others.
+        let has_cluster = search.found().iter().any(|disc| disc.multiplicity > 1);
         let effort = Effort {
-            limit: LINE_LIMIT,
+            limit: if has_cluster {
+                MOST_WITH_CLUSTERS
+            } else {
+                LINE_LIMIT
+            },
             double_double: false,
         };
         let (count, hints) = match prepared.line(sigma, effort, task) {
             Err(error) if error.ends_all() => return Err(error),
-            Err(_) => return Ok(Found::Open(last)),
+            Err(_) => return Ok(open(last, &search)),
             Ok(found) => found,
         };
         if search.weight_right_of(sigma) == count {
@@ -100,7 +109,11 @@ pub(super) fn from_guesses(
             hints,
         });
     }
-    Ok(Found::Open(last))
+    Ok(open(last, &search))
+}
+
+fn open(line: Option<Line>, search: &Search<'_, MatrixWalker<'_>>) -> Found {
+    Found::Open(line, search.walker().stalled.first().copied())
 }
 
 /// A line left of at least `n` of the discs. `ahead` are guesses of real parts of further roots.
@@ -132,7 +145,6 @@ fn line_beside(discs: &[Disc], n: usize, ahead: &[f64], chain: f64, step: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_complex::Complex64;
 
     #[test]
     fn the_line_lies_in_the_first_wide_gap() {

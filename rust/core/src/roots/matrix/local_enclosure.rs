@@ -23,7 +23,7 @@ use num_complex::Complex64;
 use super::balance::{Balanced, balance, exponent};
 use super::factor::{FLOOR, Factored, ROUNDING, factor};
 use super::kernel::combine;
-use super::system::{CharacteristicMatrix, Term};
+use super::system::{Irreducible, Term};
 use crate::Error;
 use crate::elementary::{angle, exp, sin_cos};
 use crate::linear_algebra::rows::{Rows, norm};
@@ -148,7 +148,7 @@ pub(super) struct Reach {
 
 impl LocalEnclosure {
     /// The enclosure at `s`; `None` where M(s) is too close to a singular matrix.
-    fn new(system: &CharacteristicMatrix, s: Complex64) -> Option<Self> {
+    fn new(system: &Irreducible, s: Complex64) -> Option<Self> {
         Self::tried(system, &balance(system, s)?, s).filter(Self::is_clear)
     }
 
@@ -163,11 +163,7 @@ impl LocalEnclosure {
     }
 
     /// What is known at `s` with M scaled by `balanced`, proved or not.
-    pub(super) fn tried(
-        system: &CharacteristicMatrix,
-        balanced: &Balanced,
-        s: Complex64,
-    ) -> Option<Self> {
+    pub(super) fn tried(system: &Irreducible, balanced: &Balanced, s: Complex64) -> Option<Self> {
         let n = system.size();
         let scaled = || balanced.rows.iter().zip(&balanced.references);
         let mut weights = Weights::new(system, balanced, s);
@@ -366,7 +362,7 @@ pub(super) struct Weights<'a> {
 }
 
 impl<'a> Weights<'a> {
-    pub(super) fn new(system: &'a CharacteristicMatrix, balanced: &Balanced, s: Complex64) -> Self {
+    pub(super) fn new(system: &'a Irreducible, balanced: &Balanced, s: Complex64) -> Self {
         let delays = system.delays();
         Self {
             delays,
@@ -553,7 +549,7 @@ impl Sums {
 
 /// # Errors
 /// [`Error::Argument`] where M is singular at several points, hence probably everywhere.
-pub(super) fn check_regular(system: &CharacteristicMatrix) -> Result<(), Error> {
+pub(super) fn check_regular(system: &Irreducible) -> Result<(), Error> {
     let rate = system.rate();
     let regular = |(x, y): &(f64, f64)| {
         LocalEnclosure::new(system, Complex64::new(x * rate, y * rate)).is_some()

@@ -6,6 +6,7 @@
 
 use num_complex::Complex64;
 
+use super::cluster::cluster;
 use super::simple_root::simple_root;
 use super::walker::{LEAST_SIZE, MatrixWalker, NEAR_ROOT, RESOLUTION};
 use crate::Error;
@@ -107,12 +108,16 @@ impl MatrixWalker<'_> {
             .balanced(up, NEAR_ROOT)
             .and_then(|balanced| simple_root(system, balanced, up))
             .filter(|disc| disc.radius < most);
-        let found = match single {
+        let proved = single.or_else(|| {
+            let balanced = self.balanced(up, NEAR_ROOT)?;
+            cluster(system, balanced, up)
+        });
+        let found = match proved {
             Some(disc) => Some(disc),
             None => self.square(up, most)?,
         };
         Ok(match found {
-            Some(disc) if disc.multiplicity == 1 => {
+            Some(disc) if proved.is_some() || disc.multiplicity == 1 => {
                 self.known.push(disc);
                 Outcome::Simple(disc)
             }

@@ -12,7 +12,7 @@
 
 use super::difference::Difference;
 use super::factor::{ROUNDING, factor};
-use super::system::CharacteristicMatrix;
+use super::system::Irreducible;
 use crate::elementary::exp_above;
 use crate::linear_algebra::rows::Rows;
 use crate::{Error, Task};
@@ -58,7 +58,7 @@ pub(super) struct Leading {
 impl Leading {
     /// # Errors
     /// [`Error::Argument`] where E is singular, or so close to it that no inverse can be verified.
-    pub(super) fn new(system: &CharacteristicMatrix) -> Result<Self, Error> {
+    pub(super) fn new(system: &Irreducible) -> Result<Self, Error> {
         let n = system.size();
         let (e, _) = system.dense(0);
         let mut rows = Rows::zeros(n);

@@ -3,29 +3,35 @@
 use num_complex::Complex64;
 
 use super::outer::Leading;
-use super::system::CharacteristicMatrix;
+use super::system::Irreducible;
 use super::walker::MatrixWalker;
 use crate::roots::counting::{Cell, EDGE_MARGIN};
 use crate::roots::locating::{Effort, Spectrum};
 use crate::{Error, Task};
 
-/// Factorisations after which a line is abandoned.
-const EVALUATIONS_PER_LINE: u64 = 100_000;
+/// Factorisations after which a line is abandoned: in general, and where roots are known to be too
+/// close together to be enclosed. Larger: more of these are counted all the same; smaller: the
+/// refusal takes less time.
+pub(super) const EVALUATIONS_PER_LINE: u64 = 100_000;
+pub(super) const EVALUATIONS_BESIDE_CLUSTERS: u64 = 5_000;
 
 /// Least radius of a half plane, relative to the rate of the system, so that roots at 0 are inside.
 pub(super) const LEAST_RADIUS: f64 = 1e-6;
 
 /// A system with the bounds that a search needs.
 pub(super) struct Prepared<'s> {
-    pub(super) system: &'s CharacteristicMatrix,
+    pub(super) system: &'s Irreducible,
     pub(super) leading: Leading,
+    /// Upper limit on the factorisations for a line.
+    pub(super) limit: u64,
 }
 
 impl<'s> Prepared<'s> {
-    pub(super) fn new(system: &'s CharacteristicMatrix) -> Result<Self, Error> {
+    pub(super) fn new(system: &'s Irreducible) -> Result<Self, Error> {
         Ok(Self {
             system,
             leading: Leading::new(system)?,
+            limit: EVALUATIONS_PER_LINE,
         })
     }
 
@@ -49,7 +55,12 @@ impl Spectrum for Prepared<'_> {
         Self: 'a;
 
     fn walker<'a>(&'a self, task: &'a Task, limit: u64) -> MatrixWalker<'a> {
-        MatrixWalker::new(self.system, task, limit)
+        let whole = if self.limit < EVALUATIONS_PER_LINE {
+            20 * self.limit
+        } else {
+            limit
+        };
+        MatrixWalker::new(self.system, task, limit.min(whole))
     }
 
     fn line(
@@ -58,7 +69,7 @@ impl Spectrum for Prepared<'_> {
         effort: Effort,
         task: &Task,
     ) -> Result<(u64, Vec<Complex64>), Error> {
-        let mut walker = self.walker(task, effort.limit.min(EVALUATIONS_PER_LINE));
+        let mut walker = self.walker(task, effort.limit.min(self.limit));
         let cell = self.cell(&mut walker, sigma)?;
         Ok((cell.map_or(0, |cell| cell.count), walker.hints))
     }

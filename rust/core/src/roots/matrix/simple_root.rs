@@ -18,7 +18,7 @@ use num_complex::Complex64;
 use super::balance::Balanced;
 use super::factor::{FLOOR, Factored, ROUNDING, factor};
 use super::local_enclosure::Weights;
-use super::system::CharacteristicMatrix;
+use super::system::Irreducible;
 use crate::elementary::exp;
 use crate::linear_algebra::rows::{Rows, norm};
 use crate::quasipoly::modulus;
@@ -53,13 +53,13 @@ pub(super) struct Dense {
     first: f64,
     second: f64,
     /// Bounds on the errors of G by rows, and that of G′ relative to `first`.
-    lost: Vec<f64>,
+    pub(super) lost: Vec<f64>,
     loss: f64,
 }
 
 impl Dense {
     pub(super) fn new(
-        system: &CharacteristicMatrix,
+        system: &Irreducible,
         balanced: &Balanced,
         z: Complex64,
         radius: f64,
@@ -106,20 +106,24 @@ impl Dense {
     }
 }
 
-/// The disc of the simple root next to `z`, Im z ≥ 0; `None` where it is not proved to be simple.
-pub(super) fn simple_root(
-    system: &CharacteristicMatrix,
-    balanced: &Balanced,
-    z: Complex64,
-) -> Option<Disc> {
-    let n = system.size();
+/// About |z|, and the radius of what is examined around z.
+pub(super) fn examined(system: &Irreducible, z: Complex64) -> (f64, f64) {
     let size = modulus(z).max(LEAST_SIZE * system.rate());
-    let mut reach = size;
-    if system.longest() > 0.0 {
-        reach = reach.min(LARGEST_REACH / system.longest());
-    }
+    let longest = system.longest();
+    let reach = if longest > 0.0 {
+        size.min(LARGEST_REACH / longest)
+    } else {
+        size
+    };
+    (size, reach)
+}
+
+/// The disc of the simple root next to `z`, Im z ≥ 0; `None` where it is not proved to be simple.
+pub(super) fn simple_root(system: &Irreducible, balanced: &Balanced, z: Complex64) -> Option<Disc> {
+    let n = system.size();
+    let (size, reach) = examined(system, z);
     let dense = Dense::new(system, balanced, z, reach);
-    let bordered = bordered(&dense, ASIDE * size)?;
+    let bordered = border(&dense, size)?.of(&dense.g);
     let Factored {
         inverse,
         norms,
@@ -204,8 +208,47 @@ pub(super) fn simple_root(
     (!disc.is_on_axis()).then_some(disc)
 }
 
-/// G with a border that makes it regular.
-fn bordered(dense: &Dense, aside: f64) -> Option<Rows> {
+/// Vectors b and c that make [G b; cᵀ 0] regular next to a root with one null vector.
+pub(super) struct Border {
+    right: Vec<Complex64>,
+    lower: Vec<Complex64>,
+}
+
+impl Border {
+    /// G with its border.
+    pub(super) fn of(&self, g: &Rows) -> Rows {
+        let n = g.size;
+        let mut whole = Rows::zeros(n + 1);
+        for (i, (right, lower)) in self.right.iter().zip(&self.lower).enumerate() {
+            for k in 0..n {
+                whole.add(i, k, g.get(i, k));
+            }
+            whole.add(i, n, *right);
+            whole.add(n, i, *lower);
+        }
+        whole
+    }
+
+    /// Bound on the norm of the border.
+    pub(super) fn size(&self) -> f64 {
+        let squares = self.right.iter().chain(&self.lower).map(|x| x.norm_sqr());
+        squares.sum::<f64>().sqrt() * MARGIN
+    }
+
+    /// Add [G b; cᵀ 0] x to `sums`.
+    pub(super) fn add_product(&self, g: &Rows, x: &[Complex64], sums: &mut [Complex64]) {
+        let whole = self.of(g);
+        for (i, sum) in sums.iter_mut().enumerate() {
+            for (k, x) in x.iter().enumerate() {
+                *sum += whole.get(i, k) * x;
+            }
+        }
+    }
+}
+
+/// b and c from the null vectors of G near the point; `size` is about |s|.
+pub(super) fn border(dense: &Dense, size: f64) -> Option<Border> {
+    let aside = ASIDE * size;
     let n = dense.g.size;
     let mut near = dense.g.clone();
     let slopes = dense.slope.re.iter().zip(&dense.slope.im);
@@ -226,13 +269,10 @@ fn bordered(dense: &Dense, aside: f64) -> Option<Rows> {
     if !(left.is_finite() && right.is_finite() && left > 0.0 && right > 0.0) {
         return None;
     }
-    let mut whole = Rows::zeros(n + 1);
-    for i in 0..n {
-        for k in 0..n {
-            whole.add(i, k, dense.g.get(i, k));
-        }
-        whole.add(i, n, inverse.get(row, i).conj() / left);
-        whole.add(n, i, inverse.get(i, column).conj() / right);
-    }
-    Some(whole)
+    Some(Border {
+        right: (0..n).map(|i| inverse.get(row, i).conj() / left).collect(),
+        lower: (0..n)
+            .map(|i| inverse.get(i, column).conj() / right)
+            .collect(),
+    })
 }

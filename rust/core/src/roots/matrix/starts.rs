@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use super::factor::factor;
 use super::simple_root::Dense;
-use super::system::CharacteristicMatrix;
+use super::system::Irreducible;
 use super::walker::{MatrixWalker, NEAR_ROOT};
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::order::sort_down;
@@ -31,10 +31,7 @@ const SHIFT: f64 = 1e-3;
 
 /// Guesses of the rightmost roots, Im s ≥ 0: first those close to the point of linearisation, by
 /// falling real part, and only these where there are any.
-pub(super) fn starts(
-    system: &CharacteristicMatrix,
-    walker: &mut MatrixWalker<'_>,
-) -> Vec<Complex64> {
+pub(super) fn starts(system: &Irreducible, walker: &mut MatrixWalker<'_>) -> Vec<Complex64> {
     let unit = system.longest();
     let mut x = 0.0;
     let mut found = Vec::new();
@@ -73,7 +70,7 @@ pub(super) fn starts(
 
 /// The roots of the linearisation at x, Im s ≥ 0.
 fn linearised(
-    system: &CharacteristicMatrix,
+    system: &Irreducible,
     walker: &mut MatrixWalker<'_>,
     x: f64,
 ) -> Option<Vec<Complex64>> {

@@ -14,9 +14,6 @@ const MOST_EXPONENT: i32 = 200;
 /// Sizes of entries that leave room for products in double precision.
 const USABLE: std::ops::Range<f64> = 1e-100..1e100;
 
-/// Upper limit on the number of states (bounds the time of the dense factorisations).
-const MAX_STATES: usize = 200;
-
 /// The contribution of one delay to one row of M: `(s · slope + value) e^(−s τ)` in each column.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Term {
@@ -33,9 +30,13 @@ pub(super) struct Entry {
     pub(super) value: f64,
 }
 
+/// A matrix by rows, and matrices by their delays in s.
+pub(super) type Matrix = Vec<Vec<f64>>;
+pub(super) type ByDelay = Vec<(f64, Matrix)>;
+
 /// A square matrix of quasi-polynomials of first degree, real, scaled.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CharacteristicMatrix {
+pub(super) struct Irreducible {
     rows: Vec<Vec<Term>>,
     /// Sorted, distinct, ≥ 0, the first one 0.
     delays: Vec<f64>,
@@ -44,39 +45,15 @@ pub struct CharacteristicMatrix {
     rate: f64,
 }
 
-impl CharacteristicMatrix {
-    /// From E, and N and A with their delays in s: all matrices square, by rows.
+impl Irreducible {
+    /// From E, and N and A with their delays in s: all matrices square and of one size, by rows.
     ///
     /// # Errors
-    /// [`Error::Argument`] where shapes differ, a number is not finite or far from 1 in size, a
-    /// delay is negative, or a row or column of all matrices is zero.
-    ///
-    /// ```
-    /// use deadtime::roots::matrix::CharacteristicMatrix;
-    /// let oscillator = CharacteristicMatrix::new(
-    ///     vec![vec![1.0, 0.0], vec![0.0, 1.0]],
-    ///     vec![],
-    ///     vec![(0.0, vec![vec![0.0, 1.0], vec![-4.0, -0.4]])],
-    /// )?;
-    /// assert_eq!(oscillator.size(), 2);
-    /// # Ok::<(), deadtime::Error>(())
-    /// ```
-    pub fn new(
-        e: Vec<Vec<f64>>,
-        n: Vec<(f64, Vec<Vec<f64>>)>,
-        a: Vec<(f64, Vec<Vec<f64>>)>,
-    ) -> Result<Self, Error> {
+    /// [`Error::Argument`] where a number is not finite or far from 1 in size.
+    pub(super) fn new(e: Matrix, n: ByDelay, a: ByDelay) -> Result<Self, Error> {
         let size = e.len();
-        refuse_if!(
-            size == 0 || size > MAX_STATES,
-            "{size} states: give at least 1 and at most {MAX_STATES}"
-        );
         let mut delays = vec![0.0];
         for (delay, matrix) in n.iter().chain(&a) {
-            refuse_if!(
-                !(delay.is_finite() && *delay >= 0.0),
-                "a delay of {delay} s: give finite ones, not below 0"
-            );
             // A matrix of zeros adds no delay.
             if matrix.iter().flatten().any(|x| *x != 0.0) {
                 delays.push(delay + 0.0);
@@ -91,10 +68,6 @@ impl CharacteristicMatrix {
             .chain(n.iter().map(|(delay, m)| (*delay, m, true)))
             .chain(a.iter().map(|(delay, m)| (*delay, m, false)));
         for (delay, matrix, is_slope) in all {
-            refuse_if!(
-                matrix.len() != size || matrix.iter().any(|row| row.len() != size),
-                "a matrix is not {size} by {size}, as E is"
-            );
             let group = if is_slope { &mut slopes } else { &mut values };
             let Some(target) = place(delay).and_then(|place| group.get_mut(place)) else {
                 continue;
@@ -133,25 +106,16 @@ impl CharacteristicMatrix {
                 }
             }
         }
-        let used = |column: usize| {
-            let entries = rows.iter().flatten().flat_map(|term| &term.entries);
-            entries.into_iter().any(|entry| entry.column == column)
-        };
-        refuse_if!(
-            rows.iter().any(Vec::is_empty) || !(0..size).all(used),
-            "the determinant of the characteristic matrix is zero for every s: a row or a \
-             column of E, N and A together is zero"
-        );
         Ok(Self { rows, delays, rate })
     }
 
     /// The number of states.
-    pub fn size(&self) -> usize {
+    pub(super) fn size(&self) -> usize {
         self.rows.len()
     }
 
     /// Delays in s, ascending, the first one 0.
-    pub fn delays(&self) -> &[f64] {
+    pub(super) fn delays(&self) -> &[f64] {
         &self.delays
     }
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::Task;
 use crate::quasipoly::QuasiPolynomial;
-use crate::roots::Region;
+use crate::roots::{Edge, Region};
 use num_complex::Complex64;
 
 fn ring(n: usize, delay: f64, gain: f64) -> CharacteristicMatrix {
@@ -42,9 +42,12 @@ fn a_single_state_is_a_quasi_polynomial() {
     ] {
         let region = Region::new(re, im).unwrap();
         let expected = super::super::roots(&h, &region, &task).unwrap();
-        let found = roots(&system, &region, &task).unwrap();
+        let found = roots(&system, &region, Edge::Refused, &task).unwrap();
         assert_eq!(found.counted, expected.counted);
-        assert_eq!(count(&system, &region, &task).unwrap(), expected.counted);
+        assert_eq!(
+            count(&system, &region, Edge::Refused, &task).unwrap(),
+            expected.counted
+        );
         for (k, root) in found.roots.iter().enumerate() {
             assert!(found.radii[k] < 1e-10 * root.norm());
             let near = expected
@@ -56,7 +59,7 @@ fn a_single_state_is_a_quasi_polynomial() {
     }
     let set = rightmost(&system, 1, &task).unwrap();
     assert!((set.roots[0].re + 3.316_780_322_147_385).abs() <= set.radii[0]);
-    assert!(is_stable(&system, &task).unwrap());
+    assert!(is_stable(&system, true, &task).unwrap());
 }
 
 #[test]
@@ -65,9 +68,17 @@ fn rings_have_the_roots_of_their_modes() {
     let n = 8;
     let system = ring(n, 0.5, 0.8);
     let whole = Region::new((-4.0, 2.0), (-20.0, 20.0)).unwrap();
-    let set = roots(&system, &whole, &task).unwrap();
+    let set = roots(&system, &whole, Edge::Refused, &task).unwrap();
     let parts: u64 = [(-20.0, 3.03), (3.03, 20.0)]
-        .map(|im| count(&system, &Region::new((-4.0, 2.0), im).unwrap(), &task).unwrap())
+        .map(|im| {
+            count(
+                &system,
+                &Region::new((-4.0, 2.0), im).unwrap(),
+                Edge::Refused,
+                &task,
+            )
+            .unwrap()
+        })
         .iter()
         .sum();
     assert_eq!(set.counted, parts);

@@ -5,12 +5,15 @@ use num_complex::Complex64;
 
 use super::balance::{Balanced, balance};
 use super::local_enclosure::LocalEnclosure;
-use super::system::CharacteristicMatrix;
+use super::system::Irreducible;
 use crate::roots::disc::Disc;
 use crate::{Error, Task};
 
 /// Factorisations after which a computation is given up.
 pub(super) const MAX_EVALUATIONS: u64 = 1_000_000;
+
+/// The same where roots were met that are too close together to be enclosed.
+pub(super) const MOST_WITH_CLUSTERS: u64 = 20_000;
 
 /// Approximate number of operations between two checks for cancellation.
 const CHECK_EVERY: u64 = 1_000_000;
@@ -35,7 +38,7 @@ const MOST_RESIDUALS: f64 = 30.0;
 /// Follows arg det M along lines. Keeps the number of evaluations, the hints of roots and the discs
 /// already proved.
 pub(super) struct MatrixWalker<'a> {
-    pub(super) system: &'a CharacteristicMatrix,
+    pub(super) system: &'a Irreducible,
     task: &'a Task,
     /// The scaling of M at the last points, and the least residual met with it.
     pub(super) balanced: Option<Balanced>,
@@ -55,7 +58,7 @@ pub(super) struct MatrixWalker<'a> {
 }
 
 impl<'a> MatrixWalker<'a> {
-    pub(super) fn new(system: &'a CharacteristicMatrix, task: &'a Task, limit: u64) -> Self {
+    pub(super) fn new(system: &'a Irreducible, task: &'a Task, limit: u64) -> Self {
         Self {
             system,
             task,
@@ -89,10 +92,11 @@ impl<'a> MatrixWalker<'a> {
         }
         self.work = 0;
         self.task.check()?;
-        if self.evaluations > self.limit {
+        let beside_clusters = !self.stalled.is_empty() && self.evaluations > MOST_WITH_CLUSTERS;
+        if self.evaluations > self.limit || beside_clusters {
             return Err(Error::TooMuch {
                 what: "the search for roots of a matrix",
-                limit: self.limit,
+                limit: self.limit.min(self.evaluations),
                 unit: "factorisations",
                 advice: "take a smaller region, or keep its edges clear of chains of roots".into(),
             });
