@@ -350,9 +350,11 @@ def test_sets_stay_settled_where_their_slowest_root_says_so(loop):
     rates = sets.rates()
     inside = np.abs(TIME_CONSTANTS / rates) * (1.0 + np.geomspace(1e-6, 3.0, 300))
     inside[::2] = np.abs(TIME_CONSTANTS / rates[::2]) / (1.0 + np.geomspace(1e-6, 3.0, 150))
-    np.testing.assert_array_equal(sets.stay(inside), inside * rates >= TIME_CONSTANTS)
+    never, end = np.zeros(300), 2.0 * inside.max()
+    stay = sets.stay(end - inside, never, end)
+    np.testing.assert_array_equal(stay, inside * rates >= TIME_CONSTANTS)
     # No time at all is not enough, and gives no warning.
-    assert not sets.stay(np.zeros(300)).any()
+    assert not sets.stay(np.full(300, end), never, end).any()
 
 
 @settings(max_examples=60, deadline=None)
