@@ -91,7 +91,7 @@ def last_outside(draw, final, end):
 
 
 def check(kind, count, seed, times, longest):
-    """Compare claims with own runs; returns how many sets were claimed settled, and how many did."""
+    """Compare claims with own runs; returns how many sets were called settled, and how many did."""
     draw = drawn(kind, count, times[-1], seed)
     found = [dtm.sweep(draw.loop, draw.numbers, time) for time in times]
     lasts = last_outside(draw, np.array([sweep["steady_state"] for sweep in found]), longest)

@@ -506,7 +506,8 @@ class _Sets:
             numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
             numbers.pop("limit", None)
             cells = sampled_grid(loop.plant, loop.controller, numbers, threads=self.threads)
-            return -cells.abscissa
+            # Sets that differ in their limits alone have one loop.
+            return np.broadcast_to(-cells.abscissa, self.shape)
         found = np.empty(self.shape)
         for place, _, sets, _ in self.blocks(None):
             found[place] = sweep_abscissae(sets, threads=self.threads)
