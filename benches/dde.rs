@@ -198,8 +198,9 @@ fn sweeps(criterion: &mut Criterion) {
             let mut overshoots = vec![0.0; count];
             bencher.iter(|| {
                 let keep = |sets: &[usize], measures: &Measures| {
-                    for (&set, overshoot) in sets.iter().zip(measures.metrics[3]) {
-                        overshoots[set] = overshoot;
+                    let found = measures.columns().nth(3).into_iter().flatten();
+                    for (&set, overshoot) in sets.iter().zip(found) {
+                        overshoots[set] = *overshoot;
                     }
                 };
                 let numbers: (&[f64], &[f64]) = (&[1.0], &[0.0]);

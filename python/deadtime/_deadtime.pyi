@@ -271,7 +271,12 @@ def held_map(
 ) -> MapCells: ...
 def held_crossings(rows: _HeldRows, low: float, high: float) -> tuple[_Reals, _Reals] | None: ...
 def held_boundaries(
-    rows: _HeldRows, *, along: str, decay: float, damping: _Pair | None
+    rows: _HeldRows,
+    columns: _HeldRows | None,
+    *,
+    along: tuple[str, str],
+    decay: float,
+    damping: _Pair | None,
 ) -> list[MapBoundary]: ...
 
 @final

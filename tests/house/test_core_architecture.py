@@ -30,6 +30,7 @@ CORE_ARROWS = {
 ORDER = {
     "linear_algebra": [
         "vectors",
+        "block_triangular",
         "rows",
         "banded",
         "elimination",
@@ -77,6 +78,7 @@ ORDER = {
     "estimation": [
         "plant",
         "disturbance",
+        "block_triangular",
         "rows",
         "kept",
         "propagation",

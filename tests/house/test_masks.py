@@ -74,6 +74,41 @@ TAKERS = {
 }
 
 
+MASKED = np.ma.array([1.0, 1e6], mask=[False, True])
+
+#: Functions of `solve_dde` that return a masked value.
+RETURNS = {
+    "fun": lambda value: solved2(lambda t, y, z: value),
+    "fun of nodes": lambda value: solved2(
+        lambda t, y, z: np.ma.stack([value] * t.size, axis=1), vectorized=True
+    ),
+    "rows of nodes": lambda value: solved2(
+        lambda t, y, z: [value[[1]].repeat(t.size)] * 2, vectorized=True
+    ),
+    "list": lambda value: solved2(lambda t, y, z: list(value)),
+    "history": lambda value: solved2(lambda t, y, z: -y, history=lambda t: value),
+    "event": lambda value: solved2(lambda t, y, z: -y, events=lambda t, y: value[1]),
+    "change": lambda value: solved2(lambda t, y, z: -y, jumps=[(0.5, lambda t, y: value)]),
+}
+
+
+def solved2(fun, history=(1.0, 1.0), **options):
+    return dtm.solve_dde(fun, (0.0, 1.0), history, 1.0, **options)
+
+
+@pytest.mark.parametrize("what", RETURNS)
+def test_a_masked_value_that_a_function_returns_is_refused(what):
+    # What was under the mask was the slope.
+    with pytest.raises(ValueError, match="masked"):
+        RETURNS[what](MASKED)
+
+
+def test_a_mask_without_masked_entries_is_no_obstacle():
+    plain = solved2(lambda t, y, z: -y)
+    masked = solved2(lambda t, y, z: np.ma.array(-y, mask=False))
+    assert np.array_equal(plain.y, masked.y)
+
+
 #: Functions whose result has the mask of the argument.
 UFUNCS = (
     "dde_roots",

@@ -52,6 +52,17 @@ CASES = {
     "a strided array": ("LOOP.simulate(STRIDED)", 100, "needs 76.294 MiB"),
 }  # fmt: skip
 
+#: Calls with little memory left, whether threads run before or not; MiB.
+LITTLE = {
+    "stability": "SYSTEM.is_stable()",
+    "rightmost": "SYSTEM.rightmost()",
+    "roots": "SYSTEM.poles(re=(-1, 1), im=(-3, 3))",
+    "a sweep": "dtm.sweep(LOOP, {'Kp': (0.1, 3, 2000)})",
+    "a solution": "dtm.solve_dde(lambda t, y, z: -z[0], (0, 100), np.ones(30), 1.0)",
+    "threads": "dtm.stability_map(dtm.s + Kp * dtm.delay(T), RANGES, shape=(300, 300))",
+}
+LEFT = (1, 3, 8, 24)
+
 #: Each case in a child of its own, which has loaded the package and started no threads.
 PROGRAM = """
 import json
@@ -71,25 +82,39 @@ ONES = np.ones(10_000_000, dtype=complex)
 STRIDED = np.linspace(0.0, 10.0, 20_000_001)[::2]
 
 
-def limited(call, room):
-    dtm.lambertw(np.ones(100_000))  # starts the threads
+rng = np.random.default_rng(0)
+SYSTEM = dtm.DelaySystem(
+    {
+        0.0: rng.normal(size=(60, 60)) / 60**0.5 - 2.0 * np.eye(60),
+        1.0: 0.3 * rng.normal(size=(60, 60)) / 60**0.5,
+    }
+)
+
+
+def limited(call, room, starts):
+    if starts:
+        dtm.lambertw(np.ones(100_000))  # starts the threads
     LOOP.simulate([0.0, 1.0])
     used = re.search(r"VmSize:\\s+(\\d+)", open("/proc/self/status").read())[1]
     most = int(used) * 1024 + room * 2**20
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (most, before[1]))
     try:
         eval(call)
         said = "it had enough"
-    except MemoryError as error:
+    except (MemoryError, ImportError) as error:  # of a library that Python has no room for
         said = str(error)
+    if room < 48:
+        # Python keeps what the call has used, and then there is too little for another one.
+        resource.setrlimit(resource.RLIMIT_AS, before)
     print(json.dumps([said, dtm.lambertw(1.0).real, LOOP.simulate([0.0, 1.0]).outputs.size]))
 
 
 warnings.simplefilter("ignore", DeprecationWarning)
-for call, room, _ in json.loads(sys.argv[1]):
+for call, room, starts in json.loads(sys.argv[1]):
     child = os.fork()
     if child == 0:
-        limited(call, room)
+        limited(call, room, starts)
         sys.stdout.flush()
         os._exit(0)
     if os.waitpid(child, 0)[1]:
@@ -97,18 +122,23 @@ for call, room, _ in json.loads(sys.argv[1]):
 """
 
 
-@pytest.fixture(scope="module")
-def outcomes():
+def said_by(calls):
     """What each call said, and whether the interpreter went on."""
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, json.dumps(list(CASES.values()))],
+        [sys.executable, "-c", PROGRAM, json.dumps(calls)],
         capture_output=True,
         text=True,
         timeout=120,
         check=True,
         env={**os.environ, "DEADTIME_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1"},
     )
-    return dict(zip(CASES, map(json.loads, done.stdout.splitlines()), strict=True))
+    return list(map(json.loads, done.stdout.splitlines()))
+
+
+@pytest.fixture(scope="module")
+def outcomes():
+    calls = [(call, room, True) for call, room, _ in CASES.values()]
+    return dict(zip(CASES, said_by(calls), strict=True))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -117,3 +147,12 @@ def test_memory_that_runs_out_ends_the_call_alone(case, outcomes):
     said, *alive = outcomes[case]
     assert CASES[case][2] in said
     assert alive == [0.5671432904097838, 2]
+
+
+@pytest.mark.parametrize("case", LITTLE)
+def test_little_memory_ends_no_process(case):
+    # The smallest allocations and the stacks of threads failed: SIGABRT, and an OSError.
+    calls = [(LITTLE[case], left, starts) for left in LEFT for starts in (False, True)]
+    for call, (said, *alive) in zip(calls, said_by(calls), strict=True):
+        assert said != "it ended", call
+        assert alive == [0.5671432904097838, 2], call

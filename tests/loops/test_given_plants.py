@@ -105,7 +105,7 @@ def test_a_plant_of_python_control_gives_its_poles():
     [
         (dtm.TransferFunction([1.0, 0.0, 0.0], [1.0, 1.0]), ValueError, "differentiate"),
         (1.0 / (s * delay(0.1)), ValueError, "0.1 s before its command"),
-        (dtm.DelaySystem(-np.eye(2), np.eye(2)), ValueError, "one input and one output"),
+        (dtm.DelaySystem(-np.eye(2), {0: np.eye(2)}), ValueError, "one input and one output"),
         (signal.dlti([1.0], [1.0, 0.5], dt=0.1), ValueError, "time step"),
         (s / (1.0 + delay(1.0)), ValueError, "differentiate"),
         (2.0, TypeError, "python-control"),

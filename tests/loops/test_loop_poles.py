@@ -329,3 +329,30 @@ def test_a_continuous_loop_answers_as_its_characteristic_function():
     )
     assert loop.is_stable() == loop.is_stable(strong=False) == h.is_stable()
     assert loop.spectral_abscissa(strong=False) == h.spectral_abscissa(strong=False)
+
+
+#: Questions that a sampled loop answers.
+ASKED = {
+    "is_stable": lambda loop: loop.is_stable(),
+    "rightmost": lambda loop: loop.rightmost(),
+    "spectral_abscissa": lambda loop: loop.spectral_abscissa(),
+    "count": lambda loop: loop.count(re=(0, 1)),
+    "poles": lambda loop: loop.poles(re=(-1, 0)),
+    "margin": lambda loop: loop.margin(),
+    "stable_range": lambda loop: loop.stable_range("Kp"),
+    "transition_matrix": lambda loop: loop.transition_matrix(),
+    "simulate": lambda loop: loop.simulate([0.0, 1.0]),
+    "map": lambda loop: dtm.stability_map(loop, {"Kp": (0.5, 2), "gain": (0.5, 1)}, (3, 3)),
+    "map over delays": lambda loop: dtm.stability_map(
+        loop, {"Kp": (0.5, 2), "delay": (0.5, 1)}, (3, 3)
+    ),
+}
+
+
+@pytest.mark.parametrize("sample_time", [1e-17, 1e-20, 1e-300])
+@pytest.mark.parametrize("asked", ASKED)
+def test_a_delay_of_more_samples_than_doubles_count_is_refused(asked, sample_time):
+    # An abscissa of 0, and no stable margin: the count of samples had wrapped at 2^63.
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=1.0, sample_time=sample_time)
+    with pytest.raises(ValueError, match="which doubles do not count"):
+        ASKED[asked](loop)

@@ -208,6 +208,40 @@ def test_arrays_broadcast_and_keep_their_shape():
         dtm.sweep(DRONE, {"Kp": np.array([1.0, 2.0]), "delay": np.array([0.1, 0.2, 0.3])}, 8.0)
 
 
+#: Values of each number that may vary.
+VARIED = {
+    "limit": [0.002, 0.01, 0.5],
+    "Kp": [0.5, 1.0, 2.0],
+    "Ki": [0.1, 0.2, 0.3],
+    "delay": [0.1, 0.2, 0.3],
+    "sample_time": [0.05, 0.1, 0.2],
+    "gain": [0.5, 1.0, 1.5],
+    "lag": [0.0, 0.1, 0.2],
+}
+
+
+@pytest.mark.parametrize("time", [None, 10.0])
+@pytest.mark.parametrize("limit", [None, 1.0])
+@pytest.mark.parametrize("sample_time", [None, 0.05])
+def test_every_number_varies_in_any_form(sample_time, limit, time):
+    # Three limits of a sampled loop ended in an IndexError.
+    loop = dtm.ControlLoop(
+        dtm.Integrator(), dtm.PI(1.0, 0.2), delay=0.3, sample_time=sample_time, limit=limit
+    )
+    for name, values in VARIED.items():
+        array = np.array(values)
+        each = [dtm.sweep(loop, {name: value}, time) for value in values]
+        for form in (array, array.reshape(3, 1), values * 2, array[:0], array[1:2]):
+            found = dtm.sweep(loop, {name: form}, time)
+            assert found.shape == found.status.shape == np.shape(form)
+            for one, settled in zip(np.ravel(form), found["settling_time"].flat, strict=True):
+                alone = each[values.index(one)]["settling_time"]
+                np.testing.assert_equal(settled, alone, err_msg=f"{name}={one}")
+        other = "Kp" if name != "Kp" else "limit"
+        grid = dtm.sweep(loop, {name: array[:, None], other: np.array(VARIED[other])}, time)
+        assert grid["settling_time"].shape == (3, 3)
+
+
 def test_a_lag_of_none_among_others_makes_loops_of_another_order():
     lags = np.array([0.0, 0.2, 0.0, 0.1])
     found = dtm.sweep(
@@ -350,9 +384,11 @@ def test_sets_stay_settled_where_their_slowest_root_says_so(loop):
     rates = sets.rates()
     inside = np.abs(TIME_CONSTANTS / rates) * (1.0 + np.geomspace(1e-6, 3.0, 300))
     inside[::2] = np.abs(TIME_CONSTANTS / rates[::2]) / (1.0 + np.geomspace(1e-6, 3.0, 150))
-    np.testing.assert_array_equal(sets.stay(inside), inside * rates >= TIME_CONSTANTS)
+    never, end = np.zeros(300), 2.0 * inside.max()
+    stay = sets.stay(end - inside, never, end)
+    np.testing.assert_array_equal(stay, inside * rates >= TIME_CONSTANTS)
     # No time at all is not enough, and gives no warning.
-    assert not sets.stay(np.zeros(300)).any()
+    assert not sets.stay(np.full(300, end), never, end).any()
 
 
 @settings(max_examples=60, deadline=None)

@@ -339,6 +339,25 @@ def test_single_precision_stays_single_and_is_rounded_once(block):
     assert dtm.lambertw(np.ones(2, np.float32)).dtype == np.complex128
 
 
+@pytest.mark.parametrize("kind", [np.float16, np.float32, float, np.complex64, complex, np.int8])
+@pytest.mark.parametrize(
+    "function",
+    [
+        dtm.lambertw,
+        dtm.lambertw0,
+        dtm.wrightomega,
+        dtm.special.lambertw_log,
+        lambda z: dtm.lambertw(z, np.array([0, -1])),
+        lambda z: dtm.special.lambertw_offset(z)[1],
+    ],
+)
+def test_scalars_and_arrays_have_one_dtype(function, kind):
+    if function is dtm.lambertw0 and np.dtype(kind).kind == "c":
+        pytest.skip("takes real numbers")
+    forms = (kind(0), np.array(kind(0)), [kind(0)], np.zeros(2, kind), np.zeros((3, 1), kind))
+    assert len({np.asarray(function(z)).dtype for z in forms}) == 1
+
+
 @pytest.mark.parametrize("z", ["1", None, object(), [1, "a"], 10**400, np.longdouble(1) * 1])
 def test_what_is_no_number_is_refused(z):
     if np.asarray(z).dtype == np.float64:

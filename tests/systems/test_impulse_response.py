@@ -69,7 +69,7 @@ def test_one_class_of_responses():
     assert repr(of_system) == "<Response: 1 output at 2 times, 0 to 1 s, steady state 1>"
     assert of_system.reference is None
     assert of_loop.states is None
-    two = dtm.DelaySystem([[-1, 0], [0, -2]], np.eye(2)).step_response(TIMES)
+    two = dtm.DelaySystem([[-1, 0], [0, -2]], {0: np.eye(2)}).step_response(TIMES)
     assert two.outputs.shape == (2, 101)
     assert two.info(1)["steady_state"] == 0.0
     np.testing.assert_allclose(two.steady_state, [1.0, 0.0])

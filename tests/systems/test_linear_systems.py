@@ -418,7 +418,7 @@ def test_the_response_is_a_whole_object():
         assert not copied.outputs.flags.writeable
     pytest.importorskip("matplotlib").use("Agg")
     assert len(found.plot(inputs=True).lines) == 2
-    pair = dtm.DelaySystem(-np.eye(2), np.eye(2)).step_response([0.0, 1.0], 2.0, input=1)
+    pair = dtm.DelaySystem(-np.eye(2), {0: np.eye(2)}).step_response([0.0, 1.0], 2.0, input=1)
     assert pair.outputs.shape == (2, 2)
     assert np.allclose(pair.outputs[:, 1], [0.0, 2.0 * -math.expm1(-1.0)], atol=1e-15)
     with pytest.raises(IndexError, match="output=2"):

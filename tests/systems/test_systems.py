@@ -148,7 +148,7 @@ def test_transfer_functions_keep_hidden_modes():
     G = system.transfer_function()
     assert G.hidden_modes().tolist() == [1.0]
     assert not G.is_stable()
-    G = DelaySystem(-np.eye(2), np.eye(2)).transfer_function(0, 1)
+    G = DelaySystem(-np.eye(2), {0: np.eye(2)}).transfer_function(0, 1)
     assert not G.num.coefficients.any()
     for index in (2, -1):
         with pytest.raises(IndexError, match=f"output={index}"):
@@ -217,6 +217,8 @@ def test_singular_equations_are_refused():
         (lambda: DelaySystem(1j), TypeError, "A of dtype"),
         (lambda: DelaySystem(math.inf), ValueError, "A holds inf"),
         (lambda: DelaySystem([1.0, 2.0]), ValueError, "give a matrix"),
+        (lambda: DelaySystem(-np.eye(2), np.eye(2)), ValueError, r"\{0: A0, tau: A1\}"),
+        (lambda: DelaySystem({0: -np.eye(3)}, np.eye(3), N={}), ValueError, r"B=\{0: B\}"),
         (lambda: DelaySystem(1.0, [[1], [2]]), ValueError, "B with delay 0 s"),
         (lambda: DelaySystem(1.0, 1.0, [[1, 2]]), ValueError, "C with delay 0 s"),
         (lambda: DelaySystem(1.0, 1.0, 1.0, [[1, 2]]), ValueError, "D with delay 0 s"),

@@ -102,13 +102,18 @@ class HeldFamily:
         )
 
     def boundaries(self, decay: float, damping: tuple[float, float] | None) -> list[MapBoundary]:
-        """Curves of crossings, found along a gain."""
+        """Curves of crossings, found along a gain, and along the other number if that is one."""
         if self.along is None:
             raise ValueError(
                 f"neither {' nor '.join(self.axes)} is a gain: the crossings of a sampled loop are "
                 "found along a gain of its controller or plant"
             )
-        return held_boundaries(self._rows, along=self.along, decay=decay, damping=damping)
+        (across,) = (name for name in self.axes if name != self.along)
+        columns = None
+        if across in self._gains:
+            columns = self._held({self.along: self.axes[self.along]}, across, self.axes[across])
+        along = (self.along, across)
+        return held_boundaries(self._rows, columns, along=along, decay=decay, damping=damping)
 
     def crossings(self, low: float, high: float) -> Array:
         """Values of the only axis, a gain, between two at which a pole is on the unit circle."""
@@ -124,11 +129,15 @@ class HeldFamily:
     @cached_property
     def along(self) -> str | None:
         """The gain that varies along the rows: best one that moves a pole at z = 1."""
-        gains = (*self.controller._gains(), "gain")
-        names = [name for name in self.axes if name in gains]
+        names = [name for name in self.axes if name in self._gains]
         return max(
             names, key=lambda name: (self._moves_rest(name), len(self.axes[name])), default=None
         )
+
+    @property
+    def _gains(self) -> tuple[str, ...]:
+        """The numbers in which the loop gain is linear."""
+        return (*self.controller._gains(), "gain")
 
     def _moves_rest(self, name: str) -> bool:
         """Whether the feedback at rest depends on this gain."""
@@ -151,8 +160,7 @@ class HeldFamily:
     def _column(self) -> HeldRows | None:
         """The loops of the middle of all rows, where the number across them is a gain too."""
         across = [name for name in self.axes if name != self.along]
-        gains = (*self.controller._gains(), "gain")
-        if self.along is None or across[0] not in gains:
+        if self.along is None or across[0] not in self._gains:
             return None
         points = self.axes[self.along]
         middle = {self.along: points[len(points) // 2 : len(points) // 2 + 1]}

@@ -20,6 +20,7 @@ from deadtime.loops._model import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._native import LoopResponse, on_samples
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
+from deadtime.loops._settled import stays_settled
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, response_of, until_settled
 
@@ -283,6 +284,11 @@ class _Again:
     def steady_state(self) -> float | None:
         """Output at rest under the last reference, None without such a rest."""
         return self.loop.steady_state(float(np.ravel(_whole(self.loop, self.run).reference)[-1]))
+
+    def stays_settled(self, time: Array, inputs: Array, settled: float) -> bool:
+        """Whether the response stays in the band in which it is since `settled`, s."""
+        reference = float(np.ravel(_whole(self.loop, self.run).reference)[-1])
+        return stays_settled(self.loop, time - time[0], inputs, reference, settled)
 
     def __call__(self, times: Array) -> Array:
         start = cast(float, self.found.start)

@@ -2,12 +2,15 @@
 
 A response may pass through the band, or leave it slowly after the end of the run. It counts as
 settled if it has been inside for three of the slowest time constants of the closed loop,
-1/abs(abscissa). To ask the poles of a loop takes longer than its simulation, so they are asked in
-two cases only: if the response had not decayed to well within the band, or if a pole or zero of
-plant or controller is slow compared with the simulated time. Closed-loop poles are slow close to
-these, or close to the stability limit, where the response oscillates. Where the simulated time is
-given, a count of the slow poles of a continuous loop is enough; where it is to be found, they are
-computed.
+1/abs(abscissa), and the command within its limit: at the limit the loop is open, and its integral
+may have to unwind. Where the reference needs the whole limit or more, the command rests there, and
+the time constants are those of plant and controller alone.
+
+To ask the poles of a loop takes longer than its simulation, so they are asked in two cases only: if
+the response had not decayed to well within the band, or if a pole or zero of plant or controller is
+slow compared with the simulated time. Closed-loop poles are slow close to these, or close to the
+stability limit, where the response oscillates. Where the simulated time is given, a count of the
+slow poles of a continuous loop is enough; where it is to be found, they are computed.
 """
 
 from __future__ import annotations
@@ -16,13 +19,82 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from deadtime._base.arrays import Array
-from deadtime.loops._control_loop import ControlLoop
+from deadtime._base.arrays import Array, Mask
+from deadtime._base.errors import ConvergenceError
+from deadtime.loops._controllers import Controller
+from deadtime.loops._plants import Plant
+from deadtime.loops._specification import LoopSpecification
 
 #: Time for which a response must have been in its band to count as settled, in slowest time
 #: constants of the closed loop: more misjudge fewer responses, and take longer simulations.
 TIME_CONSTANTS = 3.0
+
+#: Part of the limit by which the command at rest may be below it and counts as at it: more covers
+#: larger rounding errors, and takes more commands near the limit for ones at it.
+_AT_LIMIT = 1e-12
+
+
+def rests_at_limit(command: ArrayLike, limit: ArrayLike) -> Mask:
+    """Whether the command that the reference needs at rest is as large as the limit, or larger."""
+    return np.asarray(np.abs(command) >= np.multiply(limit, 1.0 - _AT_LIMIT))
+
+
+def time_inside(
+    settled: ArrayLike, limited_until: ArrayLike, end: float, rests: ArrayLike
+) -> tuple[Array, Mask]:
+    """For how long before `end` responses were in their bands under the same poles, s.
+
+    `settled` are the times since which they are in their bands, NaN for none, and `limited_until`
+    the last times at which commands were at their limits. Returns also which commands stay there:
+    those that are there at the end and have to be (`rests`).
+    """
+    stays = np.logical_and(rests, np.greater_equal(limited_until, end))
+    return end - np.where(stays, settled, np.maximum(settled, limited_until)), np.asarray(stays)
+
+
+def counts_as_settled(inside: ArrayLike, rates: ArrayLike) -> Mask:
+    """Whether responses were inside long enough, by the decay rates of their slowest modes, 1/s."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.multiply(inside, rates) >= TIME_CONSTANTS)
+
+
+def stays_settled(
+    loop: LoopSpecification, times: Array, inputs: Array, reference: float, settled: float
+) -> bool:
+    """Whether a simulated response stays in the band in which it is since `settled`, s.
+
+    It is a matter of the loop only if its command was or is to be at the limit. `times` count from
+    the start.
+    """
+    if loop.limit is None or not np.isfinite(settled):
+        return True
+    command = loop.command_at_rest(reference)
+    rests = command is not None and bool(rests_at_limit(command, loop.limit))
+    limited = np.flatnonzero(np.abs(inputs) >= loop.limit)
+    if not (limited.size or rests):
+        return True
+    # The command left its limit before the output after the last one at which it was there.
+    last = min(int(limited[-1]) + 1, len(times) - 1) if limited.size else 0
+    inside, stays = time_inside(settled, float(times[last]), float(times[-1]), rests)
+    try:
+        rate = (
+            slowest_rates(loop.plant, loop.controller, loop.parameters)
+            if stays
+            else -loop.abscissa_at(loop.parameters)
+        )
+    except ConvergenceError:
+        return False
+    return bool(counts_as_settled(inside, rate))
+
+
+def slowest_rates(
+    plant: Plant, controller: Controller, numbers: Mapping[str, Any]
+) -> float | Array:
+    """Lower bound in 1/s on abs(root) of plant and controller, except for roots at zero."""
+    with np.errstate(divide="ignore"):
+        return np.divide(1.0, slowest_times(plant, controller, numbers))
 
 
 def _any(values: Any) -> bool:
@@ -30,20 +102,23 @@ def _any(values: Any) -> bool:
     return bool(values.any() if isinstance(values, np.ndarray) else values)
 
 
-def slowest_times(loop: ControlLoop, numbers: Mapping[str, Any]) -> float | Array:
+def slowest_times(
+    plant: Plant, controller: Controller, numbers: Mapping[str, Any]
+) -> float | Array:
     """Upper bound in s on 1/abs(root) of plant and controller, except for roots at zero.
 
-    1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... (Fujiwara 1916).
+    1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... + c_n s^n, where c_n counts by
+    half (Fujiwara 1916).
     """
     longest: Any = 0.0
-    parts = (*loop.plant._polynomials(numbers), *loop.controller._feedback(numbers))
+    parts = (*plant._polynomials(numbers), *controller._feedback(numbers))
     for coefficients in parts:
         rising = [abs(c) for c in coefficients[::-1]]
         open_: Any = True
         for low, c in enumerate(rising[:-1]):
             # c_0 is the first coefficient that is not zero: lower powers are roots at zero.
             here = open_ & (c > 0.0)
-            for k, other in enumerate(rising[low + 1 :], 1):
+            for k, other in enumerate([*rising[low + 1 : -1], 0.5 * rising[-1]], 1):
                 if not (_any(here) and _any(other)):
                     continue
                 if here is True:

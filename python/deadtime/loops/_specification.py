@@ -179,12 +179,14 @@ class LoopSpecification(PickledByFields):
 
     def steady_state(self, reference: float) -> float | None:
         """Output at rest under a constant reference; None without such a rest within the limit."""
-        if self._rest_gains is None:
+        command = self.command_at_rest(reference)
+        if command is None or (self.limit is not None and abs(command) > self.limit):
             return None
-        output, command = self._rest_gains
-        if self.limit is not None and abs(command * reference) > self.limit:
-            return None
-        return output * reference
+        return self._rest_gains[0] * reference if self._rest_gains else None
+
+    def command_at_rest(self, reference: float) -> float | None:
+        """Command at rest under a constant reference, limit left out; None without such a rest."""
+        return self._rest_gains[1] * reference if self._rest_gains else None
 
     @cached_property
     def _rest_gains(self) -> tuple[float, float] | None:

@@ -32,7 +32,14 @@ from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._entries import Each
 from deadtime.loops._model import refuse_discretised, rest_of
 from deadtime.loops._native import sweep_abscissae, sweep_decay, sweep_metrics, sweep_responses
-from deadtime.loops._settled import TIME_CONSTANTS, slowest_times
+from deadtime.loops._settled import (
+    TIME_CONSTANTS,
+    counts_as_settled,
+    rests_at_limit,
+    slowest_rates,
+    slowest_times,
+    time_inside,
+)
 from deadtime.loops._stability import sampled_grid
 from deadtime.systems import first_duration
 
@@ -82,9 +89,10 @@ class SweepStatus(IntEnum):
     OK = 0
     """Simulated to the end; if metrics were requested, the response has settled."""
     UNSETTLED = 1
-    """Outside its settling band at the end, or inside it for less than three of the slowest time
-    constants of the closed loop: the settling time is NaN, and so is the rise time if the output
-    did not rise through the step. An unstable loop with a bounded output is among these."""
+    """Outside its settling band at the end, or inside it, with its command within the limit, for
+    less than three of the slowest time constants of the closed loop: the settling time is NaN, and
+    so is the rise time if the output did not rise through the step. An unstable loop with a bounded
+    output is among these."""
     DIVERGED = 2
     """The response or its command exceeded 1e150 before the end: all values are NaN."""
     REFUSED = 3
@@ -241,7 +249,10 @@ def sweep(
     in `Sweep.status`; other NaN mean the same as in `Response.info`: the settling or rise time was
     not reached. A settling time is given only if the output was in the band for three of the
     slowest time constants 1/abs(abscissa) of the closed loop before the end, or if it had decayed
-    to a twentieth of the band and neither plant nor controller has a slow pole or zero. This is
+    to a twentieth of the band and neither plant nor controller has a slow pole or zero; and if the
+    command was within its limit in all this time, since at the limit the output may pass through
+    the band while the integral unwinds. A loop whose reference needs the whole limit or more rests
+    with its command there: the time constants are then those of plant and controller. This is
     evidence, not a proof; `design` proves the stability of its result.
 
     Loops with up to four states are computed with SIMD instructions, several sets at once, if they
@@ -297,6 +308,21 @@ class LoopSets(NamedTuple):
     is_ahead: bool
 
 
+class _Run(NamedTuple):
+    """What was measured of sets in one run, flat arrays."""
+
+    metrics: dict[str, Array]
+    #: Sets of which the poles have to show whether they have settled are _DOUBTFUL.
+    status: NDArray[np.uint8]
+    #: The last time at which each command was at its limit; 0 where it never was.
+    limited_until: Array
+
+    @property
+    def settled(self) -> Array:
+        """The times since which outputs are in their bands."""
+        return self.metrics["settling_time"]
+
+
 @dataclass(frozen=True, eq=False)
 class _Sets:
     """The arguments of `sweep`, checked."""
@@ -345,23 +371,23 @@ class _Sets:
         outputs = found.reshape(*self.shape, len(times))
         return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
 
-    def measured(self, times: Array, progress: Report | None = None) -> Sweep:
-        """Metrics; sets of which the poles have to tell whether they have settled are _DOUBTFUL."""
-        count, span = math.prod(self.shape), float(times[-1] - times[0])
+    def measured(self, span: float, progress: Report | None = None) -> _Run:
+        """Metrics of `span` seconds of each response."""
+        count = math.prod(self.shape)
         # One piece of memory, which the next sweep uses again; many would be given back to the
         # system and cleared by it each time, at a tenth of the cost of a sweep.
-        metrics = dict(zip(_METRICS, np.empty((len(_METRICS), count)), strict=True))
+        found = np.empty((len(_METRICS) + 1, count))
         status = np.empty(count, dtype=np.uint8)
         for place, numbers, sets, report in self.blocks(progress):
             # Views of the results where `place` is a slice, else copies.
-            columns = [values[place] for values in metrics.values()]
+            columns = [values[place] for values in found]
             outcomes = status[place]
             sweep_metrics(
                 sets,
                 columns=columns,
                 status=outcomes,
                 steady_state=_steady(self.loop, numbers, self.amplitude),
-                slowest_time=slowest_times(self.loop, numbers),
+                slowest_time=slowest_times(self.loop.plant, self.loop.controller, numbers),
                 span=span,
                 settling=self.settling,
                 rise=self.rise,
@@ -370,20 +396,20 @@ class _Sets:
             )
             if not isinstance(place, slice):
                 status[place] = outcomes
-                for values, column in zip(metrics.values(), columns, strict=True):
+                for values, column in zip(found, columns, strict=True):
                     values[place] = column
-        shaped = {name: values.reshape(self.shape) for name, values in metrics.items()}
-        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), shaped)
+        return _Run(dict(zip(_METRICS, found, strict=False)), status, found[-1])
 
     def decided(self, times: Array, progress: Report | None) -> Sweep:
         """Metrics; a doubtful set counts as settled if it was in the band for long enough."""
-        found = self.measured(times, progress)
-        status, settled = found.status.flatten(), found.metrics["settling_time"].ravel()
-        doubtful = np.flatnonzero(status == _DOUBTFUL)
+        span = float(times[-1] - times[0])
+        found = self.measured(span, progress)
+        doubtful = np.flatnonzero(found.status == _DOUBTFUL)
         if doubtful.size:
-            inside = float(times[-1] - times[0]) - settled[doubtful]
-            status[doubtful[self.only(doubtful).stay(inside)]] = SweepStatus.OK
-        return self._final(found, times, found.metrics, status)
+            limited = found.limited_until[doubtful]
+            stay = self.only(doubtful).stay(found.settled[doubtful], limited, span)
+            found.status[doubtful[stay]] = SweepStatus.OK
+        return self._final(found, times)
 
     def until_settled(self, progress: Report | None) -> Sweep:
         """Metrics of all sets; sets that have not settled are simulated over a longer time."""
@@ -392,15 +418,15 @@ class _Sets:
         waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
         longest_wait = float(np.max(waits, initial=0.0))
         span = first_duration(loop.specification.model.A, longest_wait)
-        found = self.measured(np.array([0.0, span]), progress)
-        metrics = {name: array.flatten() for name, array in found.metrics.items()}
-        settled, status = metrics["settling_time"], found.status.flatten()
+        found = self.measured(span, progress)
+        settled, status, limited = found.settled, found.status, found.limited_until
 
         def run_on(places: Indices, step: float) -> None:
-            longer = self.only(places).measured(np.array([0.0, span * _longer(step)]))
+            longer = self.only(places).measured(span * _longer(step))
             done = longer.status != SweepStatus.REFUSED
             for name, array in longer.metrics.items():
-                metrics[name][places[done]] = array[done]
+                found.metrics[name][places[done]] = array[done]
+            limited[places[done]] = longer.limited_until[done]
             status[places] = np.where(done, longer.status, SweepStatus.UNSETTLED)
 
         due, longest = np.flatnonzero(_is_open(status)), 0.0
@@ -409,44 +435,65 @@ class _Sets:
             longest = float(_PER_DOUBLING)
             run_on(due, longest)
             due = due[_is_open(status[due])]
-        rates = self.only(due).rates() if due.size else np.empty(0)
+        open_sets = self.only(due)
+        closed = open_sets.rates() if due.size else np.empty(0)
+        alone, rests = open_sets.at_limit()
         steps = np.full(due.size, longest)
         while due.size:
+            ends = span * _longer(steps)
             # NaN if the output is outside the band at the end.
-            since = settled[due]
-            stays = (span * _longer(steps) - since) * rates >= TIME_CONSTANTS
-            status[due[stays]] = SweepStatus.OK
-            more = ~stays & (rates > 0.0) & (steps < _MOST_STEPS)
-            due, rates, steps, since = due[more], rates[more], steps[more], since[more]
-            lasts = np.where(np.isnan(since), _TO_SETTLE / rates, since + TIME_CONSTANTS / rates)
-            needed = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + _STEP_ROUNDING)
+            inside, stays = time_inside(settled[due], limited[due], ends, rests)
+            rates = np.where(stays, alone, closed)
+            is_settled = counts_as_settled(inside, rates)
+            status[due[is_settled]] = SweepStatus.OK
+            more = ~is_settled & (rates > 0.0) & (steps < _MOST_STEPS)
+            lasts = np.where(
+                np.isnan(inside), _TO_SETTLE / rates, ends - inside + TIME_CONSTANTS / rates
+            )
+            with np.errstate(invalid="ignore"):  # of sets that do not run again
+                needed = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + _STEP_ROUNDING)
             steps = np.minimum(np.maximum(needed, steps + 1.0), _MOST_STEPS)
-            longest = max(longest, steps.max(initial=0.0))
-            for step in np.unique(steps):
-                run_on(due[steps == step], step)
-            late = _is_open(status[due])
-            due, rates, steps = due[late], rates[late], steps[late]
-        return self._final(found, np.array([0.0, span * _longer(longest)]), metrics, status)
+            longest = max(longest, steps.max(initial=0.0, where=more))
+            for step in np.unique(steps[more]):
+                run_on(due[more & (steps == step)], step)
+            late = more & _is_open(status[due])
+            due, closed, alone, rests = due[late], closed[late], alone[late], rests[late]
+            steps = steps[late]
+        return self._final(found, np.array([0.0, span * _longer(longest)]))
 
-    def _final(
-        self, found: Sweep, times: Array, metrics: dict[str, Array], status: NDArray[np.uint8]
-    ) -> Sweep:
+    def _final(self, found: _Run, times: Array) -> Sweep:
         """The result: doubtful sets count as unsettled, and these have no settling time."""
-        status = status.reshape(self.shape)
+        status = found.status.reshape(self.shape)
         status[status == _DOUBTFUL] = SweepStatus.UNSETTLED
-        shaped = {name: array.reshape(self.shape) for name, array in metrics.items()}
+        shaped = {name: array.reshape(self.shape) for name, array in found.metrics.items()}
         unsettled = status == SweepStatus.UNSETTLED
         if unsettled.any():
             shaped["settling_time"] = np.where(unsettled, np.nan, shaped["settling_time"])
-        return replace(found, time=times, metrics=shaped, status=status)
+        return Sweep(dict(self.arrays), self.shape, times, status, shaped)
 
-    def stay(self, inside: Array) -> Mask:
-        """Whether sets that were in their bands for the last seconds `inside` count as settled."""
+    def at_limit(self) -> tuple[Array, Mask]:
+        """Decay rates of plant and controller alone, 1/s, and which commands rest at the limit."""
+        loop = self.loop
+        numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
+        _, command = rest_of(loop.plant, loop.controller, numbers)
+        rests = rests_at_limit(command * self.amplitude, numbers.get("limit", np.inf))
+        rates = slowest_rates(loop.plant, loop.controller, numbers)
+        return np.broadcast_to(rates, self.shape), np.broadcast_to(rests, self.shape)
+
+    def stay(self, settled: Array, limited_until: Array, end: float) -> Mask:
+        """Whether sets that are in their bands at the end since `settled` count as settled."""
+        alone, rests = self.at_limit()
+        inside, stays = time_inside(settled, limited_until, end, rests)
         if self.loop.is_sampled:
-            return np.asarray(inside * self.rates() >= TIME_CONSTANTS)
+            return counts_as_settled(inside, np.where(stays, alone, self.rates()))
+        found = self._decay(inside)
+        return np.where(stays, counts_as_settled(inside, alone), found)
+
+    def _decay(self, inside: Array) -> Mask:
+        """Whether continuous loops without their limits decay within the times `inside`, s."""
         # None of them decays fast enough for no time at all.
         with np.errstate(divide="ignore"):
-            least = TIME_CONSTANTS / inside
+            least = TIME_CONSTANTS / np.maximum(inside, 0.0)
         found = np.empty(self.shape, dtype=bool)
         for place, _, sets, _ in self.blocks(None):
             found[place] = sweep_decay(sets, least[place], threads=self.threads)
@@ -459,7 +506,8 @@ class _Sets:
             numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
             numbers.pop("limit", None)
             cells = sampled_grid(loop.plant, loop.controller, numbers, threads=self.threads)
-            return -cells.abscissa
+            # Sets that differ in their limits alone have one loop.
+            return np.broadcast_to(-cells.abscissa, self.shape)
         found = np.empty(self.shape)
         for place, _, sets, _ in self.blocks(None):
             found[place] = sweep_abscissae(sets, threads=self.threads)

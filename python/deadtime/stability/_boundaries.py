@@ -28,7 +28,7 @@ class Boundary(ReadOnlyArrays):
         Roots that become unstable as the parameter `along` grows through the point, less those that
         become stable: 2 or -2 for a pair, 1 or -1 for a real root.
     along : str
-        The parameter that varies along the rows of the map.
+        The parameter that varies along the rows (or columns) in which the curve was found.
 
     Notes
     -----

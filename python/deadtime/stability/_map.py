@@ -85,6 +85,9 @@ class StabilityMap(ReadOnlyArrays, Pictured):
     def boundaries(self) -> tuple[Boundary, ...]:
         """Curves on which a root lies on the edge of stability: `Boundary` objects, longest first.
 
+        Those along the rows, and those that run along the rows and are found by the columns. Of a
+        sampled loop over one gain alone, the latter may have gaps.
+
         Raises
         ------
         ValueError

@@ -74,6 +74,9 @@ class DelayMatrices(Immutable):
                         f"has {n} rows, which is the number of states, and there are {p} inputs "
                         f"and {q} outputs"
                     )
+        # Of one state, any single input has a B like this.
+        if 1 < n == p and C is None and D is None and not isinstance(B, Mapping):
+            _refuse_delayed_state(n, any(tau > 0.0 for group in (state, late) for tau in group))
         values = (state, inputs, outputs, direct, derivative, late)
         for name, value in zip(DelayMatrices.__slots__, values, strict=True):
             object.__setattr__(self, name, value)
@@ -217,6 +220,16 @@ class DelayMatrices(Immutable):
     @property
     def _states(self) -> range:
         return range(self.n_states)
+
+
+def _refuse_delayed_state(n: int, has_delay: bool) -> None:
+    """Raise for a square B of a system without any delay: most people mean a delayed state."""
+    if not has_delay:
+        raise ValueError(
+            f"A and B are both of shape {(n, n)} and have no delay: for a state that also acts "
+            "tau seconds late, give DelaySystem({0: A0, tau: A1}); for as many inputs as states, "
+            "give B={0: B}"
+        )
 
 
 def _by_delay(name: str, given: Matrices) -> dict[float, Array]:

@@ -64,7 +64,9 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     Raises
     ------
     ValueError
-        If shapes do not fit, a number is not finite or a delay negative.
+        If shapes do not fit, a number is not finite or a delay negative; if there is no delay and B
+        is a square array of two rows or more without C and D, since
+        ``DelaySystem({0: A0, tau: A1})`` is meant.
     TypeError
         If the numbers are not real.
 

@@ -146,6 +146,11 @@ class Response(ReadOnlyArrays, Pictured):
         again around each of them. Only what happens between two output times and is over before
         the next one is missed.
 
+        The settling time is that of the response up to its last output. A loop whose command was
+        at its limit has one only if output and command then stayed in their bounds for three of
+        the slowest time constants of the closed loop: at the limit the output may pass through
+        the band.
+
         Parameters
         ----------
         output : int, default 0
@@ -200,7 +205,11 @@ class Response(ReadOnlyArrays, Pictured):
             signals[index],
             None if dense is None else lambda times: np.atleast_2d(dense(times))[index],
         )
-        return one.step_metrics(settling, rise, steady_state)
+        found = one.step_metrics(settling, rise, steady_state)
+        judge = getattr(dense, "stays_settled", None)
+        if judge is not None and not judge(self.time, self.inputs, found["settling_time"]):
+            found["settling_time"] = float("nan")
+        return found
 
     def plot(self, ax: Axes | None = None, *, inputs: bool = False, **style: Any) -> Axes:
         """Draw the outputs, with the reference of a loop as a thin line.

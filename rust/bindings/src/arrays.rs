@@ -8,13 +8,14 @@ use numpy::ndarray::{ArrayView1, ArrayViewD};
 use numpy::npyffi::NPY_ARRAY_WRITEABLE;
 use numpy::{
     Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2,
-    PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::PyClass;
+use pyo3::PyTypeInfo;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
-use pyo3::types::{PyFloat, PyList};
+use pyo3::types::{PyFloat, PyList, PyTuple};
 
 use crate::errors::to_python;
 
@@ -146,10 +147,40 @@ pub(crate) fn array_of<'py>(
     value: &Bound<'py, PyAny>,
     who: impl Fn() -> String,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    match value.cast::<PyArrayDyn<f64>>() {
-        Ok(array) => Ok(array.clone()),
-        Err(_) => converted_array(value, who),
+    if value.get_type().is(PyUntypedArray::type_object(value.py())) {
+        if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
+            return Ok(array.clone());
+        }
+    } else if is_masked(value)? {
+        return Err(PyValueError::new_err(format!(
+            "{} returned a masked value, which is no number: give all numbers, or fill masked \
+             entries",
+            who()
+        )));
     }
+    converted_array(value, who)
+}
+
+/// Is an entry of an array, or of one in a list, masked? NumPy drops the mask as it converts.
+fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let py = value.py();
+    // Without numpy.ma there are no masked arrays, and it is slow to load.
+    let modules = py.import("sys")?.getattr("modules")?;
+    let Ok(masked) = modules.get_item("numpy.ma") else {
+        return Ok(false);
+    };
+    if value.is_instance(&masked.getattr("MaskedArray")?)? {
+        let any = masked.call_method1("is_masked", (value,))?;
+        return any.extract();
+    }
+    if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        for item in value.try_iter()? {
+            if is_masked(&item?)? {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }
 
 fn converted_array<'py>(

@@ -89,22 +89,32 @@ pub(crate) fn held_map(
     cells_of(py, found, question.abscissa, shape)
 }
 
-/// The curves on which poles of loops in rows lie on the edge of stability.
+/// The curves on which poles of loops in rows lie on the edge of stability, and those that `columns`
+/// find besides; the parameters along both.
 #[pyfunction]
-#[pyo3(signature = (rows, *, along, decay, damping))]
+#[pyo3(signature = (rows, columns, *, along, decay, damping))]
 pub(crate) fn held_boundaries(
     py: Python<'_>,
     rows: HeldRows<'_>,
-    along: String,
+    columns: Option<HeldRows<'_>>,
+    along: [String; 2],
     decay: f64,
     damping: Option<(f64, f64)>,
 ) -> PyResult<Vec<MapBoundary>> {
-    let found = rows.with(|rows| {
-        run(py, None, None, |task| {
-            stability::held_boundaries(rows, specification(decay, damping), task)
-        })
+    let [row_curves, column_curves] = rows.with(|rows| {
+        let found = |columns: Option<&LoopRows<'_>>| {
+            run(py, None, None, |task| {
+                stability::held_boundaries(rows, columns, specification(decay, damping), task)
+            })
+        };
+        match &columns {
+            Some(columns) => columns.with(|columns| found(Some(columns))),
+            None => found(None),
+        }
     })?;
-    curves_of(py, &along, &found)
+    let mut curves = curves_of(py, &along[0], &row_curves)?;
+    curves.extend(curves_of(py, &along[1], &column_curves)?);
+    Ok(curves)
 }
 
 /// The values of the gain between two, and the frequencies, at which a pole of the first row is on

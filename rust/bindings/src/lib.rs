@@ -15,6 +15,7 @@ mod matrix;
 mod online;
 mod pointers;
 mod quasipoly;
+mod reserve;
 mod runtime;
 mod sampled;
 mod solver;
@@ -92,6 +93,8 @@ mod _deadtime {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        // Where there is no memory for it now, each call asks again.
+        let _ = super::reserve::ready();
         super::loading::load_numpy(module.py(), || super::special::add_ufuncs(module))?;
         super::pointers::add_pointers(module)
     }

@@ -14,11 +14,13 @@ use std::time::Duration;
 
 use arc_swap::ArcSwapOption;
 use deadtime::{Error, Task};
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::arrays::converted;
 use crate::errors::to_python;
+use crate::reserve;
 
 /// How often the waiting thread checks for signals and reports progress.
 pub(crate) const POLL: Duration = Duration::from_millis(20);
@@ -205,6 +207,7 @@ where
     T: Send,
     F: FnOnce(&Task) -> Result<T, Error> + Send,
 {
+    converted(reserve::ready())?;
     let task = Task::asking(POLL, goes_on);
     let result = py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&task))));
     into_py_result(Some(result), PyErr::take(py))
@@ -215,6 +218,7 @@ pub(crate) fn run_attached<T, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     F: FnOnce(&Task) -> Result<T, Error>,
 {
+    converted(reserve::ready())?;
     let task = Task::asking(POLL, goes_on);
     let result = catch_unwind(AssertUnwindSafe(|| work(&task)));
     into_py_result(Some(result), PyErr::take(py))
@@ -254,6 +258,7 @@ pub(crate) fn internal(panic: &(dyn Any + Send)) -> PyErr {
 
 /// The pool of this process with the requested number of threads, built where there is none.
 fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
+    converted(reserve::ready())?;
     let threads = thread_count(threads)?;
     let process = std::process::id();
     let current = POOL.load_full();
@@ -267,7 +272,12 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<Pool>> {
         .num_threads(threads)
         .thread_name(|index| format!("deadtime-{index}"))
         .build()
-        .map_err(|error| PyOSError::new_err(format!("no threads to be had: {error}")))?;
+        .map_err(|error| {
+            PyMemoryError::new_err(format!(
+                "{threads} threads cannot be started ({error}): ask for fewer with threads or \
+                 DEADTIME_NUM_THREADS, or raise the limits on memory and threads"
+            ))
+        })?;
     let built = Arc::new(Pool {
         process,
         threads,

@@ -162,7 +162,12 @@ impl PyFamily {
                 )
             })?;
             found
-                .map(|found| map_boundaries(py, &self.inner, axes, &found))
+                .map(|found| {
+                    let curves = found.each_ref();
+                    let curves = curves.map(|found| map_boundaries(py, &self.inner, axes, found));
+                    let [first, second] = curves;
+                    Ok([first?, second?].into_iter().flatten().collect())
+                })
                 .transpose()
         })
     }

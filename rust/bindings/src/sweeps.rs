@@ -96,8 +96,9 @@ pub(crate) struct LoopSensitivities {
     inputs: Py<PyArray2<f64>>,
 }
 
-/// Measure step responses of `span` seconds. Metrics and status are written to `columns` and
-/// `status`, one element for each loop.
+/// Measure step responses of `span` seconds. Metrics, with the last times at which commands were at
+/// their limits behind them, and status are written to `columns` and `status`, one element for each
+/// loop.
 #[pyfunction]
 #[pyo3(signature = (sets, *, columns, status, steady_state, slowest_time, span, settling, rise, threads=None, progress=None))]
 #[expect(
@@ -127,7 +128,7 @@ pub(crate) fn sweep_metrics<'py>(
     let status = status.as_slice_mut()?;
     run(py, threads, progress.as_ref(), |task| {
         let keep = |sets: &[usize], measures: &Measures| {
-            for (column, metrics) in columns.iter_mut().zip(&measures.metrics) {
+            for (column, metrics) in columns.iter_mut().zip(measures.columns()) {
                 put(column, sets, metrics);
             }
             for (&set, outcome) in sets.iter().zip(measures.outcomes()) {

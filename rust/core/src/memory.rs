@@ -4,10 +4,12 @@
 //! therefore allocated here, where a failure is [`Error::Memory`] with the size, and only if
 //! [`HEADROOM`] remains for small things: queues, series, matrices of one loop. These grow while a
 //! kernel runs, so that the waiting thread checks [`is_scarce`] regularly and stops the kernel in
-//! time. Nothing is guaranteed where the operating system promises more memory than it has and
+//! time. Where a small request fails before that, an allocator with memory in reserve reports it
+//! ([`report_shortage`]), and every task ends at its next check. Nothing is guaranteed where the operating system promises more memory than it has and
 //! kills processes later.
 
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::Error;
 
@@ -18,6 +20,24 @@ pub const HEADROOM: usize = 48 << 20;
 
 /// Requests below this size are served from the headroom.
 const SMALL: usize = 1 << 20;
+
+/// Has an allocation failed, and been served from the reserve?
+static SHORT: AtomicBool = AtomicBool::new(false);
+
+/// Every task is to end at its next check: the reserve is in use.
+pub fn report_shortage() {
+    SHORT.store(true, Ordering::Relaxed);
+}
+
+/// There is a reserve again.
+pub fn end_shortage() {
+    SHORT.store(false, Ordering::Relaxed);
+}
+
+/// Is the reserve in use?
+pub(crate) fn is_short() -> bool {
+    SHORT.load(Ordering::Relaxed)
+}
 
 /// Is less than the headroom available?
 pub fn is_scarce() -> bool {
@@ -34,10 +54,11 @@ pub fn room<T>(what: &'static str, count: usize) -> Result<(), Error> {
     if bytes < SMALL || there_is(bytes.saturating_add(HEADROOM)) {
         return Ok(());
     }
-    Err(refused(what, bytes))
+    Err(no_room(what, bytes))
 }
 
-fn refused(what: &'static str, bytes: usize) -> Error {
+/// The error where so many bytes cannot be had.
+pub fn no_room(what: &'static str, bytes: usize) -> Error {
     Error::Memory {
         what,
         bytes: bytes as u64,
@@ -49,7 +70,7 @@ pub fn reserved<T>(what: &'static str, count: usize) -> Result<Vec<T>, Error> {
     room::<T>(what, count)?;
     let mut made = Vec::new();
     made.try_reserve_exact(count)
-        .map_err(|_| refused(what, count.saturating_mul(size_of::<T>())))?;
+        .map_err(|_| no_room(what, count.saturating_mul(size_of::<T>())))?;
     Ok(made)
 }
 
@@ -99,7 +120,7 @@ pub fn push_back<T>(what: &'static str, to: &mut VecDeque<T>, value: T) -> Resul
         let most = to.len().saturating_add(to.len().max(1));
         room::<T>(what, most)?;
         to.try_reserve(1)
-            .map_err(|_| refused(what, most.saturating_mul(size_of::<T>())))?;
+            .map_err(|_| no_room(what, most.saturating_mul(size_of::<T>())))?;
     }
     to.push_back(value);
     Ok(())
@@ -109,7 +130,7 @@ fn grow<T>(what: &'static str, to: &mut Vec<T>, more: usize) -> Result<(), Error
     let most = to.len().saturating_add(more.max(to.len()));
     room::<T>(what, most)?;
     to.try_reserve(more)
-        .map_err(|_| refused(what, most.saturating_mul(size_of::<T>())))
+        .map_err(|_| no_room(what, most.saturating_mul(size_of::<T>())))
 }
 
 /// A size in readable units.

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::Error;
-use crate::memory::{HEADROOM, is_scarce};
+use crate::memory::{HEADROOM, is_scarce, is_short, no_room};
 
 /// Checks between two readings of the clock, which cost more than a check.
 const CHECKS: u64 = 32;
@@ -123,13 +123,11 @@ impl Task {
                 self.stop();
             }
         }
-        if !self.stop.load(Ordering::Relaxed) {
+        let is_stopped = self.stop.load(Ordering::Relaxed);
+        if is_short() || (is_stopped && self.scarce.load(Ordering::Relaxed)) {
+            Err(no_room("the rest of the computation", HEADROOM))
+        } else if !is_stopped {
             Ok(())
-        } else if self.scarce.load(Ordering::Relaxed) {
-            Err(Error::Memory {
-                what: "the rest of the computation",
-                bytes: HEADROOM as u64,
-            })
         } else {
             Err(Error::Interrupted)
         }

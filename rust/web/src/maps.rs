@@ -111,38 +111,33 @@ fn listed(chart: &Chart) -> Vec<f64> {
 }
 
 /// The answer has for each curve the number of its points, and for each of those the values on both
-/// axes and the frequency in rad/s. Points of a curve that is all but parallel to the rows are too far
-/// apart to be joined: of a sampled loop the rows are along the gain that leaves fewer of them alone.
+/// axes and the frequency in rad/s.
 pub(crate) fn boundaries(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let plane = Plane::read(request)?;
     let task = Task::new();
     let specification = plane.question.specification;
-    if !plane.is_sampled() {
+    let found = if plane.is_sampled() {
+        let along = plane.along()?;
+        let (rows, _) = plane.rows(along)?;
+        let other = plane.axes.get(1 - along);
+        let columns = if other.is_some_and(|axis| axis.0.is_gain()) {
+            Some(plane.rows(1 - along)?.0)
+        } else {
+            None
+        };
+        let columns = columns.as_ref().map(|columns| columns.view());
+        let [curves, others] =
+            held_boundaries(&rows.view(), columns.as_ref(), specification, &task)?;
+        let of = |along, curves| Boundaries { along, curves };
+        Some([of(along, curves), of(1 - along, others)])
+    } else {
         let family = plane
             .control_loop
             .family(plane.axes.map(|(name, _)| name))?;
-        let found = curves(&family, &[0.0; 2], plane.axes(), specification, &task)?;
-        return Ok(found.map_or_else(Vec::new, |found| plane.listed(&found)));
-    }
-    let first = plane.along()?;
-    let mut best: Option<Boundaries> = None;
-    for along in [first, 1 - first] {
-        if !plane.axes.get(along).is_some_and(|axis| axis.0.is_gain()) {
-            continue;
-        }
-        let (rows, _) = plane.rows(along)?;
-        let curves = held_boundaries(&rows.view(), specification, &task)?;
-        let found = Boundaries { along, curves };
-        if best.as_ref().is_none_or(|best| alone(&found) < alone(best)) {
-            best = Some(found);
-        }
-    }
-    Ok(best.map_or_else(Vec::new, |found| plane.listed(&found)))
-}
-
-/// Points that are not joined to others.
-fn alone(found: &Boundaries) -> usize {
-    found.curves.iter().filter(|curve| curve.len() == 1).count()
+        curves(&family, &[0.0; 2], plane.axes(), specification, &task)?
+    };
+    let found = found.iter().flatten();
+    Ok(found.flat_map(|found| plane.listed(found)).collect())
 }
 
 impl Plane<'_> {

@@ -50,3 +50,20 @@ pub(crate) fn finite<S: Scalar>(name: &str, values: &[S]) -> Result<(), Error> {
         None => Ok(()),
     }
 }
+
+/// Most samples in a delay, 2⁵³: of more, a double does not tell how many they are.
+const MOST_SAMPLES: f64 = 9_007_199_254_740_992.0;
+
+/// Refuse a delay whose samples cannot be counted.
+///
+/// # Errors
+/// [`Error::Argument`].
+pub(crate) fn countable(delay: f64, sample_time: f64) -> Result<(), Error> {
+    refuse_if!(
+        delay / sample_time > MOST_SAMPLES,
+        "delay={delay} holds {:.3e} samples of sample_time={sample_time}, which doubles do not \
+         count: lengthen the sample time, or leave it out",
+        delay / sample_time
+    );
+    Ok(())
+}

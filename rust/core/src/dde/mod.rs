@@ -21,6 +21,7 @@ pub use control_loop::{
     Criteria, Equations, LinearLoop, Metrics, Reference, Request, Response, Start, Trajectory,
     Update, ensemble, fixed_step, on_sample, sampled, sensitivity,
 };
+pub(crate) use limits::countable;
 pub use rate_limits::RateLimits;
 pub use scalar::{Dual, Scalar};
 pub use spectral::{breaks, history};

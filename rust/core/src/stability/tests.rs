@@ -368,7 +368,7 @@ fn boundaries_are_closed_forms_in_order() {
         Specification::default(),
         &Task::new(),
     );
-    let found = found.unwrap().unwrap();
+    let [found, _] = found.unwrap().unwrap();
     assert_eq!((found.along, found.curves.len()), (0, 1));
     let curve = &found.curves[0];
     assert_eq!(curve.len(), others.len());
@@ -397,7 +397,7 @@ fn a_curve_that_turns_back_is_one() {
     let (first, second) = (line(-130.0, 20.0, 31), line(0.02, 8.0, 400));
     let axes = axes(&first, &second);
     let found = boundaries(&family, &none, axes, Specification::default(), &Task::new());
-    let found = found.unwrap().unwrap();
+    let [found, _] = found.unwrap().unwrap();
     // The real root crosses in the opposite direction where the pair reaches it, at Kd = 0.3.
     assert_eq!((found.along, found.curves.len()), (0, 3));
     let curves = &found.curves;

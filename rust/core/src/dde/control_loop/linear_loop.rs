@@ -12,7 +12,7 @@
 //! every signal is scalar, x has any length.
 
 use crate::Error;
-use crate::dde::limits::finite;
+use crate::dde::limits::{countable, finite};
 use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 
@@ -142,6 +142,9 @@ impl<S: Scalar> LinearLoop<S> {
                 "sample_time={}: give a positive number of seconds, or none for continuous time",
                 ts.value()
             );
+        }
+        if let Some(ts) = sample_time {
+            countable(delay.value(), ts.value())?;
         }
         if let Some(limit) = limit
             && (limit.value().is_nan() || limit.value() <= 0.0)

@@ -11,6 +11,10 @@ const QUIET_FOR: f64 = 0.2;
 
 const QUIET_WAITS: f64 = 3.0;
 
+/// A response has settled if it was inside its band, with its command within the limit, for so many of
+/// the slowest time constants of the loop: more misjudge fewer responses, and take longer runs.
+pub(crate) const TIME_CONSTANTS: f64 = 3.0;
+
 /// Metrics of a step response, measured between its first output and its steady state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Metrics {
@@ -146,15 +150,60 @@ pub(crate) struct Record {
     pub(crate) inside_since: f64,
     /// Last time at which the output was outside the quiet band.
     pub(crate) unsettled_until: f64,
+    /// Last time at which the command was at its limit; zero where it never was. Until then the time
+    /// constants of the closed loop say nothing about the response.
+    pub(crate) limited_until: f64,
+}
+
+/// How long a response was run, and how fast its loop may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pace {
+    /// Time from the start to the end of the response.
+    pub(crate) span: f64,
+    /// The time after which the loop reacts to its own output.
+    pub(crate) wait: f64,
+    /// The slowest time constant of plant and controller.
+    pub(crate) slowest: f64,
+}
+
+/// Whether a response has settled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// It is outside of its band at the end.
+    Outside,
+    /// It is inside, but the poles of the loop have to show that it stays there.
+    Doubtful,
+    /// The response itself shows that it stays inside.
+    Settled,
 }
 
 impl Record {
-    /// Does the response itself show at `end` that it stays in the band? `wait` is the time after
-    /// which the loop reacts to its own output.
-    pub(crate) fn stays_settled(&self, end: f64, wait: f64) -> bool {
-        let quiet = end - self.unsettled_until;
-        quiet >= QUIET_FOR * (self.unsettled_until - self.inside_since)
-            && quiet >= QUIET_WAITS * wait
+    /// For how long, up to the end of `span`, the output was in its band and the command within its
+    /// limit; NaN where the output is outside at the end.
+    pub(crate) fn time_inside(&self, span: f64) -> f64 {
+        // The difference comes first: it keeps NaN.
+        let inside = span - self.inside_since;
+        if self.limited_until > self.inside_since {
+            span - self.limited_until
+        } else {
+            inside
+        }
+    }
+
+    /// Does the response itself show that it stays in the band?
+    pub(crate) fn verdict(&self, pace: &Pace) -> Verdict {
+        if self.inside_since.is_nan() {
+            return Verdict::Outside;
+        }
+        let unrest = self.unsettled_until.max(self.limited_until);
+        let quiet = pace.span - unrest;
+        let is_quiet =
+            quiet >= QUIET_FOR * (unrest - self.inside_since) && quiet >= QUIET_WAITS * pace.wait;
+        if is_quiet && TIME_CONSTANTS * pace.slowest <= self.time_inside(pace.span) {
+            Verdict::Settled
+        } else {
+            Verdict::Doubtful
+        }
     }
 
     pub(crate) fn metrics(&self, levels: &Levels) -> Metrics {

@@ -74,6 +74,13 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         }
     }
 
+    /// The command is at its limit from `start` to `end`.
+    pub(crate) fn limited(&mut self, start: S, end: S) {
+        if let Some(metrics) = &mut self.metrics {
+            metrics.limited(start.value(), end.value());
+        }
+    }
+
     /// Output and input times.
     pub(crate) fn times(&self) -> [&'a [f64]; 2] {
         [self.output_times, self.input_times]

@@ -41,6 +41,7 @@ impl StepMetrics {
                 after: unknown,
                 inside_since: f64::NAN,
                 unsettled_until: 0.0,
+                limited_until: 0.0,
             },
             zeros: Vec::new(),
         }
@@ -51,9 +52,16 @@ impl StepMetrics {
             .map_or(Metrics::UNKNOWN, |levels| self.record.metrics(&levels))
     }
 
-    /// Does the response show that it stays settled?
-    pub(crate) fn stays_settled(&self, wait: f64) -> bool {
-        self.record.stays_settled(self.end - self.start, wait)
+    /// What is known of the response.
+    pub(crate) fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// The command is at its limit from `start` to `end`.
+    pub(crate) fn limited(&mut self, start: f64, end: f64) {
+        if start <= self.end {
+            self.record.limited_until = self.record.limited_until.max(end.min(self.end));
+        }
     }
 
     /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.

@@ -8,11 +8,13 @@ use super::blocks::{CharacteristicMatrix, Part};
 use super::determinant;
 use super::system::Irreducible;
 use crate::order::sort_up;
+use crate::roots::chains;
+use crate::roots::counting::exact_chain_abscissa;
 use crate::roots::disc::Disc;
-use crate::roots::locating::{Edge, count_with_edge, first, roots_with_edge};
+use crate::roots::locating::{self, Edge, count_with_edge, first, roots_with_edge};
 use crate::roots::region::Region;
 use crate::roots::root_set::RootSet;
-use crate::{Error, Task, roots as functions};
+use crate::{Error, Task};
 
 /// Covers the rounding errors of distances between centres.
 const ROUNDED: f64 = 1.0 + 1e-12;
@@ -29,7 +31,7 @@ const ROUNDED: f64 = 1.0 + 1e-12;
 /// close to it that its side cannot be decided; [`Error::TooMuch`]; [`Error::Interrupted`].
 ///
 /// ```
-/// use deadtime::{Task, functions::{Edge, Region, matrix::{CharacteristicMatrix, count}}};
+/// use deadtime::{Task, roots::{Edge, Region, matrix::{CharacteristicMatrix, count}}};
 /// let unit = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
 /// let late = vec![(1.0, vec![vec![-1.0, 0.0], vec![0.0, -1.0]])];
 /// let system = CharacteristicMatrix::new(unit, vec![], late)?;
@@ -62,7 +64,7 @@ pub fn count(
 /// was counted.
 ///
 /// ```
-/// use deadtime::{Task, functions::{Edge, Region, matrix::{CharacteristicMatrix, roots}}};
+/// use deadtime::{Task, roots::{Edge, Region, matrix::{CharacteristicMatrix, roots}}};
 /// // x′ = −x(t − 1), twice.
 /// let unit = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
 /// let late = vec![(1.0, vec![vec![-1.0, 0.0], vec![0.0, -1.0]])];
@@ -117,7 +119,7 @@ pub fn rightmost(system: &CharacteristicMatrix, n: usize, task: &Task) -> Result
     let mut discs = Vec::new();
     let mut sets = system.parts().iter().map(|(part, times)| {
         let set = match part {
-            Part::Scalar(h) => functions::rightmost(h, n, task),
+            Part::Scalar(h) => locating::rightmost(h, n, task),
             Part::Matrix(block) => determinant::rightmost(block, n, task),
         };
         set.map(|set| (set, *times))
@@ -155,7 +157,7 @@ pub fn spectral_abscissa(
     let mut largest = f64::NEG_INFINITY;
     for (part, _) in system.parts() {
         largest = largest.max(match part {
-            Part::Scalar(h) => functions::spectral_abscissa(h, strong, task)?,
+            Part::Scalar(h) => locating::spectral_abscissa(h, strong, task)?,
             Part::Matrix(block) => {
                 let found = determinant::spectral_abscissa(block, task)?;
                 let chain = determinant::chain_abscissa(block, task)?.1;
@@ -190,7 +192,7 @@ fn judged_exactly(known: bool, strong: f64) -> Result<(), Error> {
 /// [`Error::Argument`] for an E that cannot be inverted; [`Error::Interrupted`].
 ///
 /// ```
-/// use deadtime::{Task, functions::matrix::{CharacteristicMatrix, chain_abscissa}};
+/// use deadtime::{Task, roots::matrix::{CharacteristicMatrix, chain_abscissa}};
 /// let one = || vec![vec![1.0]];
 /// let system = CharacteristicMatrix::new(one(), vec![(0.36, vec![vec![0.3]])], vec![(0.0, one())])?;
 /// let (low, high) = chain_abscissa(&system, true, &Task::new())?;
@@ -207,11 +209,11 @@ pub fn chain_abscissa(
     for (part, _) in system.parts() {
         let own = match part {
             Part::Scalar(h) => {
-                let chain = functions::chain_abscissa(h);
+                let chain = chains::chain_abscissa(h);
                 let exact = if strong {
                     None
                 } else {
-                    functions::exact_chain_abscissa(h, task)?
+                    exact_chain_abscissa(h, task)?
                 };
                 let end = exact.unwrap_or(chain);
                 if end.is_finite() {
@@ -250,7 +252,7 @@ pub fn is_stable(system: &CharacteristicMatrix, strong: bool, task: &Task) -> Re
     let mut undecided = None;
     for (part, _) in system.parts() {
         let stable = match part {
-            Part::Scalar(h) => functions::is_stable(h, strong, task),
+            Part::Scalar(h) => locating::is_stable(h, strong, task),
             Part::Matrix(block) => block_is_stable(block, strong, task),
         };
         match stable {

@@ -10,7 +10,7 @@ use crate::parallel;
 use crate::quasipoly::QuasiPolynomial;
 use crate::stability::crossings::{Crossing, Members, crossings};
 use crate::stability::hold::Hold;
-use crate::stability::map::{Chart, Proof, Question, Vertex, join};
+use crate::stability::map::{Chart, Lines, Proof, Question, Vertex, join_both};
 use crate::stability::specification::Specification;
 use crate::{Error, Task};
 
@@ -133,27 +133,24 @@ pub fn held_map(
     Ok(chart)
 }
 
-/// The curves on which roots lie on the edge of the specification.
+/// The curves on which roots lie on the edge of the specification: those along the rows, and those
+/// that run along them and are found by the columns. `columns` are the loops of the same map along
+/// the parameter that varies from row to row, if that is a gain as well.
 ///
 /// # Errors
 /// As for [`held_map`].
 pub fn held_boundaries(
     rows: &LoopRows<'_>,
+    columns: Option<&LoopRows<'_>>,
     specification: Specification,
     task: &Task,
-) -> Result<Vec<Vec<Vertex>>, Error> {
+) -> Result<[Vec<Vec<Vertex>>; 2], Error> {
     specification.check()?;
-    let (Some(low), Some(high)) = (rows.points.first(), rows.points.last()) else {
-        return Ok(Vec::new());
-    };
-    let shared = rows.shared_model()?;
-    let found: Vec<Vec<Crossing>> = rows.each(task, |index| {
-        let numbers = rows.numbers(index, shared.as_ref())?;
-        numbers.members(rows.points, specification, |members| {
-            Ok(members.found(task)?.unwrap_or_default())
-        })
-    })?;
-    Ok(join(&found, (*low, *high)))
+    let is_ordered = |lines: &&LoopRows<'_>| lines.points.is_sorted() && rows.points.is_sorted();
+    let columns = columns.filter(is_ordered);
+    let columns = columns.map(|columns| columns.lines(specification, task));
+    let found = rows.lines(specification, task)?;
+    Ok(join_both(&found, columns.transpose()?.as_ref()))
 }
 
 /// All crossings of the first row with k in `range`; `None` where they are beyond double precision.
@@ -174,6 +171,21 @@ pub fn held_crossings(
 }
 
 impl<'a> LoopRows<'a> {
+    /// The crossings of all rows.
+    fn lines(&self, specification: Specification, task: &Task) -> Result<Lines<'a>, Error> {
+        let shared = self.shared_model()?;
+        let crossings = self.each(task, |index| {
+            let numbers = self.numbers(index, shared.as_ref())?;
+            numbers.members(self.points, specification, |members| {
+                Ok(members.found(task)?.unwrap_or_default())
+            })
+        })?;
+        Ok(Lines {
+            crossings,
+            points: self.points,
+        })
+    }
+
     /// An entry of an array for a row.
     fn entry(
         &self,

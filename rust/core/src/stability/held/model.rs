@@ -21,7 +21,7 @@
 
 use crate::Error;
 use crate::dde::control_loop::sampled::Timing;
-use crate::dde::{LinearLoop, Update};
+use crate::dde::{LinearLoop, Update, countable};
 use crate::elementary::DoubleDouble;
 use crate::linear_algebra::balance::balanced;
 use crate::stability::crossings::sizes;
@@ -103,6 +103,7 @@ impl LoopPolynomials {
             a.iter().chain(b).any(|entry| !entry.is_finite()),
             "an entry of the equations is not finite: choose smaller gains"
         );
+        countable(delay, sample_time)?;
         Ok(Self::built((a, b), None, delay, sample_time))
     }
 
@@ -116,6 +117,7 @@ impl LoopPolynomials {
         match plant.update() {
             None => Self::new(a, b, delay, sample_time),
             Some(update) if b.len() <= MOST_STATES => {
+                countable(delay, sample_time)?;
                 Ok(Self::built((a, b), Some(update), delay, sample_time))
             }
             Some(_) => refuse!(

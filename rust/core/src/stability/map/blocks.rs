@@ -42,17 +42,18 @@ const IS_PAGE: bool = cfg!(target_family = "wasm");
 /// The index of the axis along the rows, and the crossings of each.
 pub(crate) type Crossed = (usize, Vec<Vec<Crossing>>);
 
-/// The crossings of the edge along every row, and the index of the axis along the rows: that with
-/// more points.
+/// The crossings of the edge along every row, and the index of the axis along the rows: of these
+/// axes that with more points.
 ///
 /// # Errors
 /// [`Error::Interrupted`] alone.
-pub(crate) fn crossings(map: &Map<'_>) -> Result<Option<Crossed>, Error> {
+pub(crate) fn crossings(map: &Map<'_>, axes: &[usize]) -> Result<Option<Crossed>, Error> {
     if IS_PAGE || grid(map).is_none() {
         return Ok(None);
     }
     let [first, second] = map.axes;
-    let (along, axis, across) = if first.points.len() > second.points.len() {
+    let is_first = first.points.len() > second.points.len() || !axes.contains(&1);
+    let (along, axis, across) = if is_first && axes.contains(&0) {
         (0, first, second)
     } else {
         (1, second, first)

@@ -6,6 +6,9 @@
 //! direction and their directions agree. Where two curves of opposite directions end side by side
 //! in the same row, they are the two arms of one curve that turns back there. Every point is a
 //! proved crossing; only the order of the points is heuristic.
+//!
+//! A curve that runs along the rows meets few of them or none. Where the crossings of the columns
+//! are known too, those that no joined curve passes make curves of their own.
 
 use crate::order::sort_up;
 use crate::stability::crossings::Crossing;
@@ -21,6 +24,11 @@ const FARTHEST: f64 = 0.2;
 /// top lies less than a row, h, above the last one, by δ, the gap is 2√δ/(√(δ + h) − √δ) ≤ 2/(√2 −
 /// 1) = 4.83 steps.
 const TURN: f64 = 5.5;
+
+/// How far ω may leave the values at both ends of a step of a curve, as a share of their difference,
+/// and of the highest ω. More takes points of other curves for its own; less shows points twice.
+const BEYOND: f64 = 1.0;
+const ROUNDING: f64 = 1e-9;
 
 /// A point of a boundary.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,8 +84,79 @@ fn distance(p: (f64, f64), q: (f64, f64), scale: (f64, f64)) -> f64 {
     ((p.0 - q.0) / scale.0).abs() + ((p.1 - q.1) / scale.1).abs()
 }
 
+/// Lines of a map along which one parameter varies: the crossings of each, and the values on them.
+pub(crate) struct Lines<'a> {
+    pub(crate) crossings: Vec<Vec<Crossing>>,
+    pub(crate) points: &'a [f64],
+}
+
+impl Lines<'_> {
+    /// The least and the largest value.
+    fn range(&self) -> (f64, f64) {
+        let end = |point: Option<&f64>| point.copied().unwrap_or_default();
+        (end(self.points.first()), end(self.points.last()))
+    }
+}
+
+/// Join the crossings of the rows, and those of the columns that these curves do not pass.
+pub(crate) fn join_both(rows: &Lines<'_>, columns: Option<&Lines<'_>>) -> [Vec<Vec<Vertex>>; 2] {
+    let curves = join(&rows.crossings, rows.range());
+    let others = columns.map_or_else(Vec::new, |columns| {
+        join(&missed(&curves, rows.points, columns), columns.range())
+    });
+    [curves, others]
+}
+
+/// Where a curve passes a column: after which row, and between which frequencies.
+struct Passage {
+    row: usize,
+    omega: (f64, f64),
+}
+
+/// The crossings of columns, at `gains`, that no curve passes.
+fn missed(curves: &[Vec<Vertex>], gains: &[f64], columns: &Lines<'_>) -> Vec<Vec<Crossing>> {
+    let highest = curves
+        .iter()
+        .flatten()
+        .fold(0.0, |most, vertex| vertex.omega.max(most));
+    let mut passages: Vec<Vec<Passage>> = gains.iter().map(|_| Vec::new()).collect();
+    for pair in curves.iter().flat_map(|curve| curve.windows(2)) {
+        let [a, b] = pair else { continue };
+        let (low, high) = (a.omega.min(b.omega), a.omega.max(b.omega));
+        let slack = BEYOND * (high - low) + ROUNDING * highest;
+        let first = gains.partition_point(|gain| *gain < a.gain.min(b.gain));
+        let last = gains.partition_point(|gain| *gain <= a.gain.max(b.gain));
+        // A curve that turns back does so before or after its row.
+        let turns = (a.row == b.row).then(|| a.row.saturating_sub(1));
+        for passages in passages.get_mut(first..last).into_iter().flatten() {
+            for row in [Some(a.row.min(b.row)), turns].into_iter().flatten() {
+                passages.push(Passage {
+                    row,
+                    omega: (low - slack, high + slack),
+                });
+            }
+        }
+    }
+    let crossings = columns.crossings.iter().zip(&mut passages);
+    let left = crossings.map(|(crossings, passages)| {
+        let is_missed = |crossing: &&Crossing| {
+            let row = columns
+                .points
+                .partition_point(|point| *point <= crossing.gain);
+            let row = row.saturating_sub(1);
+            let own = passages.iter().position(|passage| {
+                passage.row == row && (passage.omega.0..=passage.omega.1).contains(&crossing.omega)
+            });
+            // Each passage is that of one crossing.
+            own.map(|place| passages.swap_remove(place)).is_none()
+        };
+        crossings.iter().filter(is_missed).copied().collect()
+    });
+    left.collect()
+}
+
 /// Join the crossings of all rows.
-pub(crate) fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>> {
+fn join(rows: &[Vec<Crossing>], range: (f64, f64)) -> Vec<Vec<Vertex>> {
     let all = || rows.iter().flatten();
     let highest = all().fold(0.0, |most, crossing| crossing.omega.max(most));
     let scale = (

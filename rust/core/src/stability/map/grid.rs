@@ -12,7 +12,7 @@
 use super::axes::{Axis, Map, Proof, Question, check_parameters, put};
 use super::blocks;
 use super::chart::Chart;
-use super::curves::{Vertex, join};
+use super::curves::{Lines, Vertex, join_both};
 use super::rows::{Rows, Wanted};
 use crate::parallel;
 use crate::roots::chain_abscissa;
@@ -72,18 +72,18 @@ pub fn map(
     }
 }
 
-/// The boundaries of a map: see [`Vertex`].
+/// Boundaries of a map: see [`Vertex`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundaries {
-    /// Which of the two axes runs along the rows, whose values are the gains of the vertices.
+    /// Which of the two axes runs along the lines, whose values are the gains of the vertices.
     pub along: usize,
     /// Each curve with its points in order.
     pub curves: Vec<Vec<Vertex>>,
 }
 
-/// The curves on which roots lie on the edge of the specification. `None` where the family is
-/// affine in neither parameter and a root of all members stays at 0, or where points are not in
-/// order.
+/// The curves on which roots lie on the edge of the specification: first those along the rows, then
+/// those that run along them and are found by the columns. `None` where the family is affine in
+/// neither parameter and a root of all members stays at 0, or where points are not in order.
 ///
 /// # Errors
 /// As for [`map`].
@@ -93,7 +93,7 @@ pub fn boundaries(
     axes: [Axis<'_>; 2],
     specification: Specification,
     task: &Task,
-) -> Result<Option<Boundaries>, Error> {
+) -> Result<Option<[Boundaries; 2]>, Error> {
     specification.check()?;
     check(family, values, axes)?;
     let map = Map {
@@ -106,22 +106,13 @@ pub fn boundaries(
         },
         task,
     };
-    let (along, crossings) = match Rows::of(&map, Wanted::Boundaries) {
-        Some(rows) if rows.has_boundaries() => (rows.along, rows.crossings()?),
-        Some(_) => return Ok(None),
-        None => match blocks::crossings(&map)? {
-            Some(found) => found,
-            None => return Ok(None),
-        },
-    };
-    let points = axes.get(along).map_or(&[][..], |axis| axis.points);
-    let (Some(low), Some(high)) = (points.first(), points.last()) else {
+    let Some((along, rows)) = map.lines(&[0, 1])? else {
         return Ok(None);
     };
-    Ok(Some(Boundaries {
-        along,
-        curves: join(&crossings, (*low, *high)),
-    }))
+    let columns = map.lines(&[1 - along])?.map(|(_, columns)| columns);
+    let [curves, others] = join_both(&rows, columns.as_ref());
+    let of = |along, curves| Boundaries { along, curves };
+    Ok(Some([of(along, curves), of(1 - along, others)]))
 }
 
 /// The abscissa of the chains of every member, row-major: −∞ where there are none, NaN where it
@@ -147,7 +138,20 @@ pub fn chains(
     parallel::results("the map", cells, || values.to_vec(), cell)
 }
 
-impl Map<'_> {
+impl<'a> Map<'a> {
+    /// The crossings of all lines along one of these axes, and the index of that axis.
+    fn lines(&self, axes: &[usize]) -> Result<Option<(usize, Lines<'a>)>, Error> {
+        let found = match Rows::along(self, Wanted::Boundaries, axes) {
+            Some(rows) if rows.has_boundaries() => Some((rows.along, rows.crossings()?)),
+            Some(_) => None,
+            None => blocks::crossings(self, axes)?,
+        };
+        Ok(found.and_then(|(along, crossings)| {
+            let points = self.axes.get(along)?.points;
+            (!points.is_empty()).then_some((along, Lines { crossings, points }))
+        }))
+    }
+
     fn cell_by_cell(&self) -> Result<Chart, Error> {
         let Question {
             specification,

@@ -19,6 +19,6 @@ mod rows;
 pub use axes::{Axis, Proof, Question};
 pub use chart::Chart;
 pub use curves::Vertex;
-pub(crate) use curves::join;
+pub(crate) use curves::{Lines, join_both};
 pub use grid::{Boundaries, boundaries, chains, map};
 pub use robust::robust_map;

@@ -136,7 +136,14 @@ impl<'a> Rows<'a> {
     /// s, so that a root at 0 crosses within rows and not between them; then the longer rows, which
     /// cost less for each cell.
     pub(crate) fn of(map: &'a Map<'a>, wanted: Wanted) -> Option<Self> {
-        let lines = map.axes.into_iter().enumerate().flat_map(|(along, axis)| {
+        Self::along(map, wanted, &[0, 1])
+    }
+
+    /// [`Self::of`] along one of these axes.
+    pub(crate) fn along(map: &'a Map<'a>, wanted: Wanted, axes: &[usize]) -> Option<Self> {
+        let all = map.axes.into_iter().enumerate();
+        let chosen = all.filter(|(along, _)| axes.contains(along));
+        let lines = chosen.flat_map(|(along, axis)| {
             // Only the imaginary axis is crossed at frequencies that do not depend on the delay.
             let Specification { decay, damping } = map.question.specification;
             let suits = damping.is_none() && (decay == 0.0 || wanted == Wanted::Abscissas);
@@ -189,13 +196,21 @@ impl<'a> Rows<'a> {
     }
 
     pub(crate) fn crossings(&self) -> Result<Vec<Vec<Crossing>>, Error> {
-        self.each(
-            |_, members| match (members.found(self.map.task)?, members.delay) {
-                (Some(found), _) => Ok(found),
-                (None, Some(delay)) => delay.by_parts.crossings(),
-                (None, None) => Ok(Vec::new()),
-            },
-        )
+        let is_divisible = blocks::grid(self.map).is_some();
+        self.each(|index, members| match members.found(self.map.task)? {
+            Some(found) => Ok(found),
+            None if is_divisible => {
+                let mut values = self.map.values.to_vec();
+                put(&mut values, self.across(), index);
+                let row = OneRow {
+                    map: self.map,
+                    values: &values,
+                    axis: self.line.axis,
+                };
+                row.crossings()
+            }
+            None => Ok(Vec::new()),
+        })
     }
 
     /// The counts along the middle column, where the other parameter is a gain or a delay as well.

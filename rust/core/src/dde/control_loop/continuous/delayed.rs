@@ -132,15 +132,18 @@ pub(super) fn run<S: Scalar>(
             if order <= REPORTED {
                 requested.input_break(t + S::from(stretch.start) * h)?;
             }
-            let last = stretch.end >= 1.0;
+            let start = t + S::from(stretch.start) * h;
+            let end = if stretch.end >= 1.0 {
+                next
+            } else {
+                t + S::from(stretch.end) * h
+            };
+            if stretch.mode != Mode::Free {
+                requested.limited(start, end);
+            }
             let mut piece = pieces.blank();
             piece.start = delay + t + S::from(stretch.start) * h;
-            piece.end = delay
-                + if last {
-                    next
-                } else {
-                    t + S::from(stretch.end) * h
-                };
+            piece.end = delay + end;
             piece.origin = t + delay;
             piece.scale = scale;
             piece.series.copy_from(clipped(&u, stretch.mode, &held));

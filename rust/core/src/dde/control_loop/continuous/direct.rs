@@ -151,6 +151,9 @@ pub(super) fn run<S: Scalar>(
         if requested.is_measured() {
             requested.measure(t.value(), h.value(), end, &y.values());
         }
+        if held.is_some() {
+            requested.limited(t, next);
+        }
         requested.output_blocks(next.value() - tolerance, |times| {
             y.at_each(times.map(|time| (time - t) / h))
         });

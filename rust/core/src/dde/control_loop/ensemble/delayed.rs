@@ -297,6 +297,16 @@ impl<S: Simd, const N: usize> Run<S> for Steps<'_, S, N> {
         outlined(self.output.simd(), Advance { steps: self, trace })
     }
 
+    /// Such a command is at its limit at first alone.
+    fn limited_until(&self) -> Real<S> {
+        let runs = &self.loops.runs;
+        let saturated = self.loops.saturated.as_ref();
+        saturated.map_or(runs.zero, |at_first| {
+            // A command that never leaves its limit is there to the end.
+            runs.time(at_first.samples, runs.zero).smaller(runs.end)
+        })
+    }
+
     fn unfit(&self) -> Mask<S> {
         self.limited
     }

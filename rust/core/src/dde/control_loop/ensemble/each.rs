@@ -1,7 +1,7 @@
 //! One loop, run by the code for single loops.
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
-use crate::dde::control_loop::metrics::{Criteria, Metrics};
+use crate::dde::control_loop::metrics::{Criteria, Pace};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::control_loop::row::Row;
@@ -9,11 +9,7 @@ use crate::dde::control_loop::step_metrics::StepMetrics;
 use crate::memory::collected;
 use crate::{Error, Task};
 
-use super::sets::{Outcome, Sets};
-
-/// A response has settled if it was inside its band for so many of the slowest time constants of the
-/// loop.
-pub(super) const TIME_CONSTANTS: f64 = 3.0;
+use super::sets::{Found, Outcome, Sets};
 
 /// Metrics of one set, with its steady state and the slowest time constant of plant and controller.
 pub(super) fn metrics(
@@ -23,34 +19,37 @@ pub(super) fn metrics(
     span: f64,
     criteria: &Criteria,
     task: &Task,
-) -> Result<(Metrics, Outcome), Error> {
+) -> Result<(Found, Outcome), Error> {
     let Some((plant, ahead)) = loop_of(sets, set)? else {
-        return Ok((Metrics::UNKNOWN, Outcome::Refused));
+        return Ok((Found::UNKNOWN, Outcome::Refused));
     };
     let end = [ahead + span];
     let mut steady = steady;
     if steady.is_nan() {
         match run(sets, &plant, RequestedOutput::new(&end, &[], 0.0)?, task)? {
             Ok(found) => steady = found.outputs.last().copied().unwrap_or(f64::NAN),
-            Err(outcome) => return Ok((Metrics::UNKNOWN, outcome)),
+            Err(outcome) => return Ok((Found::UNKNOWN, outcome)),
         }
     }
     let row = sets.row(set);
     let row = Row::new(sets.states(), &row)?;
-    let wait = row.delay + row.sample_time;
+    let pace = Pace {
+        span,
+        wait: row.delay + row.sample_time,
+        slowest,
+    };
     let mut metrics = StepMetrics::new(ahead, ahead + span, steady, *criteria);
     let requested = RequestedOutput::new(&end, &[], 0.0)?.measured_by(&mut metrics);
     Ok(match run(sets, &plant, requested, task)? {
         Ok(_) => {
-            let (metrics, outcome) = judged(metrics.metrics(), metrics.stays_settled(wait));
-            let inside = span - metrics.settling_time;
-            if outcome == Outcome::Ok && TIME_CONSTANTS * slowest > inside {
-                (metrics, Outcome::Doubtful)
-            } else {
-                (metrics, outcome)
-            }
+            let record = metrics.record();
+            let found = Found {
+                metrics: metrics.metrics(),
+                limited_until: record.limited_until,
+            };
+            (found, record.verdict(&pace).into())
         }
-        Err(outcome) => (Metrics::UNKNOWN, outcome),
+        Err(outcome) => (Found::UNKNOWN, outcome),
     })
 }
 
@@ -71,18 +70,6 @@ pub(super) fn response(
             Err(outcome) => (Vec::new(), outcome),
         },
     )
-}
-
-/// Metrics together with the outcome that they show.
-pub(super) fn judged(metrics: Metrics, stays_settled: bool) -> (Metrics, Outcome) {
-    let outcome = if metrics.settling_time.is_nan() {
-        Outcome::Unsettled
-    } else if stays_settled {
-        Outcome::Ok
-    } else {
-        Outcome::Doubtful
-    };
-    (metrics, outcome)
 }
 
 /// The loop and the time by which its output is read ahead; none where the numbers are not those of

@@ -82,6 +82,7 @@ impl<S: Simd> Measured<S> {
                 (bottom, -dip)
             },
             inside_since: of(&self.inside_since, lane),
+            limited_until: 0.0,
             unsettled_until: of(&self.unsettled_until, lane),
         }
     }

@@ -1,13 +1,12 @@
 //! The metrics of all loops of two vectors.
 
-use crate::dde::control_loop::metrics::{Criteria, Levels, Metrics};
+use crate::dde::control_loop::metrics::{Criteria, Levels, Pace, TIME_CONSTANTS};
 use crate::simd::Simd;
 
-use super::each::{TIME_CONSTANTS, judged};
 use super::loops::Runs;
 use super::measured::Measured;
 use super::rounds::measure;
-use super::sets::{Measures, Outcome, SETS, of as number};
+use super::sets::{Found, Measures, Outcome, SETS, of as number};
 use super::through::Job;
 use super::trace::{Trace, of};
 use super::view::View;
@@ -74,16 +73,17 @@ impl Job for MetricsJob<'_> {
         }
         let lost = run.lost().select(1.0, zero);
         let unfit = run.unfit().select(1.0, zero);
+        let limited = run.limited_until();
         let mut measures = Measures::new();
         let mut radius = zero;
         let mut is_doubtful = false;
         for (lane, (&set, levels)) in members.iter().zip(&levels).enumerate() {
             if of(&unfit, lane) > 0.0 {
-                measures.push(&Metrics::UNKNOWN, None);
+                measures.push(&Found::UNKNOWN, None);
                 continue;
             }
             if of(&lost, lane) > 0.0 {
-                measures.push(&Metrics::UNKNOWN, Some(Outcome::Diverged));
+                measures.push(&Found::UNKNOWN, Some(Outcome::Diverged));
                 continue;
             }
             let ahead = of(&loops.ahead, lane);
@@ -94,19 +94,23 @@ impl Job for MetricsJob<'_> {
             record.risen = (since(record.risen.0, ahead), since(record.risen.1, ahead));
             record.inside_since = since(record.inside_since, ahead);
             record.unsettled_until -= ahead;
-            let stays = record.stays_settled(self.span, of(&loops.wait, lane));
-            let (metrics, mut outcome) = judged(record.metrics(levels), stays);
-            let inside = self.span - metrics.settling_time;
-            let slowest = number(self.slowest, set);
-            if outcome == Outcome::Ok && TIME_CONSTANTS * slowest > inside {
-                outcome = Outcome::Doubtful;
-            }
+            record.limited_until = of(&limited, lane);
+            let outcome = Outcome::from(record.verdict(&Pace {
+                span: self.span,
+                wait: of(&loops.wait, lane),
+                slowest: number(self.slowest, set),
+            }));
+            let inside = record.time_inside(self.span);
             if outcome == Outcome::Doubtful && inside > 0.0 {
                 is_doubtful = true;
                 let sample_time = of(&loops.sample_time, lane);
                 radius.numbers_mut()[lane] = libm::exp(-TIME_CONSTANTS * sample_time / inside);
             }
-            measures.push(&metrics, Some(outcome));
+            let found = Found {
+                metrics: record.metrics(levels),
+                limited_until: record.limited_until,
+            };
+            measures.push(&found, Some(outcome));
         }
         if is_doubtful {
             let decay = run.decay(radius);

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::dde::control_loop::linear_loop::LinearLoop;
-use crate::dde::control_loop::metrics::Metrics;
+use crate::dde::control_loop::metrics::{Metrics, Verdict};
 use crate::dde::control_loop::row::{Row, width};
 
 /// Number of loops in a block: two vectors of the widest instruction set.
@@ -25,11 +25,39 @@ pub enum Outcome {
     Doubtful = 4,
 }
 
+/// What is found of one set besides its outcome.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Found {
+    pub(super) metrics: Metrics,
+    /// The last time at which the command was at its limit; zero where it never was.
+    pub(super) limited_until: f64,
+}
+
+impl Found {
+    /// Nothing.
+    pub(super) const UNKNOWN: Self = Self {
+        metrics: Metrics::UNKNOWN,
+        limited_until: f64::NAN,
+    };
+}
+
+impl From<Verdict> for Outcome {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Outside => Self::Unsettled,
+            Verdict::Doubtful => Self::Doubtful,
+            Verdict::Settled => Self::Ok,
+        }
+    }
+}
+
 /// Metrics and outcomes of some sets.
 #[derive(Debug, Clone)]
 pub struct Measures {
     /// The metrics in the order of their fields, one for each set.
-    pub metrics: [[f64; SETS]; 9],
+    metrics: [[f64; SETS]; 9],
+    /// The last time at which each command was at its limit.
+    limited_until: [f64; SETS],
     /// Outcomes; none of sets that have to run one by one.
     pub(super) outcomes: [Option<Outcome>; SETS],
     /// How many sets.
@@ -41,6 +69,7 @@ impl Measures {
     pub(super) fn new() -> Self {
         Self {
             metrics: [[f64::NAN; SETS]; 9],
+            limited_until: [f64::NAN; SETS],
             outcomes: [None; SETS],
             count: 0,
         }
@@ -48,7 +77,14 @@ impl Measures {
 
     /// Append those of a set, without an outcome if it has to run alone.
     #[inline]
-    pub(super) fn push(&mut self, metrics: &Metrics, outcome: Option<Outcome>) {
+    pub(super) fn push(&mut self, found: &Found, outcome: Option<Outcome>) {
+        let Found {
+            metrics,
+            limited_until,
+        } = found;
+        if let Some(place) = self.limited_until.get_mut(self.count) {
+            *place = *limited_until;
+        }
         for (column, metric) in self.metrics.iter_mut().zip(metrics.to_array()) {
             if let Some(place) = column.get_mut(self.count) {
                 *place = metric;
@@ -64,6 +100,12 @@ impl Measures {
     #[cfg(test)]
     pub(super) fn of(&self, place: usize) -> Metrics {
         Metrics::from_array(self.metrics.map(|column| column[place]))
+    }
+
+    /// The metrics in the order of their fields, and then the last times at which commands were at
+    /// their limits.
+    pub fn columns(&self) -> impl Iterator<Item = &[f64; SETS]> {
+        self.metrics.iter().chain([&self.limited_until])
     }
 
     /// Outcomes, refused where there is none.

@@ -4,10 +4,10 @@ use super::block::{Column, Members};
 use super::each;
 use super::metrics::MetricsJob;
 use super::responses::ResponsesJob;
-use super::sets::{Measures, Outcome, SETS, Sets, of};
+use super::sets::{Found, Measures, Outcome, SETS, Sets, of};
 use super::shape::{Shapes, plant_states};
 use super::through::{Job, through};
-use crate::dde::control_loop::metrics::{Criteria, Metrics};
+use crate::dde::control_loop::metrics::Criteria;
 use crate::memory::{filled, push, reserved, room};
 use crate::parallel;
 use crate::{Error, Task};
@@ -113,7 +113,7 @@ impl Sets<'_> {
 struct Receiver<F>(F);
 
 impl<F: FnMut(&[usize], &Measures)> Kept<MetricsJob<'_>> for Receiver<F> {
-    type Single = (Metrics, Outcome);
+    type Single = (Found, Outcome);
 
     fn lanes(
         &mut self,
@@ -131,9 +131,9 @@ impl<F: FnMut(&[usize], &Measures)> Kept<MetricsJob<'_>> for Receiver<F> {
         Ok(count)
     }
 
-    fn single(&mut self, set: usize, (metrics, outcome): Self::Single) {
+    fn single(&mut self, set: usize, (found, outcome): Self::Single) {
         let mut measures = Measures::new();
-        measures.push(&metrics, Some(outcome));
+        measures.push(&found, Some(outcome));
         (self.0)(&[set], &measures);
     }
 }

@@ -122,7 +122,7 @@ fn all_metrics(
 fn alone(sets: &Sets<'_>, set: usize, span: f64) -> Metrics {
     let numbers = (f64::NAN, 0.0);
     let found = each::metrics(sets, set, numbers, span, &CRITERIA, &Task::new());
-    found.map_or(Metrics::UNKNOWN, |(metrics, _)| metrics)
+    found.map_or(Metrics::UNKNOWN, |(found, _)| found.metrics)
 }
 
 /// Loops whose gains differ from those of `rows` by some rounding errors. A saturated loop may be

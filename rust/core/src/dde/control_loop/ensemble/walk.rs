@@ -27,6 +27,9 @@ pub(super) trait Run<S: Simd> {
     /// The loops whose response exceeds all limits before its end.
     fn lost(&self) -> Mask<S>;
 
+    /// The last time at which each command was at its limit; zero where it never was.
+    fn limited_until(&self) -> Real<S>;
+
     /// The loops that this method cannot simulate, as it turned out.
     fn unfit(&self) -> Mask<S>;
 
@@ -48,6 +51,7 @@ pub(super) struct Walk<'a, S: Simd, const N: usize, const P: usize> {
     /// Number of the next sample.
     number: usize,
     lost: Mask<S>,
+    limited_until: Real<S>,
 }
 
 impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
@@ -61,6 +65,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             inside: runs.first_output,
             number: 0,
             lost: runs.no_lane,
+            limited_until: runs.zero,
         }
     }
 
@@ -124,6 +129,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
         let (mut x, mut output, mut number) = (self.x, self.output, self.number);
         // The sum of the squares of all states and commands.
         let (mut lost, mut size) = (self.lost, loops.zero);
+        let mut limited_until = self.limited_until;
         // Copies of few numbers stay in registers while the trace is written; more are read faster
         // where they are.
         let copies = (controllers.k, controllers.step);
@@ -199,6 +205,12 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             }
             x = step.apply(&x, before, after);
             let next = loops.sample_time * (number + 1) as f64;
+            // A command is held to the next sample.
+            let mut limited = u.abs().gt(limit);
+            if EXACT {
+                limited = limited & now.le(loops.latest);
+            }
+            limited_until = limited.select(next, limited_until);
             if EXACT {
                 let sound = are_sound(&[u]) & (are_sound(&x) | next.gt(loops.latest));
                 lost = lost | (now.le(loops.latest) & !sound);
@@ -232,6 +244,7 @@ impl<'a, S: Simd, const N: usize, const P: usize> Walk<'a, S, N, P> {
             self.inside = output;
         }
         (self.x, self.output, self.number, self.lost) = (x, output, number, lost);
+        self.limited_until = limited_until;
         trace.samples = first_sample + CHUNK;
         trace.chunks.push(summary);
         true
@@ -301,6 +314,10 @@ impl<S: Simd, const N: usize, const P: usize> Run<S> for Walk<'_, S, N, P> {
 
     fn lost(&self) -> Mask<S> {
         self.lost
+    }
+
+    fn limited_until(&self) -> Real<S> {
+        self.limited_until
     }
 
     fn unfit(&self) -> Mask<S> {

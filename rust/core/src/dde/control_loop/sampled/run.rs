@@ -69,7 +69,11 @@ pub(crate) fn run<S: Scalar>(
         let arrived = walk.commands.at(index - walk.lag() - 1);
         let u = equations.command(&walk.x, arrived, walk.held.value());
         check_growth(&walk.x, u, now)?;
-        walk.commands.issue(saturate(u, plant.limit()))?;
+        let issued = saturate(u, plant.limit());
+        if issued.value() != u.value() {
+            walk.requested.limited(now, now + sample_time);
+        }
+        walk.commands.issue(issued)?;
         if let Some(update) = plant.update() {
             walk.update(update, arrived);
         }
