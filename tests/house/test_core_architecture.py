@@ -78,7 +78,6 @@ ORDER = {
     "estimation": [
         "plant",
         "disturbance",
-        "block_triangular",
         "rows",
         "kept",
         "propagation",
