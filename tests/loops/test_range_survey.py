@@ -138,10 +138,10 @@ def survey(seeds):
 
 
 def test_ranges_of_some_loops_are_those_of_eigenvalues():
-    wrong, asked, refused = survey(range(3))
+    wrong, asked, refused = survey([9, 10])
     assert not wrong
-    assert asked > 15
-    assert len(refused) <= 1
+    assert not refused
+    assert asked == 11
 
 
 @pytest.mark.survey
@@ -153,4 +153,4 @@ def test_ranges_of_three_hundred_loops_are_those_of_eigenvalues(part):
     assert asked > 300
     # Of polynomials of degree seven or eight, and where a light mode turns many times in a sample.
     assert len(refused) < 0.05 * asked
-    assert all("beyond" in message or "near" in message for _, _, message in refused)
+    assert all("beyond" in message for _, _, message in refused)

@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::held::Crossover;
+use super::gain_crossovers::Crossover;
 use crate::elementary::angle;
 use crate::quasipoly::modulus;
 use crate::stability::HeldNumbers;

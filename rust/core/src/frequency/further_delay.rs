@@ -17,7 +17,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::circle::is_stable;
-use super::held::{Crossover, crossovers};
+use super::gain_crossovers::{Crossover, crossovers};
 use super::held_range::loss_of_delay;
 use crate::stability::HeldLoop;
 use crate::{Error, Task};
@@ -109,6 +109,17 @@ pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Erro
         "no loss of stability was met from a delay of {start} s to {delay} s, and none beyond is \
          ruled out: look at single delays with is_stable()"
     )
+}
+
+/// The stable range of the delay.
+///
+/// # Errors
+/// As for [`further_delay`].
+pub fn held_delay_range(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Error> {
+    let (further, _) = further_delay(held, task)?;
+    let start = held.delay();
+    let earlier = loss_of_delay(held, (start, 0.0), task)?;
+    Ok((earlier.unwrap_or(0.0), start + further))
 }
 
 /// Is the loop stable at a delay? `None` where rounding decides.

@@ -25,8 +25,7 @@
 //! the hold delays the fastest mode and crossover by a small part of the distance.
 
 use super::circle::is_stable;
-use super::further_delay::further_delay;
-use super::held::{FAR, crossovers, is_zero};
+use super::gain_crossovers::{FAR, crossovers, is_zero};
 use crate::dde::LinearLoop;
 use crate::stability::HeldLoop;
 use crate::{Error, Task};
@@ -36,6 +35,11 @@ use crate::{Error, Task};
 const SHARE: f64 = 0.5;
 const LEAST: f64 = 1e-4;
 const MOST: f64 = 0.5;
+
+/// Factor on the speed with which a distance changed in the last step, and the least speed that counts,
+/// rad a rad: smaller ones trust the past more and take less time.
+const FASTER: f64 = 3.0;
+const SLOWEST: f64 = 0.1;
 
 /// A step that reduces the distance below this share of it is taken again, shorter by the other.
 const KEPT: f64 = 0.5;
@@ -113,8 +117,8 @@ struct Look {
     is_stable: Option<bool>,
     /// To a loss of stability, at most 1 rad.
     distance: f64,
-    /// The same, where a slow crossover counts by its further delay.
-    room: f64,
+    /// The same of each crossover and factor, where a slow crossover counts by its further delay.
+    rooms: Vec<f64>,
     /// Do shorter samples change nothing?
     is_continuous: bool,
     /// The change of the value that turns something by a radian.
@@ -123,6 +127,28 @@ struct Look {
     longest: f64,
     /// Values at which L may change at once.
     jumps: Vec<f64>,
+}
+
+impl Look {
+    /// The turn within which stability is not expected to be lost, at most 1 rad: each distance over
+    /// its speed, which is one, or what it was since the look `before`, a turn ago, with a factor.
+    fn room(&self, before: Option<(&Self, f64)>) -> f64 {
+        let alike = before.filter(|(look, _)| look.rooms.len() == self.rooms.len());
+        let speed = |place: usize, room: f64| match alike {
+            Some((look, turn)) if turn > 0.0 => {
+                let change = look
+                    .rooms
+                    .get(place)
+                    .map_or(turn, |last| (room - last).abs());
+                (FASTER * change / turn).clamp(SLOWEST, 1.0)
+            }
+            _ => 1.0,
+        };
+        let rooms = self.rooms.iter().enumerate();
+        rooms.fold(1.0, |least, (place, room)| {
+            least.min(room / speed(place, *room))
+        })
+    }
 }
 
 struct Search<'a> {
@@ -179,17 +205,6 @@ pub(super) fn loss_of_delay(
     Ok((end != to).then_some(end))
 }
 
-/// The stable range of the delay.
-///
-/// # Errors
-/// As for [`held_range`] and [`further_delay`].
-pub fn held_delay_range(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Error> {
-    let (further, _) = further_delay(held, task)?;
-    let start = held.delay();
-    let earlier = loss_of_delay(held, (start, 0.0), task)?;
-    Ok((earlier.unwrap_or(0.0), start + further))
-}
-
 impl Search<'_> {
     /// The first loss of stability towards `bound`, or `bound`.
     fn end(&mut self, bound: f64) -> Result<f64, Error> {
@@ -204,7 +219,7 @@ impl Search<'_> {
             self.start
         );
         let last = self.last(bound)?;
-        let mut share = 1.0;
+        let (mut share, mut room) = (1.0, here.room(None));
         for _ in 0..STEPS {
             if here.value == last {
                 return self.at_last(bound, last);
@@ -212,7 +227,7 @@ impl Search<'_> {
             if here.is_continuous && sign < 0.0 {
                 return Ok(bound);
             }
-            let turn = (SHARE * share * here.room).clamp(LEAST, MOST);
+            let turn = (SHARE * share * room).clamp(LEAST, MOST);
             let step = (turn * here.unit).min(here.longest);
             let next = self.next(&here, sign * step, last);
             let there = self.look(next)?;
@@ -225,6 +240,7 @@ impl Search<'_> {
             {
                 share *= SHORTER;
             } else {
+                room = there.room(Some((&here, step / here.unit)));
                 here = there;
                 share = (2.0 * share).min(1.0);
             }
@@ -306,7 +322,8 @@ impl Search<'_> {
         let factors = numbers.factors(NEAR, self.task)?.unwrap_or_default();
         places.extend(factors.iter().map(|at| (at.omega, at.gain.ln().abs())));
         fastest = places.iter().fold(fastest, |most, place| most.max(place.0));
-        let (mut distance, mut room) = (1.0f64, 1.0f64);
+        let mut distance = 1.0f64;
+        let mut rooms = Vec::with_capacity(places.len());
         for (omega, size) in &places {
             // The turn of a slow crossover is small beside that of the fastest, or of one.
             let slow = match self.number {
@@ -314,7 +331,7 @@ impl Search<'_> {
                 Number::SampleTime | Number::Other => 1.0 / (omega * whole),
             };
             distance = distance.min(*size);
-            room = room.min(size * slow.max(1.0));
+            rooms.push(size * slow.max(1.0));
         }
         let is_abrupt = held.is_direct() || held.fastest() * period > ABRUPT;
         let usual = if self.start == 0.0 {
@@ -331,7 +348,7 @@ impl Search<'_> {
             value,
             is_stable: is_stable(&numbers, &found, self.task)?,
             distance,
-            room,
+            rooms,
             is_continuous: self.number == Number::SampleTime
                 && !held.is_direct()
                 && (held.fastest() + fastest) * period < CONTINUOUS * distance,
