@@ -102,8 +102,6 @@ def test_a_slow_integral_costs_no_memory():
 def test_turns_of_the_delay_are_followed_only_where_the_gain_reaches_one(Kp, Ki):
     """All turns with a gain above 0.3 were followed: 20 s for this margin, mostly of 0.5."""
     loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 1.0), dtm.PI(0.5, 1e-4), delay=0.3, sample_time=0.01)
-    late = loop.replace(delay=18136.0)
-    assert len(late._sampled_gain.resolved) < 3000
     slow = loop.replace(Kp=Kp, Ki=Ki)
     smooth = slow.continuous().margin().delay_margin
     assert slow.margin().delay_margin == pytest.approx(smooth, rel=1e-5)
