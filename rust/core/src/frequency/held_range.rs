@@ -87,7 +87,7 @@ const CONTINUOUS: f64 = 0.05;
 
 /// Distance between the last stable and the first unstable value, relative, between which rounding
 /// may hide which is which.
-const HIDDEN: f64 = 1e-3;
+const HIDDEN: f64 = 1e-5;
 
 /// Relative distances beyond a value at which rounding decides, where a loss of stability is seen.
 const BEYOND: [f64; 4] = [1e-11, 1e-9, 1e-7, 1e-5];
