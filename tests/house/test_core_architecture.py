@@ -21,7 +21,7 @@ CORE_ARROWS = {
     "roots": {"linear_algebra", "elementary", "lambertw", "quasipoly"},
     # Loops with a hold are stepped in `dde`.
     "stability": {"linear_algebra", "elementary", "lambertw", "quasipoly", "roots", "dde"},
-    "frequency": {"elementary", "quasipoly", "roots", "stability"},
+    "frequency": {"elementary", "quasipoly", "roots", "dde", "stability"},
     "dde": {"linear_algebra", "elementary"},
     "estimation": {"linear_algebra"},
 }
@@ -66,6 +66,10 @@ ORDER = {
         "argument",
         "chains",
         "margins",
+        "gain_crossovers",
+        "circle",
+        "held_range",
+        "further_delay",
         "held",
         "equation",
         "passage",

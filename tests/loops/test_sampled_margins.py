@@ -148,6 +148,70 @@ def test_a_delay_margin_of_more_than_two_hundred_samples():
     assert not loop.replace(delay=lost + 1e-4).is_stable()
 
 
+def response(loop, omega, delay):
+    """The loop gain with another delay in 60 digits, from the equations of the loop."""
+    import mpmath as mp
+
+    with mp.workdps(60):
+        model, period = loop.specification.model, mp.mpf(loop.sample_time)
+        n, exact = len(model.B), mp.mpf(delay)
+        whole = mp.floor(exact / period)
+        early = exact - whole * period
+        joined = mp.zeros(n + 1)
+        for i in range(n):
+            for j in range(n):
+                joined[i, j] = mp.mpf(float(model.A[i, j]))
+            joined[i, n] = mp.mpf(float(model.B[i]))
+        late, first = (mp.expm(joined * time) for time in (period - early, early))
+        moves = late[:n, :n] * first[:n, :n]
+        older, newer = late[:n, :n] * first[:n, n], late[:n, n]
+        z = mp.expj(mp.mpf(omega) * period)
+        states = mp.lu_solve(z * mp.eye(n) - moves, older / z + newer)
+        back = sum(mp.mpf(float(k)) * x for k, x in zip(model.K, states, strict=True))
+        return complex(-(back + mp.mpf(float(model.L)) / z) * z**-whole)
+
+
+#: Loops with a pole or a zero of the loop gain next to z = 1, and delay margins up to 1e12 samples.
+SLOW = [
+    *(sampled(dtm.FirstOrder(1.0, 1.0), dtm.PI(0.5, Ki), 0.1, 0.01) for Ki in (1e-10, 1e-8, 1e-5)),
+    *(sampled(dtm.Integrator(), dtm.P(Kp), 0.36) for Kp in (1e-10, 1e-4)),
+    sampled(dtm.FirstOrder(1.0, 1e7), dtm.P(3.0), 0.1, 0.01),
+    sampled(dtm.FirstOrder(1.0, 1e5), dtm.PI(0.5, 1e-7), 0.1, 0.01),
+    sampled(dtm.Integrator(1.0, 0.02), dtm.PID(1e-5, 1e-11, 1e-6, SMOOTH), 0.1, 0.05),
+    sampled(dtm.Integrator(), dtm.PV(1e-6, 0.2), 0.36),
+]
+
+
+@pytest.mark.parametrize("loop", SLOW)
+def test_a_margin_takes_no_more_work_next_to_one(loop):
+    """Work grew with one over Ki: 1.5 s at 1e-4, no end at 1e-5, and refused at 1e-10."""
+    pytest.importorskip("mpmath")
+    found = loop.margin()
+    assert found.stable
+    lost = loop.delay + found.delay_margin
+    assert abs(1.0 + response(loop, found.delay_margin_omega, lost)) < 1e-6
+    # No other crossover, which could turn to -1 earlier, and not a whole turn too late.
+    omega = np.geomspace(1e-3 * found.delay_margin_omega, np.pi / loop.sample_time, 3000)
+    above = np.abs(loop.frequency_response(omega)) > 1.0
+    assert np.count_nonzero(np.diff(above)) == 1
+    assert 0.0 < found.delay_margin * found.delay_margin_omega < 2.0 * math.pi
+
+
+def test_a_gain_margin_of_light_modes_with_few_digits():
+    """It was 961: the interval of the first crossing held zero, and so it was taken for that."""
+    plant = dtm.RationalPlant(
+        [2.838486838890161, 141.00499244570625, 34049.42923715788, 860824.0, 17721193.0],
+        [0.1334594903976515, 1.4141317837907716, 1594.0989301208474, 13288.57, 843457.7, 6243183.0],
+        0.001,
+    )
+    smooth = dtm.DerivativeFilter(57.2255121643435, 0.23802857142396533, "tustin")
+    loop = sampled(plant, dtm.PID(1.57637695, 0.00171426145, 0.07085253802, smooth), 0.0, 0.169357)
+    found = loop.margin().gain_margin
+    assert radius(loop, 1.001 * found) > 1.0 > radius(loop, 0.999 * found)
+    for factor in np.linspace(0.1, 0.99, 20) * found:
+        assert radius(loop, factor) < 1.0
+
+
 def test_an_unstable_sampled_loop_has_no_margins_but_crossings():
     found = sampled(dtm.Integrator(), dtm.P(9.0), 0.36).margin()
     assert not found.stable

@@ -22,7 +22,6 @@ from deadtime.loops._native import (
     MapBoundary,
     MapCells,
     held_boundaries,
-    held_crossings,
     held_map,
 )
 from deadtime.loops._plants import Plant
@@ -114,17 +113,6 @@ class HeldFamily:
             columns = self._held({self.along: self.axes[self.along]}, across, self.axes[across])
         along = (self.along, across)
         return held_boundaries(self._rows, columns, along=along, decay=decay, damping=damping)
-
-    def crossings(self, low: float, high: float) -> Array:
-        """Values of the only axis, a gain, between two at which a pole is on the unit circle."""
-        ((name, points),) = self.axes.items()
-        found = held_crossings(self._held({}, name, points), low, high)
-        if found is None:
-            raise ValueError(
-                f"the values of {name} at which a pole of this sampled loop is on the unit circle "
-                "are beyond double precision: a pole and a zero of its loop gain may cancel there"
-            )
-        return found[0]
 
     @cached_property
     def along(self) -> str | None:

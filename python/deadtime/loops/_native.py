@@ -13,7 +13,6 @@ from deadtime._deadtime import (
     fixed_step_run as fixed_step_run,
     gain_range as gain_range,
     held_boundaries as held_boundaries,
-    held_crossings as held_crossings,
     held_map as held_map,
     held_response as held_response,
     loop_sensitivities as loop_sensitivities,

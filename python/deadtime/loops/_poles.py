@@ -272,9 +272,9 @@ class LoopPoles:
         """Interval of one named number, around its present value, on which the loop is stable.
 
         The ends are the nearest values on either side at which a pole reaches the edge of
-        stability, or a neutral loop loses strong stability. None is passed over, however soon
-        stability is regained: of a continuous loop they are among all its `crossings`; of a
-        sampled one, steps are taken for which the loop gain on the unit circle keeps clear of -1.
+        stability, or a neutral loop loses strong stability. Of a continuous loop, and of the gains
+        of a sampled one, they are the next of all crossings, so that none is passed over. Other
+        numbers of a sampled loop are followed in steps bounded by its fastest mode.
 
         Parameters
         ----------
@@ -296,9 +296,13 @@ class LoopPoles:
 
         Notes
         -----
-        Of a sampled loop the frequencies at which the loop gain is looked at are dense, but chosen
-        by its poles, zeros and peaks and not by a proof. Of a neutral loop the last hundredth of
-        the way to where it loses strong stability is halved, not searched for all crossings.
+        What is not looked at: of a sampled loop, for numbers other than gains, what happens within
+        a step, between two values at which all crossovers and poles are known. A step is a share
+        of the distance to a loss of stability. An infinite end of such a number is a limit that
+        this distance reaches over decades, and no proof.
+
+        Of a neutral loop the last hundredth of the way to where it loses strong stability is
+        halved, not searched for all crossings.
 
         Examples
         --------

@@ -23,7 +23,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from deadtime._base.arrays import Array, Complex, Mask
+from deadtime._base.arrays import Array, Complex
 from deadtime._base.validation import real_array
 from deadtime.loops._model import LoopModel
 
@@ -184,27 +184,8 @@ class SampledLoopGain:
     @cached_property
     def angles(self) -> Array:
         """`corners`, and enough angles between them to resolve every turn due to the delay."""
-        return self._with_turns(np.full(len(self.corners) - 1, True))
-
-    @cached_property
-    def resolved(self) -> Array:
-        """As `angles`, but turns are resolved only where abs(L) may reach one."""
-        sizes = np.abs(self.at(self.corners))
-        with np.errstate(invalid="ignore"):
-            change = np.abs(np.diff(sizes))
-            # Peaks are corners, so between two corners abs(L) exceeds both by less than it changes
-            # in this gap or the ones beside it.
-            padded = np.pad(change, 1)
-            bound = np.maximum(sizes[1:], sizes[:-1]) + np.max(
-                [padded[:-2], change, padded[2:]], axis=0
-            )
-            return self._with_turns(~(bound < 1.0))
-
-    def _with_turns(self, chosen: Mask) -> Array:
-        """Divide the `chosen` gaps between corners so that the turns of the delay are resolved."""
         gaps = np.diff(self.corners)
         parts = np.ceil(gaps * (_PER_TURN * (self.whole + 1.0) / np.pi))
-        parts = np.where(chosen, np.maximum(parts, 1.0), 1.0)
         if parts.sum() > _MOST:
             raise ValueError(
                 f"{self.whole} samples of delay turn the loop gain too often to look at every "

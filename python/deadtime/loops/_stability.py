@@ -16,12 +16,10 @@ import deadtime.loops._native as native
 from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
 from deadtime.loops._factored_plant import PAIR
-from deadtime.loops._held import HeldFamily
 from deadtime.loops._model import LoopModel, refuse_discretised
 from deadtime.loops._native import sampled_abscissa_grid
 from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import Plant
-from deadtime.loops._sampled_ranges import SampledNumber
 from deadtime.roots import Parameter, QuasiPolynomial, RootSet
 
 #: Numbers of a loop that cannot be negative.
@@ -33,13 +31,10 @@ _KEEPS_SIGN = frozenset({"time_constant", *PAIR})
 #: Numbers of a filter.
 _OF_FILTER = frozenset({"omega", "damping"})
 
-#: Relative value below which a number counts as zero on the way down.
-_NEARLY_ZERO = 1e-6
-#: Largest gain at which crossings are looked for, relative to the largest one of the loop.
-_LARGEST_GAIN = 1e12
 
-#: Relative value up to which a sampled loop is followed where it may be stable for any value.
-_FARTHEST = 1e6
+#: Changes of a number, relative to it, for which the loop is compared to find whether it depends on
+#: the number: any two that are not special values.
+_CHANGES = (0.37, 0.71)
 
 
 def sampled_abscissa(model: LoopModel, delay: float, sample_time: float) -> float:
@@ -165,59 +160,50 @@ def sampled_range(
     plant: Plant, controller: Controller, values: Mapping[str, float], name: str
 ) -> tuple[float, float]:
     """Stable values of one number of a sampled loop, around its present one."""
-    number = SampledNumber(lambda given: LoopModel.build(plant, controller, given), values, name)
-    low, high = _bounds(plant, name, number.value)
-    if number.is_idle:
-        return low, high
+    value, bounds = values[name], _bounds(plant, name, values[name])
+
+    def loop(**changed: float) -> native.LinearLoop:
+        given = {**values, **changed}
+        model = LoopModel.build(plant, controller, given)
+        return model.native(given["delay"], given["sample_time"])
+
+    def at(changed: float) -> native.LinearLoop:
+        return loop(**{name: changed})
+
     if name == "delay":
-        before = number.loss(0.0)
-        native = LoopModel.build(plant, controller, values).native(
-            values["delay"], values["sample_time"]
-        )
-        return 0.0 if before is None else before.value, number.value + native.further_delay()[0]
-    smooth = controller._filter
-    in_samples = smooth is not None and smooth.discretisation is not None
-    if (name == "gain" or name in controller._gains()) and not in_samples:
-        return _gain_range(plant, controller, values, name, (low, high))
-    endless = name in _NON_NEGATIVE or _keeps_sign(plant, name)
-    return _sampled_end(number, low, -1.0, endless), _sampled_end(number, high, 1.0, endless)
+        return at(value).held_delay_range()
+    gains = controller._gains()
+    if name == "gain" or name in gains:
+        # The feedback is linear in the gains of the controller times the gain of the plant.
+        total = {gain: values[gain] * (values["gain"] if name != "gain" else 1.0) for gain in gains}
+        none = dict.fromkeys(gains, 0.0)
+        own = total if name == "gain" else {**none, name: values["gain"]}
+        rest = none if name == "gain" else {**total, name: 0.0}
+        return loop(gain=1.0, **rest).held_gain_range(loop(gain=1.0, **own), value, bounds)
+    if name != "sample_time" and _is_idle(plant, controller, values, name):
+        return bounds
+    return native.LinearLoop.held_range(at, name, value, bounds)
 
 
-def _gain_range(
-    plant: Plant,
-    controller: Controller,
-    values: Mapping[str, float],
-    name: str,
-    within: tuple[float, float],
-) -> tuple[float, float]:
-    """Between the crossings of the circle next to the present value of a gain."""
+def _is_idle(plant: Plant, controller: Controller, values: Mapping[str, float], name: str) -> bool:
+    """Whether the stability of a loop does not depend on a number."""
     value = values[name]
-    family = HeldFamily(plant, controller, dict(values), {name: np.array([value])})
-    gains = (value, *(values[gain] for gain in controller._gains()))
-    far = _LARGEST_GAIN * max(abs(gain) for gain in gains)
-    found = family.crossings(-far, far)
-    low, high = within
-    return (
-        float(max(found[found <= value], default=low)) if low < value else low,
-        float(min(found[found >= value], default=high)),
+    size = abs(value) if value != 0.0 else 1.0
+    here, *others = (
+        LoopModel.build(plant, controller, {**values, name: value + part * size})
+        for part in (0.0, *_CHANGES)
     )
 
-
-def _sampled_end(number: SampledNumber, end: float, sign: float, endless: bool) -> float:
-    """The end of a range; of an `endless` one nothing may be known beyond the farthest value."""
-    size = abs(number.value) if number.value != 0.0 else 1.0
-    if number.value == end:
-        return end
-    if end == 0.0:
-        found = number.loss(-sign * _NEARLY_ZERO * size)
-        return 0.0 if found is None else found.value
-    found = number.loss(sign * _FARTHEST * size if endless else end)
-    if found is None:
-        raise ValueError(
-            f"the loop is stable from {number.name}={number.value:g} to "
-            f"{sign * _FARTHEST * size:g}, and nothing beyond is ruled out"
+    def same(one: Any, other: Any, matrices: tuple[str, ...]) -> bool:
+        return all(
+            np.array_equal(getattr(one, matrix), getattr(other, matrix)) for matrix in matrices
         )
-    return found.value
+
+    return all(
+        same(here, other, ("A", "B", "K", "L"))
+        and (here.update is None or same(here.update, other.update, ("states", "command")))
+        for other in others
+    )
 
 
 def _bounds(plant: Plant, name: str, value: float) -> tuple[float, float]:

@@ -1,15 +1,14 @@
 //! Bindings of `deadtime::stability` for loops with a hold.
 
-use deadtime::stability::{self, Crossing, LoopRows};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use deadtime::stability::{self, LoopRows};
+use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 
-use crate::arrays::{column, in_order};
+use crate::arrays::in_order;
 use crate::runtime::run;
 use crate::stability::{MapBoundary, MapCells, MapQuestion, cells_of, curves_of, specification};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Loops in rows, along which a gain varies: every array holds one entry for all rows, or one a row.
 #[derive(FromPyObject)]
@@ -115,34 +114,4 @@ pub(crate) fn held_boundaries(
     let mut curves = curves_of(py, &along[0], &row_curves)?;
     curves.extend(curves_of(py, &along[1], &column_curves)?);
     Ok(curves)
-}
-
-/// The values of the gain between two, and the frequencies, at which a pole of the first row is on
-/// the unit circle; None where they are beyond double precision.
-#[pyfunction]
-pub(crate) fn held_crossings<'py>(
-    py: Python<'py>,
-    rows: HeldRows<'_>,
-    low: f64,
-    high: f64,
-) -> PyResult<Option<(Vector<'py>, Vector<'py>)>> {
-    let found = rows.with(|rows| {
-        run(py, None, None, |task| {
-            stability::held_crossings(rows, (low, high), task)
-        })
-    })?;
-    found
-        .map(|found| {
-            // Zero, where rounding does not tell it from that.
-            let gain = |at: &Crossing| {
-                if at.low <= 0.0 && at.high >= 0.0 {
-                    0.0
-                } else {
-                    at.gain
-                }
-            };
-            let gains = column(&found, gain)?.into_pyarray(py);
-            Ok((gains, column(&found, |at| at.omega)?.into_pyarray(py)))
-        })
-        .transpose()
 }

@@ -54,7 +54,7 @@ mod _deadtime {
         end_of_gain, gain_range, loop_margins, ratio,
     };
     #[pymodule_export]
-    use super::held::{held_boundaries, held_crossings, held_map};
+    use super::held::{held_boundaries, held_map};
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]

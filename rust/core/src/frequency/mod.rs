@@ -4,16 +4,21 @@
 //! frequency made of them, `squares` the difference of two moduli; `zeros` finds all their zeros up
 //! to the frequencies of `bounds`. From these are `margins` of a loop, and of an `equation` in which
 //! one number varies the `crossings`, those of `delays` and `multiples` of one, and stable `ranges`.
-//! `held` has the margins of loops with a hold. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
+//! Of loops with a hold `gain_crossovers` has those, `circle` counts poles by them, `held_range` follows one
+//! number, `further_delay` the delay, and `held` has the margins. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
 //! their phases; `polynomial` finds roots of small polynomials.
 
 mod argument;
 mod bounds;
 mod chains;
+mod circle;
 mod crossings;
 mod delays;
 mod equation;
+mod further_delay;
+mod gain_crossovers;
 mod held;
+mod held_range;
 mod margins;
 mod multiples;
 mod passage;
@@ -29,7 +34,9 @@ pub use argument::argument;
 pub use bounds::end_of_gain;
 pub use crossings::{Crossings, crossings};
 pub use delays::{delay_margin, delay_range};
-pub use held::{further_delay, held_margins};
+pub use further_delay::{further_delay, held_delay_range};
+pub use held::held_margins;
+pub use held_range::{Number, gain_range_held, held_range};
 pub use margins::{Margins, margins};
 pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};

@@ -187,6 +187,11 @@ impl<S: Scalar> LinearLoop<S> {
         Ok(self)
     }
 
+    /// The same loop with another delay.
+    pub(crate) fn with_delay(self, delay: S) -> Self {
+        Self { delay, ..self }
+    }
+
     /// The change of the states at a sample; none where there is none.
     pub fn update(&self) -> Option<&Update> {
         self.update.as_ref()

@@ -36,6 +36,9 @@ const MAX_DOUBLINGS: u32 = 60;
 /// Upper limit on Newton's steps for one zero.
 const MAX_ITERATIONS: u32 = 30;
 
+/// Upper limit on Newton's steps within its proved interval.
+const MAX_POLISHING: u32 = 4;
+
 /// Length of the next step tried, in lengths of the last one.
 const STRIDE: f64 = 2.5;
 
@@ -210,15 +213,24 @@ impl<'a> Search<'a> {
         let slope = zero.f[1];
         let room = slope.abs() - self.bounds.error[1];
         if room > 0.0 {
-            // F(0) = 0, and up to here F′ keeps its sign.
-            let bend = zero.f[2].abs() + self.bounds.error[2];
-            let length = quadratic(room, -bend, -0.5 * self.bounds.third) * SHARE;
             self.record(&zero, 0.0, Some(if slope > 0.0 { -1 } else { 1 }))?;
-            let limit = self.top.min(self.bounds.reach);
-            for share in STARTS {
-                let next = self.pencil.at((share * length).min(limit));
-                if self.is_clear(&next) {
-                    return Some(next);
+            // With bounds of a usual step, then with those of the length that they prove.
+            for is_second in [false, true] {
+                // F(0) = 0, and up to here F′ keeps its sign.
+                let room = slope.abs() - self.bounds.error[1];
+                let bend = zero.f[2].abs() + self.bounds.error[2];
+                let length = quadratic(room, -bend, -0.5 * self.bounds.third) * SHARE;
+                let limit = self.top.min(self.bounds.reach);
+                for share in STARTS {
+                    let next = self.pencil.at((share * length).min(limit));
+                    if self.is_clear(&next) {
+                        return Some(next);
+                    }
+                }
+                if !is_second {
+                    self.is_flat = true;
+                    let length = length.min(limit);
+                    self.bounds = self.pencil.bounds(0.0, length, length)?;
                 }
             }
         }
@@ -354,7 +366,10 @@ impl<'a> Search<'a> {
                 let radius = 2.0 * (value.abs() + error[0]) / slope.abs() * ENLARGED;
                 let loss = error[1] + radius * (bend.abs() + error[2] + radius * self.bounds.third);
                 if loss < 0.5 * slope.abs() {
-                    return self.record(&best, radius, jump);
+                    let before = self.found.len();
+                    self.record(&best, radius, jump)?;
+                    self.polish(before, &best, radius);
+                    return Some(());
                 }
                 break;
             }
@@ -378,6 +393,27 @@ impl<'a> Search<'a> {
         let half = 0.5 * (high - low);
         let middle = self.pencil.at(low + half);
         self.record(&middle, half * ENLARGED, jump)
+    }
+
+    /// Improve the gain stored last, whose interval is kept, by the zero to the rounding of F, which
+    /// is far less than its bound.
+    fn polish(&mut self, before: usize, at: &Point, radius: f64) {
+        let mut best = *at;
+        for _ in 0..MAX_POLISHING {
+            let next = self.pencil.at(best.t - best.f[0] / best.f[1]);
+            if (next.t - at.t).abs() > radius || next.f[0].abs() >= best.f[0].abs() {
+                break;
+            }
+            best = next;
+        }
+        if let (Varied::Gain(_), Some(crossing)) = (self.varied, self.found.get_mut(before)) {
+            let (a, b) = (best.a, best.b);
+            let gain = -(a.re * b.re + a.im * b.im) / b.norm_sqr();
+            if gain >= crossing.low && gain <= crossing.high {
+                crossing.gain = gain;
+                crossing.omega = best.s.im;
+            }
+        }
     }
 
     /// Store the crossing within `radius` of `point`, if its k may lie in the range.

@@ -8,7 +8,7 @@
 use super::model::{LoopPolynomials, Polynomial, share_of_errors};
 use crate::parallel;
 use crate::quasipoly::QuasiPolynomial;
-use crate::stability::crossings::{Crossing, Members, crossings};
+use crate::stability::crossings::{Crossing, Members};
 use crate::stability::hold::Hold;
 use crate::stability::map::{Chart, Lines, Proof, Question, Vertex, join_both};
 use crate::stability::specification::Specification;
@@ -151,23 +151,6 @@ pub fn held_boundaries(
     let columns = columns.map(|columns| columns.lines(specification, task));
     let found = rows.lines(specification, task)?;
     Ok(join_both(&found, columns.transpose()?.as_ref()))
-}
-
-/// All crossings of the first row with k in `range`; `None` where they are beyond double precision.
-///
-/// # Errors
-/// As for [`held_map`].
-pub fn held_crossings(
-    rows: &LoopRows<'_>,
-    range: (f64, f64),
-    task: &Task,
-) -> Result<Option<Vec<Crossing>>, Error> {
-    let numbers = rows.numbers(0, None)?;
-    match &numbers.parts {
-        None => Ok(None),
-        Some((_, b)) if b.is_zero() => Ok(Some(Vec::new())),
-        Some((a, b)) => crossings(a, b, Specification::default(), numbers.hold, range, task),
-    }
 }
 
 impl<'a> LoopRows<'a> {

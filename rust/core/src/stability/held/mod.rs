@@ -7,7 +7,7 @@ mod map;
 mod model;
 mod single;
 
-pub use map::{LoopRows, held_boundaries, held_crossings, held_map};
+pub use map::{LoopRows, held_boundaries, held_map};
 pub use single::{HeldLoop, HeldNumbers};
 
 #[cfg(test)]

@@ -210,10 +210,7 @@ impl LoopPolynomials {
         }
         Self {
             delay,
-            a: Polynomial {
-                coefficients: a.iter().map(|c| c.high).collect(),
-                errors: a_moduli.iter().map(|size| ROUGHNESS * size).collect(),
-            },
+            a: Polynomial::known(a.iter().copied().zip(a_moduli.iter().copied())),
             units: Vec::new(),
             a_exact: a,
             a_moduli,
@@ -224,7 +221,7 @@ impl LoopPolynomials {
 
     /// b for this feedback.
     pub(super) fn feedback(&self, k: &[f64], l: f64) -> Polynomial {
-        let mut found = Polynomial::default();
+        let mut found = Vec::with_capacity(self.forward.len());
         let powers = self.forward.iter().zip(&self.forward_moduli);
         for ((vector, moduli), (a, a_size)) in powers.zip(self.a_exact.iter().zip(&self.a_moduli)) {
             let mut sum = *a * l;
@@ -236,8 +233,22 @@ impl LoopPolynomials {
                 sum = sum + *entry * k;
                 size += k.abs() * modulus;
             }
-            found.coefficients.push(sum.high);
-            found.errors.push(ROUGHNESS * size);
+            found.push((sum, size));
+        }
+        Polynomial::known(found.into_iter())
+    }
+}
+
+impl Polynomial {
+    /// From coefficients and sums of moduli. One below its error is taken as exactly zero: a zero and
+    /// a pole at z = 1 of a controller cancel, and what rounding leaves of them would count as a root.
+    fn known(coefficients: impl Iterator<Item = (DoubleDouble, f64)>) -> Self {
+        let mut found = Self::default();
+        for (c, size) in coefficients {
+            let error = ROUGHNESS * size;
+            let is_zero = c.high.abs() <= error;
+            found.coefficients.push(if is_zero { 0.0 } else { c.high });
+            found.errors.push(if is_zero { 0.0 } else { error });
         }
         found
     }

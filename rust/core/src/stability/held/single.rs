@@ -6,7 +6,8 @@ use super::model::{LoopPolynomials, share_of_errors};
 use crate::dde::LinearLoop;
 use crate::dde::control_loop::sampled;
 use crate::linear_algebra::balance::balanced_norm;
-use crate::quasipoly::QuasiPolynomial;
+use crate::linear_algebra::eigenvalues::eigenvalues;
+use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::stability::branches::rightmost;
 use crate::stability::cell::Cell;
 use crate::stability::crossings::{Crossing, count, crossings};
@@ -17,6 +18,13 @@ use crate::{Error, Task};
 
 /// Samples in the delay up to which eigenvalues are computed.
 const FEW: f64 = 10.0;
+
+/// A rate this small beside the largest one is that of an integrator.
+const AT_REST: f64 = 1e-9;
+
+/// Distance of a pole from the circle that counts at least: a smaller one sees narrower resonances
+/// where two meet and takes longer.
+const CLOSEST: f64 = 1e-3;
 
 /// A sampled loop whose polynomials can be formed at any delay.
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +68,51 @@ impl<'a> HeldLoop<'a> {
         balanced_norm(&equations.a, equations.states())
     }
 
+    /// The frequency of the fastest oscillation of plant and controller that does not decay by more
+    /// than e^(−`decay`) in a sample, rad/s.
+    pub fn fastest_oscillation(&self, decay: f64) -> f64 {
+        let modes = self.modes();
+        let lasting = modes.iter().filter(|s| s.re * self.sample_time > -decay);
+        lasting.fold(0.0, |most, s| most.max(s.im.abs()))
+    }
+
+    /// The relative change of the distance between e^(λ Ts) and the next pole on a relative change of
+    /// Ts, largest of such oscillations; within their own distance from the circle poles are one.
+    pub fn fastest_meeting(&self, decay: f64) -> f64 {
+        let modes = self.modes();
+        let poles: Vec<Complex64> = modes.iter().map(|s| (s * self.sample_time).exp()).collect();
+        let mut most = 0.0f64;
+        for (i, (s, z)) in modes.iter().zip(&poles).enumerate() {
+            if s.im <= 0.0 || s.re * self.sample_time <= -decay {
+                continue;
+            }
+            let others = poles.iter().enumerate().filter(|(j, _)| *j != i);
+            let next = others.fold(1.0f64, |least, (_, other)| least.min(modulus(z - other)));
+            let own = (1.0 - modulus(*z)).abs().max(CLOSEST);
+            most = most.max(modulus(*s) * self.sample_time / next.max(own));
+        }
+        most
+    }
+
+    /// The same loop with another delay.
+    pub(crate) fn with_delay(&self, delay: f64) -> LinearLoop {
+        self.plant.clone().with_delay(delay)
+    }
+
+    /// The longest time constant of plant and controller that decays or grows, s.
+    pub fn slowest(&self) -> f64 {
+        let modes = self.modes();
+        let largest = modes.iter().fold(0.0f64, |most, s| most.max(modulus(*s)));
+        let rates = modes.iter().map(|s| s.re.abs());
+        let least = rates.filter(|rate| *rate > AT_REST * largest);
+        1.0 / least.fold(f64::INFINITY, f64::min)
+    }
+
+    fn modes(&self) -> Vec<Complex64> {
+        let equations = self.plant.equations();
+        eigenvalues(&equations.a, equations.states()).unwrap_or_default()
+    }
+
     /// Does the command act on the feedback at once when it arrives?
     pub fn is_direct(&self) -> bool {
         self.plant.equations().l != 0.0
@@ -77,6 +130,47 @@ impl<'a> HeldLoop<'a> {
         }
         let numbers = self.at(self.delay())?;
         Ok(rightmost(&numbers.h()?, numbers.hold, task)?.abscissa)
+    }
+
+    /// The values in `range` of a gain, whose factor is the feedback of `slope`, at which a pole of
+    /// this loop and it together is on the circle; `None` where that is beyond double precision.
+    ///
+    /// # Errors
+    /// As [`at`](Self::at); [`Error::Interrupted`].
+    pub fn gain_crossings(
+        &self,
+        slope: &LinearLoop,
+        range: (f64, f64),
+        task: &Task,
+    ) -> Result<Option<Vec<Crossing>>, Error> {
+        let model = LoopPolynomials::of_loop(self.plant, self.delay(), self.sample_time)?;
+        let [constant, factor] = [self.plant, slope].map(|of| {
+            let equations = of.equations();
+            model.feedback(&equations.k, equations.l)
+        });
+        let coefficients = share_of_errors(
+            &[&model.a, &constant, &factor],
+            model.delay,
+            self.sample_time,
+        );
+        if !coefficients.is_finite() {
+            return Ok(None);
+        }
+        let negative = |row: &[f64]| row.iter().map(|c| -c).collect::<Vec<f64>>();
+        let a = vec![
+            model.a.coefficients.clone(),
+            negative(&constant.coefficients),
+        ];
+        let a = QuasiPolynomial::new(a, vec![0.0, model.delay])?;
+        let b = QuasiPolynomial::new(vec![negative(&factor.coefficients)], vec![model.delay])?;
+        if b.is_zero() {
+            return Ok(Some(Vec::new()));
+        }
+        let hold = Hold {
+            sample_time: self.sample_time,
+            coefficients,
+        };
+        crossings(&a, &b, Specification::default(), hold, range, task)
     }
 
     /// The polynomials at another delay. Factors that both have in common are left out where they
@@ -116,6 +210,26 @@ impl HeldNumbers {
         (&self.a, &self.b)
     }
 
+    /// Ts, s.
+    pub fn sample_time(&self) -> f64 {
+        self.hold.sample_time
+    }
+
+    /// d, s.
+    pub fn delay(&self) -> f64 {
+        self.delay
+    }
+
+    /// Errors of the coefficients, relative to sums of moduli.
+    pub fn errors(&self) -> f64 {
+        self.hold.coefficients
+    }
+
+    /// σ at s = jω.
+    pub fn variable(&self, omega: f64) -> Complex64 {
+        self.hold.at(Complex64::new(0.0, omega)).0
+    }
+
     fn h(&self) -> Result<QuasiPolynomial, Error> {
         let b = self.b.iter().map(|c| -c).collect();
         QuasiPolynomial::new(vec![self.a.clone(), b], vec![0.0, self.delay])
@@ -130,18 +244,13 @@ impl HeldNumbers {
         count(&self.h()?, specification, self.hold, task)
     }
 
-    /// Are all poles inside the circle? By the proved count, and by the abscissa of the eigenvalues
-    /// where a pole is too close to the circle for a proof.
+    /// Are all poles inside the circle, by the proved count? `None` where rounding decides.
     ///
     /// # Errors
     /// As [`count`](Self::count).
-    pub fn is_stable(&self, task: &Task) -> Result<bool, Error> {
+    pub fn is_stable(&self, task: &Task) -> Result<Option<bool>, Error> {
         let cell = self.count(Specification::default(), task)?;
-        if cell.status == CellStatus::Ok {
-            return Ok(cell.unstable == 0);
-        }
-        let found = rightmost(&self.h()?, self.hold, task)?;
-        Ok(found.abscissa.is_some_and(|abscissa| abscissa < 0.0))
+        Ok((cell.status == CellStatus::Ok).then_some(cell.unstable == 0))
     }
 
     /// The places on the circle, with factors k in `range`, at which k L = −1; `None` where that is
@@ -161,16 +270,18 @@ impl HeldNumbers {
         crossings(&a, &b, Specification::default(), self.hold, range, task)
     }
 
-    /// The loop gain L at s = jω.
-    pub fn gain(&self, omega: f64) -> Complex64 {
-        let s = Complex64::new(0.0, omega);
-        let (sigma, _) = self.hold.at(s);
+    /// a and e^(−s d) b at s = jω: the loop gain is minus their ratio.
+    pub fn parts(&self, omega: f64) -> (Complex64, Complex64) {
+        let sigma = self.variable(omega);
         let value = |row: &[f64]| {
             row.iter()
                 .rev()
                 .fold(Complex64::ZERO, |sum, c| sum * sigma + c)
         };
         let (sine, cosine) = crate::elementary::sin_cos(omega * self.delay);
-        -value(&self.b) / value(&self.a) * Complex64::new(cosine, -sine)
+        (
+            value(&self.a),
+            value(&self.b) * Complex64::new(cosine, -sine),
+        )
     }
 }
