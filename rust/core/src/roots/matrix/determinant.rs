@@ -22,6 +22,11 @@ use crate::{Error, Task};
 /// Upper limit on the roots that can be requested.
 const MAX_WANTED: usize = 1000;
 
+/// Half of the largest square whose roots are said to be too close together, in units of the distance
+/// from 0 and the rate of the system. Larger: roots apart from one another are blamed; smaller:
+/// clusters are not named.
+const CLOSE_TOGETHER: f64 = 0.3;
+
 /// Factorisations along the axis before a root right of it is searched for.
 const AT_A_GLANCE: u64 = 2_000;
 
@@ -147,7 +152,7 @@ fn explained(system: &Irreducible, place: Option<Complex64>, error: Error, task:
         return error;
     };
     let mut walker = MatrixWalker::new(system, task, MOST_WITH_CLUSTERS);
-    match walker.cluster(place, modulus(place) + system.rate()) {
+    match walker.cluster(place, CLOSE_TOGETHER * (modulus(place) + system.rate())) {
         Ok(Some(disc)) if disc.multiplicity > 1 => Error::CountMismatch {
             counted: disc.multiplicity.into(),
             found: Vec::new(),
@@ -227,6 +232,10 @@ pub(super) fn is_stable(system: &Irreducible, task: &Task) -> Result<bool, Error
                 Ok(true) => return Ok(false),
                 Err(error) if error.ends_all() => return Err(error),
                 _ => {}
+            }
+            if system.is_neutral() {
+                // A line beside chains takes many steps wherever it lies.
+                return is_none(count(system, &Region::right_of(0.0), task));
             }
             // Next to a cluster a line takes very short steps; discs of all its roots do without.
             match rightmost(system, 1, task) {

@@ -57,11 +57,8 @@ pub(super) fn from_guesses(
     let mut walker = MatrixWalker::new(prepared.system, task, LINE_LIMIT);
     let step = 1.0 / prepared.system.longest();
     let mut guesses = starts(prepared.system, &mut walker);
-    let mut ahead: Vec<f64> = guesses
-        .split_off(guesses.len().min(n + MORE_STARTS))
-        .iter()
-        .map(|s| s.re)
-        .collect();
+    let mut others = guesses.split_off(guesses.len().min(n + MORE_STARTS));
+    let mut ahead: Vec<f64> = others.iter().map(|s| s.re).collect();
     let mut search = Search::new(&mut walker);
     let mut last = None;
     for _ in 0..MAX_LINES {
@@ -103,6 +100,7 @@ pub(super) fn from_guesses(
         guesses.clone_from(&hints);
         sort_down(&mut guesses, |guess| guess.re);
         guesses.truncate(MAX_HINTS);
+        guesses.extend(others.drain(..).filter(|guess| guess.re > sigma - step));
         last = Some(Line {
             sigma,
             count,

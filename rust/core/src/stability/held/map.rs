@@ -8,7 +8,7 @@
 use super::model::{LoopPolynomials, Polynomial, share_of_errors};
 use crate::parallel;
 use crate::quasipoly::QuasiPolynomial;
-use crate::stability::crossings::{Crossing, Members};
+use crate::stability::crossings::Members;
 use crate::stability::hold::Hold;
 use crate::stability::map::{Chart, Lines, Proof, Question, Vertex, join_both};
 use crate::stability::specification::Specification;
