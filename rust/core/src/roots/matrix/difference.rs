@@ -172,13 +172,17 @@ impl Difference {
         self.terms.is_empty()
     }
 
+    pub(super) fn number_of_terms(&self) -> usize {
+        self.terms.len()
+    }
+
     fn angles(&self) -> usize {
         self.terms.len().saturating_sub(1)
     }
 
     /// C at the angles of all terms but the first, on Re s = `sigma`, and a bound on its rounding
     /// errors.
-    fn at(&self, sigma: f64, angles: &[f64]) -> (Rows, f64) {
+    pub(super) fn at(&self, sigma: f64, angles: &[f64]) -> (Rows, f64) {
         let mut sum = Rows::zeros(self.size);
         let mut lost = self.loss;
         let angles = std::iter::once(&0.0).chain(angles);
@@ -471,7 +475,7 @@ fn frobenius(matrix: &Rows) -> f64 {
 }
 
 /// A bound on the spectral norm.
-fn norm(matrix: &Rows) -> f64 {
+pub(super) fn norm(matrix: &Rows) -> f64 {
     let n = matrix.size;
     let mut columns = vec![0.0; n];
     let mut largest = 0.0f64;

@@ -11,7 +11,7 @@
 //! close together by its Taylor series, `starts` guesses the
 //! rightmost ones from a linearisation, `leading` proves that these are the rightmost.
 //! `outer` bounds the roots of half planes by norms, `difference` bounds the chains of neutral
-//! systems. All statements are proved for the matrices as
+//! systems, `quotient` the roots beside them. All statements are proved for the matrices as
 //! given, however large or small their entries are. The accuracy of a root depends on how regular M
 //! is next to it; where rounding errors hide on which side of a line it lies, the result is an
 //! error.
@@ -30,6 +30,7 @@ mod newton;
 mod outer;
 mod prepared;
 mod product;
+mod quotient;
 mod simple_root;
 mod starts;
 mod system;

@@ -12,6 +12,7 @@
 
 use super::difference::Difference;
 use super::factor::{ROUNDING, factor};
+use super::quotient::Value;
 use super::system::Irreducible;
 use crate::elementary::exp_above;
 use crate::linear_algebra::rows::Rows;
@@ -48,6 +49,8 @@ const LEAST_RADIUS: f64 = 1e-100;
 #[derive(Debug, Clone)]
 pub(super) struct Leading {
     delays: Vec<f64>,
+    /// F A_j, and bounds on the norms of their errors.
+    products: Vec<(Rows, f64)>,
     /// |F A_j|.
     values: Vec<Vec<Vec<f64>>>,
     /// |F N_j|; for delay 0 |Y|.
@@ -61,12 +64,6 @@ impl Leading {
     pub(super) fn new(system: &Irreducible) -> Result<Self, Error> {
         let n = system.size();
         let (e, _) = system.dense(0);
-        let mut rows = Rows::zeros(n);
-        for (i, row) in e.iter().enumerate() {
-            for (j, x) in row.iter().enumerate() {
-                rows.add(i, j, Complex64::new(*x, 0.0));
-            }
-        }
         let singular = || {
             Error::argument(
                 "E is singular, or too close to it to verify its inverse: half planes need an E \
@@ -74,7 +71,7 @@ impl Leading {
                  four sides are closed",
             )
         };
-        let inverse = factor(rows).ok_or_else(singular)?.inverse;
+        let inverse = factor(real(&e)).ok_or_else(singular)?.inverse;
         let product = |matrix: &[Vec<f64>]| {
             let mut found = vec![vec![0.0; n]; n];
             let mut moduli = found.clone();
@@ -114,10 +111,13 @@ impl Leading {
         }
         let unit = above(&own);
         let (mut values, mut slopes) = (Vec::new(), vec![unit.clone()]);
+        let mut products = Vec::new();
         let mut late = Vec::new();
         for (index, delay) in system.delays().iter().enumerate() {
             let (slope, value) = system.dense(index);
-            values.push(above(&product(&value)));
+            let value = product(&value);
+            values.push(above(&value));
+            products.push((real(&value.0), frobenius(&value.1)));
             if index > 0 {
                 let product = product(&slope);
                 slopes.push(above(&product));
@@ -131,6 +131,7 @@ impl Leading {
         }
         Ok(Self {
             delays: system.delays().to_vec(),
+            products,
             values,
             slopes,
             difference: Difference::new(n, late, frobenius(&unit)),
@@ -201,10 +202,22 @@ impl Leading {
                 best = best.min(norm(&values, y) / (1.0 - share) * MARGIN);
             }
         }
-        if best.is_infinite()
+        let neutral = !self.difference.is_trivial();
+        if (neutral || best.is_infinite())
             && let Some(inverse) = self.difference.inverse_bound(sigma, task)?
         {
-            best = inverse * frobenius(&values) * MARGIN;
+            best = best.min(inverse * frobenius(&values) * MARGIN);
+            if neutral {
+                let parts = self.products.iter().zip(&weights);
+                let parts = parts.map(|((matrix, lost), weight)| Value {
+                    matrix: matrix.clone(),
+                    lost: *lost,
+                    weight: *weight,
+                });
+                let parts: Vec<Value> = parts.collect();
+                let bound = self.difference.quotient_bound(sigma, &parts, task)?;
+                best = best.min(bound.unwrap_or(f64::INFINITY));
+            }
         }
         if best.is_finite() {
             Ok(best.max(LEAST_RADIUS))
@@ -217,6 +230,17 @@ impl Leading {
             )
         }
     }
+}
+
+/// A real matrix as a complex one.
+fn real(matrix: &[Vec<f64>]) -> Rows {
+    let mut rows = Rows::zeros(matrix.len());
+    for (i, row) in matrix.iter().enumerate() {
+        for (j, x) in row.iter().enumerate() {
+            rows.add(i, j, Complex64::new(*x, 0.0));
+        }
+    }
+    rows
 }
 
 fn weighted(matrices: &[Vec<Vec<f64>>], weights: &[f64]) -> Vec<Vec<f64>> {
