@@ -30,7 +30,7 @@ pub use bounds::end_of_gain;
 pub use crossings::{Crossings, crossings};
 pub use delays::{delay_margin, delay_range};
 pub use held::{further_delay, held_margins};
-pub use margins::{Margins, margins};
+pub use margins::{Margins, margins, margins_of_ratio};
 pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};
 pub use ratio::{first_term, ratio};
