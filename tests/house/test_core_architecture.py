@@ -41,7 +41,7 @@ ORDER = {
         "hessenberg",
         "eigenvalues",
     ],
-    "roots": ["region", "disc", "root_set", "chains", "counting", "locating", "matrix"],
+    "roots": ["region", "disc", "root_set", "chains", "counting", "locating", "ratio", "matrix"],
     "stability": [
         "family",
         "specification",

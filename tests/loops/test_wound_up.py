@@ -120,7 +120,9 @@ def test_no_step_is_called_settled_that_leaves_its_band_later(kind):
 
 
 @pytest.mark.survey
-@pytest.mark.parametrize("kind", range(12))
+@pytest.mark.parametrize(
+    "kind", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, 12))]
+)
 def test_no_step_of_a_thousand_is_called_settled_that_leaves_its_band_later(kind):
     claims, settled = check(kind, 90, 1, (None, 60.0, 800.0), longest=4000.0)
     assert claims >= 0.5 * settled > 0

@@ -105,12 +105,13 @@ def check(seeds, largest):
 
 
 def test_repeated_roots_are_never_wrong_and_decided_where_the_matrices_decide():
-    check(range(24), largest=5)
+    check(range(12), largest=4)
 
 
 @pytest.mark.survey
-def test_300_systems_with_repeated_roots_are_never_wrong():
-    check(range(24, 324), largest=20)
+@pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.long)])
+def test_many_systems_with_repeated_roots_are_never_wrong(count):
+    check(range(24, 24 + count), largest=20)
 
 
 def test_decoupled_equal_states_have_one_double_root():

@@ -95,14 +95,15 @@ def test_every_change_of_a_family_is_at_a_boundary(name):
 
 
 #: Near Kp = delay Ki the loop gain is flat at z = 1, and its crossings are beyond double precision.
+LONG = pytest.mark.long
 FLAT = pytest.mark.xfail(reason="rows of a sampled double integrator that no search decides")
 
 
 @pytest.mark.survey
 @pytest.mark.parametrize(
     ("plant", "sample_time"),
-    [(plant, None) for plant in PLANTS]
-    + [pytest.param(p, 0.05, marks=FLAT if p == "integrator" else ()) for p in PLANTS],
+    [pytest.param(plant, None, marks=LONG if k else ()) for k, plant in enumerate(PLANTS)]
+    + [pytest.param(p, 0.05, marks=(LONG, FLAT) if p == "integrator" else LONG) for p in PLANTS],
 )
 def test_every_change_over_any_pair_is_at_a_boundary(plant, sample_time):
     names = GAINS if sample_time else tuple(RANGES)

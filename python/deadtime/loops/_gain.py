@@ -15,7 +15,7 @@ from deadtime.loops._characteristic import closed_loop, open_loop
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.loops._specification import LoopSpecification
 from deadtime.loops._stability import sampled_is_stable
-from deadtime.systems import Margins, TransferFunction, margins_of
+from deadtime.systems import Margins, TransferFunction, margins, margins_of
 
 
 class LoopGain:
@@ -110,7 +110,8 @@ class LoopGain:
         """The margins; without the delay margin, which is NaN, where a sampled loop may save it."""
         loop = self.specification
         if loop.sample_time is None:
-            return self.open_loop().margin()
+            gain = self.open_loop()
+            return margins(gain.num, gain.den, all_modes=True)
         _ = loop.known_delay
         return margins_of(loop.native.held_margins(delay_margin))
 

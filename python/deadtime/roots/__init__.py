@@ -8,9 +8,9 @@ independent program checks.
 
 # The files. `_quasipolynomial` and `_parametric` are the functions, `_characteristic` the questions
 # about their roots, `_root_set`, `_chains`, `_sensitivity` and `_expansion` the answers.
-# `_crossings` varies one number. `_determinant` and `_matrix_roots` serve systems of matrices,
-# `_scalar_delay` the scalar equation. `certificate` holds proofs of root counts and an independent
-# program that checks them.
+# `_crossings` varies one number, `_ratio` leaves out the roots of a numerator. `_determinant` and
+# `_matrix_roots` serve systems of matrices, `_scalar_delay` the scalar equation. `certificate`
+# holds proofs of root counts and an independent program that checks them.
 
 from deadtime.roots._chains import Chain
 from deadtime.roots._characteristic import Edge as Edge
@@ -33,6 +33,7 @@ from deadtime.roots._matrix_roots import (
 from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial, parameters
 from deadtime.roots._plots import plot_root_set as plot_root_set
 from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, is_number as is_number, s
+from deadtime.roots._ratio import Ratio as Ratio
 from deadtime.roots._root_set import RootSet
 from deadtime.roots._scalar_delay import dde_roots, rightmost_branches
 from deadtime.roots._sensitivity import RootSensitivity

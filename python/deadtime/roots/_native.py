@@ -6,6 +6,7 @@ from deadtime._deadtime import (
     Family as Family,
     Monotone as Monotone,
     QuasiPolynomial as QuasiPolynomial,
+    Ratio as Ratio,
     RootSet as RootSet,
     Segment as Segment,
     crossings as crossings,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -47,6 +47,9 @@ class RootSet(ReadOnlyArrays, Pictured):
     region : tuple of (float, float)
         The ranges of the real and of the imaginary part, `((a, b), (c, d))`, in which the roots
         listed are all there are.
+    hidden : ndarray of complex
+        Of the poles of a `TransferFunction`: roots of its denominator in `region` that are roots of
+        the numerator as well, each as often as it is one. They are not among `roots`.
 
     Examples
     --------
@@ -64,6 +67,7 @@ class RootSet(ReadOnlyArrays, Pictured):
     resolved: NDArray[np.bool_]
     counted: int
     region: tuple[tuple[float, float], tuple[float, float]]
+    hidden: NDArray[np.complex128] = field(default_factory=lambda: np.empty(0, np.complex128))
 
     def __len__(self) -> int:
         return len(self.roots)
@@ -119,15 +123,21 @@ class RootSet(ReadOnlyArrays, Pictured):
         (a, b), (c, d) = self.region
         lines = [f"RootSet: {self.counted} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g})"]
         for index in range(min(len(self), _SHOWN)):
-            root = complex(self.roots[index])
-            line = f"  {root.real:.15g} {'-' if root.imag < 0 else '+'} {abs(root.imag):.15g}i"
-            line += f"  within {self.radii[index]:.1e}"
+            line = f"  {_written(self.roots[index])}  within {self.radii[index]:.1e}"
             if self.multiplicities[index] > 1:
                 line += f", {self.multiplicities[index]} roots not told apart"
             lines.append(line)
         if len(self) > _SHOWN:
             lines.append(f"  and {len(self) - _SHOWN} more")
+        if len(self.hidden):
+            listed = ", ".join(map(_written, self.hidden[:_SHOWN]))
+            more = " and more" if len(self.hidden) > _SHOWN else ""
+            lines.append(f"  hidden, as the numerator is zero there too: {listed}{more}")
         return "\n".join(lines)
+
+
+def _written(root: complex) -> str:
+    return f"{root.real:.15g} {'-' if root.imag < 0 else '+'} {abs(root.imag):.15g}i"
 
 
 def root_set(found: native.RootSet) -> RootSet:
@@ -139,4 +149,5 @@ def root_set(found: native.RootSet) -> RootSet:
         resolved=found.resolved,
         counted=found.counted,
         region=found.region,
+        hidden=found.hidden,
     )

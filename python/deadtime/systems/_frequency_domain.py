@@ -136,8 +136,8 @@ class FrequencyDomain(ABC):
         -----
         All crossings are found, by a bound on the curvature of abs(num)^2 - abs(den)^2 and of
         Im(num conj(den)) between the points at which they are evaluated, and a bound on the
-        frequencies that matter. Stability of the closed loop, as it is, is decided by a proved
-        count of roots.
+        frequencies that matter. Stability of the closed loop, as it is, is that of ``feedback(G)``,
+        decided by a proved count of roots.
 
         Examples
         --------
@@ -147,7 +147,7 @@ class FrequencyDomain(ABC):
         >>> (9.0 / s * delay(0.36)).margin()
         <Margins: none, the closed loop is not stable as it is>
         """
-        return margins(self._num, self._den)
+        return margins(self._num, self._den, all_modes=False)
 
     def bode(
         self,

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+import numpy as np
+from numpy.typing import NDArray
+
 import deadtime.systems._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
@@ -42,6 +45,9 @@ class Margins(ReadOnlyArrays):
         Frequencies from zero up at which L is real and negative, in rad/s.
     gain_margins : ndarray, shape (m,)
         1/abs(L) there.
+    hidden : ndarray of complex
+        Roots of the closed loop that are not left of the imaginary axis and do not count for
+        `stable`, because numerator and denominator of L have them in common.
     searched : tuple of float
         Up to which frequencies, in rad/s, the gain crossovers and the phase crossovers are all
         listed; inf if there are no more. In a stable loop abs(L) is smaller beyond the second one
@@ -73,6 +79,7 @@ class Margins(ReadOnlyArrays):
     phase_crossovers: Array
     gain_margins: Array
     searched: tuple[float, float]
+    hidden: NDArray[np.complex128]
 
     def _delay_margin(self) -> float:
         """The delay margin of a loop that must be stable."""
@@ -108,12 +115,15 @@ class Margins(ReadOnlyArrays):
             where = "" if math.isnan(omega) else f" at {omega:.4g} rad/s"
             number = "any" if value == math.inf else f"{value:.4g}{unit}"
             parts.append(f"{name} {number}{where}")
+        if len(self.hidden):
+            modes = ", ".join(f"{mode:.6g}" for mode in self.hidden)
+            parts.append(f"hidden modes at {modes}")
         return f"<Margins: {', '.join(parts)}>"
 
 
-def margins(n: QuasiPolynomial, d: QuasiPolynomial) -> Margins:
-    """Margins of the loop gain n/d."""
-    return margins_of(loop_margins(n._native, d._native))
+def margins(n: QuasiPolynomial, d: QuasiPolynomial, *, all_modes: bool) -> Margins:
+    """Margins of the loop gain n/d; with `all_modes`, what n and d have in common counts."""
+    return margins_of(loop_margins(n._native, d._native, all_modes))
 
 
 def margins_of(found: native.Margins) -> Margins:

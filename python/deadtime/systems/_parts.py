@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any, TypeAlias, cast
 
 from numpy.typing import ArrayLike, NDArray
@@ -52,3 +53,79 @@ def without_common_powers(
     k = min(one._native.powers_of_s(), other._native.powers_of_s())
     one, other = (QuasiPolynomial._wrap(h._native.without_powers(k)) for h in (one, other))
     return one, other
+
+
+def without_common_factor(
+    one: QuasiPolynomial, other: QuasiPolynomial
+) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Divide both by the greatest polynomial that divides every row of both.
+
+    Computed in integers, by Euclid's algorithm. If a quotient is no double, nothing is divided.
+    """
+    rows = [_whole(row) for h in (one, other) for row in h.coefficients]
+    factor: _Whole = []
+    for row, _ in rows:
+        factor = _greatest_divisor(factor, row)
+    if factor[-1] < 0:
+        factor = [-number for number in factor]
+    if len(factor) < 2:
+        return one, other
+    quotients = [
+        [Fraction(number) / unit for number in _divided(row, factor)[0]] for row, unit in rows
+    ]
+    if any(_rounded(number) != number for row in quotients for number in row):
+        return one, other
+    width = max(map(len, quotients))
+    table = [[float(number) for number in row] + [0.0] * (width - len(row)) for row in quotients]
+    first = len(one.delays)
+    return QuasiPolynomial(table[:first], one.delays), QuasiPolynomial(table[first:], other.delays)
+
+
+#: A polynomial with integer coefficients, in ascending powers; the last one is not zero.
+_Whole: TypeAlias = list[int]
+
+
+def _whole(row: NDArray[Any]) -> tuple[_Whole, int]:
+    """Integer coefficients, and the power of two that was multiplied to them."""
+    numbers = [Fraction(float(number)) for number in row]
+    unit = max(number.denominator for number in numbers)
+    return _trimmed([int(number * unit) for number in numbers]), unit
+
+
+def _trimmed(polynomial: _Whole) -> _Whole:
+    while polynomial and polynomial[-1] == 0:
+        polynomial = polynomial[:-1]
+    return polynomial
+
+
+def _divided(dividend: _Whole, divisor: _Whole) -> tuple[_Whole, _Whole]:
+    """Quotient and remainder, of the dividend times a whole number where division needs one."""
+    rest, quotient = list(dividend), [0] * max(len(dividend) - len(divisor) + 1, 0)
+    for at in reversed(range(len(quotient))):
+        top = rest[at + len(divisor) - 1]
+        if top % divisor[-1]:
+            scale = abs(divisor[-1]) // math.gcd(top, divisor[-1])
+            rest, quotient = [scale * n for n in rest], [scale * n for n in quotient]
+            top *= scale
+        quotient[at] = top // divisor[-1]
+        for k, number in enumerate(divisor):
+            rest[at + k] -= quotient[at] * number
+    return quotient, _trimmed(rest)
+
+
+def _greatest_divisor(one: _Whole, other: _Whole) -> _Whole:
+    """Greatest common divisor, its coefficients without a common factor."""
+    while other:
+        one, other = other, _divided(one, other)[1]
+        common = math.gcd(*other)
+        other = [number // common for number in other]
+    common = math.gcd(*one)
+    return [number // common for number in one]
+
+
+def _rounded(number: Fraction) -> Fraction | None:
+    """Give the double next to a number; None where it is too large."""
+    try:
+        return Fraction(float(number))
+    except OverflowError:
+        return None

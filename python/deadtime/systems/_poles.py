@@ -14,6 +14,7 @@ from deadtime.roots import (
     MatrixDeterminant,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
+    Ratio,
     RootSet,
     RoundedExpansion,
     crossings,
@@ -22,11 +23,11 @@ from deadtime.roots import (
 T = TypeVar("T")
 
 #: What answers the questions.
-Determinant: TypeAlias = QuasiPolynomial | MatrixDeterminant | RoundedExpansion
+Determinant: TypeAlias = QuasiPolynomial | Ratio | MatrixDeterminant | RoundedExpansion
 
 
 class HasPoles(ABC):
-    """Base of systems; the poles are the roots of what is asked, hidden ones included."""
+    """Base of systems; the poles are the roots of what is asked."""
 
     __slots__ = ()
 
@@ -67,6 +68,9 @@ class HasPoles(ABC):
 
         Notes
         -----
+        Of a `TransferFunction`, a root of the denominator at which the numerator is zero as well is
+        no pole: see `poles`.
+
         A `DelaySystem` is split into blocks of states that depend on one another. For each, the
         matrix is factorised at points along the contour, so close to one another that bounds on its
         change and on all rounding prove how far the argument of the determinant turns between them.
@@ -102,6 +106,13 @@ class HasPoles(ABC):
         CountMismatchError
             If the arithmetic does not suffice to locate all poles that were counted.
 
+        Notes
+        -----
+        The poles of a `DelaySystem` are all its modes. Of a `TransferFunction`, the attribute
+        ``hidden`` has the roots of the denominator that are no poles: the numerator has a zero
+        there of at least the same multiplicity, to the rounding of its coefficients and delays. One
+        of lower multiplicity lowers that of the pole.
+
         Examples
         --------
         >>> import deadtime as dtm
@@ -128,6 +139,10 @@ class HasPoles(ABC):
         ContourError, ValueError
             As in `count`; ValueError also where the determinant cannot be expanded without
             rounding.
+
+        Notes
+        -----
+        Of a `TransferFunction`, all roots of the denominator are counted.
         """
         return self._exactly().certify(re, im)
 
@@ -169,6 +184,7 @@ class HasPoles(ABC):
         Returns
         -------
         float
+            -inf for a `TransferFunction` with no pole left, hidden roots apart.
 
         Raises
         ------
@@ -214,6 +230,13 @@ class HasPoles(ABC):
         ------
         ValueError
             As in `spectral_abscissa`.
+
+        Notes
+        -----
+        A `DelaySystem` is asked about all its modes. A `TransferFunction` is asked about its poles,
+        from input to output: a mode of `TransferFunction.hidden_modes` does not show there, and an
+        unstable one must not be a state of what is built. Where the chains are left of the axis
+        for exact delays only, they count: with ``strong=False`` the answer may be False.
         """
         return self._ask(lambda h: h.is_stable(strong))
 

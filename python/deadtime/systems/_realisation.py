@@ -17,7 +17,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.roots import QuasiPolynomial
+from deadtime.roots import QuasiPolynomial, Ratio
 from deadtime.systems._native import LinearSystem
 
 Group = Mapping[float, NDArray[np.float64]]
@@ -44,6 +44,8 @@ class Realisation:
     has_states: bool
     #: If not: the state at rest under an input of one; None if there is no such state.
     rest: NDArray[np.float64] | None = None
+    #: Rate of the fastest growing mode that does not show in the outputs, 1/s; 0 without one.
+    hidden_rate: float = 0.0
 
 
 class Realisable(Protocol):
@@ -84,6 +86,7 @@ def _realised(
     *,
     has_states: bool,
     rest: NDArray[np.float64] | None = None,
+    hidden_rate: float = 0.0,
     **groups: Group,
 ) -> Realisation:
     """Give the native form of the groups A, N, B, C, F and D; those left out are zero."""
@@ -105,6 +108,7 @@ def _realised(
         needs_slopes=bool(matrices.N or matrices.F),
         has_states=has_states,
         rest=rest,
+        hidden_rate=hidden_rate,
     )
 
 
@@ -192,4 +196,6 @@ def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
     c = rows(num, lower, 1.0)
     constant = float(den.coefficients[:, 0].sum())
     rest = np.append(1.0 / constant, np.zeros(n - 1)) if constant else None
-    return _realised(n, 1, 1, has_states=False, rest=rest, A=a, N=neutral, B={0.0: b}, C=c, F=f)
+    groups: dict[str, Group] = {"A": a, "N": neutral, "B": {0.0: b}, "C": c, "F": f}
+    rate = max(Ratio(num, den).hidden_unstable().real, default=0.0)
+    return _realised(n, 1, 1, has_states=False, rest=rest, hidden_rate=float(rate), **groups)

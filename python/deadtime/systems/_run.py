@@ -5,6 +5,7 @@ Before the start the state is given by the history, and the inputs have the valu
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +20,10 @@ from deadtime._base.validation import finite, increasing, positive, real_array
 from deadtime.systems._native import Signal
 from deadtime.systems._realisation import Differentiable, Realisable, Realisation
 from deadtime.systems._response import Response, until_settled
+
+#: Share of an output that rounding may make up. A larger one lets outputs pass of which fewer
+#: digits are right; a smaller one refuses runs whose digits suffice for a plot.
+_ROUNDING = 1e-6
 
 Given: TypeAlias = ArrayLike | Callable[..., ArrayLike]
 
@@ -77,6 +82,7 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     start = float(times[0])
+    _refuse_hidden_growth(float(times[-1]) - start, model.hidden_rate)
     before = _vector("input_before", drive.input_before, model.inputs)
     step = None if drive.max_step is None else positive("max_step", drive.max_step)
     smooth: dict[str, Any] = {"start": start, "vectorized": drive.vectorized, "max_step": step}
@@ -110,6 +116,17 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
         steady_state=float(rest[0]) if rest is not None and outputs.ndim == 1 else rest,
         _dense=_Run(system, start, drive) if len(times) > 1 else None,
     )
+
+
+def _refuse_hidden_growth(duration: float, rate: float) -> None:
+    """Refuse a run in which a hidden mode amplifies rounding until it shows."""
+    if rate * duration > math.log(_ROUNDING / np.finfo(float).eps):
+        raise ValueError(
+            f"numerator and denominator have a mode in common that grows with exp({rate:.6g} t) "
+            "(see hidden_modes()). It does not show in the output, but amplifies rounding, which "
+            f"hides the output before the end of this run of {duration:.6g} s: end it earlier, or "
+            "divide the common factor out"
+        )
 
 
 def step_response(

@@ -15,6 +15,7 @@ from deadtime.roots import (
     Parameter,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
+    Ratio,
     RootSet,
     delay,
     is_number,
@@ -28,6 +29,7 @@ from deadtime.systems._parts import (
     Polynomial,
     quasi_polynomial,
     without_common_delay,
+    without_common_factor,
     without_common_powers,
 )
 from deadtime.systems._poles import Determinant, HasPoles, T
@@ -42,9 +44,9 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
     """A transfer function num(s)/den(s) of two quasi-polynomials.
 
     Usually made by dividing: ``2.0 / s * delay(0.36)``. Immutable. A delay common to numerator
-    and denominator is cancelled; common roots are not, because a mode that cancels is still there
-    (see `hidden_modes`), with one exception: a sum takes equal denominators, and equal powers of
-    s in them, once.
+    and denominator is cancelled; common roots stay in both, with one exception: a sum takes equal
+    denominators, and equal powers of s in them, once. Common roots are no poles, because the
+    ratio is finite there, and `hidden_modes` lists them.
 
     Parameters
     ----------
@@ -243,38 +245,54 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
     def hidden_modes(
         self, re: OpenRange | None = None, im: OpenRange | None = None
     ) -> NDArray[np.complex128]:
-        """List the poles in a region that are zeros as well, as far as can be told.
+        """List the roots of the denominator that are no poles, as the numerator is zero there too.
 
-        What cancels does not show between input and output, but it is there: an unstable hidden
-        mode makes a system useless whose response looks well.
+        They do not show between input and output. Whether they are modes of what is built, the
+        ratio does not say: an integral over a finite time, as (1 - exp(-s))/s, has none. Two
+        blocks in series, of which one cancels a pole of the other, have one; an unstable one makes
+        them useless.
 
         Parameters
         ----------
         re, im : tuple of (float or None, float or None), optional
-            As in `poles`.
+            As in `poles`, edges included. By default everywhere; where the denominator has delays,
+            the right half plane.
 
         Returns
         -------
         ndarray of complex, shape (n,)
-            Poles whose disc meets that of a zero.
+            Each as often as it is a common root.
+
+        Raises
+        ------
+        ContourError, CountMismatchError, ValueError
+            As in `poles`.
+
+        Notes
+        -----
+        A root counts as common where the numerator is zero to the rounding of coefficients and
+        delays: relative changes of four units in the last place make it zero.
 
         Examples
         --------
-        >>> from deadtime import s
+        >>> from deadtime import delay, s
         >>> G = (s - 1.0) / (s + 2.0) * (3.0 / (s - 1.0))
         >>> G.hidden_modes()
         array([1.+0.j])
+        >>> L = 3.0 / (s - 1.0) * delay(0.1)
+        >>> T = L / (1 + L)
+        >>> T.is_stable(), T.hidden_modes()
+        (True, array([1.+0.j]))
         """
-        poles, zeros = self.poles(re, im), self.zeros(re, im)
-        apart = np.abs(poles.roots[:, None] - zeros.roots[None, :])
-        meet = apart <= poles.radii[:, None] + zeros.radii[None, :]
-        return poles.roots[meet.any(axis=1)]
+        if re is None and im is None and self._den.kind != "polynomial":
+            re = (0.0, None)
+        return self.poles(re, im, edge="inside").hidden
 
     def minreal(self) -> TransferFunction:
-        """Cancel what cancels exactly: common powers of s.
+        """Cancel what cancels exactly: the greatest polynomial that divides all coefficients.
 
-        Other common roots of quasi-polynomials cannot be divided out without error; `hidden_modes`
-        lists them.
+        A common factor whose coefficients or quotients were rounded stays, and so do common roots
+        that are no roots of a common polynomial; they are no poles, and `hidden_modes` lists them.
 
         Returns
         -------
@@ -285,13 +303,15 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
         >>> from deadtime import s
         >>> (s / (s * (s + 1.0))).minreal()
         1 / (1 + s)
+        >>> ((s - 1.0) * (s + 2.0) / ((s - 1.0) * (s + 3.0))).minreal()
+        (2 + s) / (3 + s)
         """
         if not self._num.coefficients.any():
             return TransferFunction(0.0)
-        return TransferFunction(*without_common_powers(self._num, self._den))
+        return TransferFunction(*without_common_factor(self._num, self._den))
 
     def _ask(self, question: Callable[[Determinant], T]) -> T:
-        return question(self._den)
+        return question(Ratio(self._num, self._den))
 
     def _exactly(self) -> QuasiPolynomial:
         return self._den
@@ -323,7 +343,7 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
                 f"{self!r} is not causal: its output would depend on later inputs (or its equation "
                 "is advanced)"
             )
-        return of_ratio(num, den)
+        return of_ratio(*without_common_factor(num, den))
 
     def _differentiated(self) -> Realisable:
         if self._num.degree >= self._den.degree and self._num.coefficients.any():

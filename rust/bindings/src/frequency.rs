@@ -31,6 +31,7 @@ pub(crate) struct PyMargins {
     phase_crossovers: Floats,
     gain_margins: Floats,
     searched: (f64, f64),
+    hidden: Py<PyArray1<Complex64>>,
 }
 
 impl PyMargins {
@@ -52,18 +53,26 @@ impl PyMargins {
             phase_crossovers: array(found.phase_crossovers),
             gain_margins: array(found.gain_margins),
             searched: found.searched,
+            hidden: found.hidden.into_pyarray(py).unbind(),
         }
     }
 }
 
-/// Margins of the loop gain n/d.
+/// Margins of the loop gain n/d; with `all_modes` those that n and d have in common count for
+/// stability.
 #[pyfunction]
 pub(crate) fn loop_margins(
     py: Python<'_>,
     n: &QuasiPolynomial,
     d: &QuasiPolynomial,
+    all_modes: bool,
 ) -> PyResult<PyMargins> {
-    let found = run_here(py, |task| frequency::margins(&n.core, &d.core, task))?;
+    let margins = if all_modes {
+        frequency::margins
+    } else {
+        frequency::margins_of_ratio
+    };
+    let found = run_here(py, |task| margins(&n.core, &d.core, task))?;
     Ok(PyMargins::new(py, found))
 }
 

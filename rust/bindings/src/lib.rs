@@ -60,7 +60,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::online::OnlineBank;
     #[pymodule_export]
-    use super::quasipoly::{Expansion, QuasiPolynomial};
+    use super::quasipoly::{Expansion, QuasiPolynomial, Ratio};
     #[pymodule_export]
     use super::quasipoly::{RootSet, Sensitivity};
     #[pymodule_export]

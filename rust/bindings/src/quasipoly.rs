@@ -36,10 +36,16 @@ pub(crate) struct RootSet {
     resolved: Py<PyArray1<bool>>,
     counted: u64,
     region: (Range, Range),
+    hidden: Py<PyArray1<Complex64>>,
 }
 
 impl RootSet {
     pub(crate) fn new(py: Python<'_>, set: roots::RootSet) -> Self {
+        Self::without(py, set, Vec::new())
+    }
+
+    /// Without the roots that are hidden, which are named.
+    fn without(py: Python<'_>, set: roots::RootSet, hidden: Vec<Complex64>) -> Self {
         Self {
             roots: set.roots.into_pyarray(py).unbind(),
             multiplicities: set.multiplicities.into_pyarray(py).unbind(),
@@ -47,6 +53,7 @@ impl RootSet {
             resolved: set.resolved.into_pyarray(py).unbind(),
             counted: set.counted,
             region: (set.region.re, set.region.im),
+            hidden: hidden.into_pyarray(py).unbind(),
         }
     }
 }
@@ -261,6 +268,54 @@ impl QuasiPolynomial {
             delay: found.delay,
         }
     }
+}
+
+/// A ratio of the core.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct Ratio {
+    core: roots::Ratio,
+}
+
+#[pymethods]
+impl Ratio {
+    #[new]
+    fn new(n: &QuasiPolynomial, d: &QuasiPolynomial) -> Self {
+        let core = roots::Ratio::new(n.core.clone(), d.core.clone());
+        Self { core }
+    }
+
+    fn count(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<u64> {
+        let edge = side(edge)?;
+        run_here(py, |task| self.core.count(&Region { re, im }, edge, task))
+    }
+
+    fn poles(&self, py: Python<'_>, re: Range, im: Range, edge: &str) -> PyResult<RootSet> {
+        let edge = side(edge)?;
+        let found = run_here(py, |task| self.core.poles(&Region { re, im }, edge, task))?;
+        Ok(listed(py, found))
+    }
+
+    fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
+        let found = run_here(py, |task| self.core.rightmost(n, task))?;
+        Ok(listed(py, found))
+    }
+
+    fn spectral_abscissa(&self, py: Python<'_>, strong: bool) -> PyResult<f64> {
+        run_here(py, |task| self.core.spectral_abscissa(strong, task))
+    }
+
+    /// The verdict, and the hidden roots on which it rests.
+    fn stability<'py>(&self, py: Python<'py>, strong: bool) -> PyResult<(bool, Values<'py>)> {
+        let found = run_here(py, |task| self.core.stability(strong, task))?;
+        Ok((found.stable, found.hidden.into_pyarray(py)))
+    }
+}
+
+/// Poles, and each hidden root as often as it is one.
+fn listed(py: Python<'_>, found: roots::Poles) -> RootSet {
+    let hidden = found.hidden.roots.iter().zip(&found.hidden.multiplicities);
+    let hidden = hidden.flat_map(|(root, m)| std::iter::repeat_n(*root, *m as usize));
+    RootSet::without(py, found.poles, hidden.collect())
 }
 
 /// What `work` makes of all points, in C order: a few of them on the calling thread.

@@ -73,5 +73,6 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
         phase_crossovers,
         gain_margins: gains,
         searched: (f64::INFINITY, f64::INFINITY),
+        hidden: Vec::new(),
     })
 }

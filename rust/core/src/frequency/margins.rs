@@ -22,7 +22,7 @@ use super::waves::Waves;
 use super::zeros::zeros_between;
 use crate::elementary::angle;
 use crate::quasipoly::{Kind, Probe, QuasiPolynomial};
-use crate::roots::is_stable;
+use crate::roots::{Ratio, Stability, is_stable};
 use crate::{Error, Task};
 
 /// Where delays stay in the phase but none of them turns it through 180 degrees, there is no bound
@@ -58,9 +58,10 @@ pub struct Margins {
     pub phase_crossovers: Vec<f64>,
     pub gain_margins: Vec<f64>,
     pub searched: (f64, f64),
+    pub hidden: Vec<Complex64>,
 }
 
-/// Margins of the loop gain n/d.
+/// Margins of the loop gain n/d, all roots of d + n counting for stability.
 ///
 /// # Errors
 /// [`Error::Argument`] where a loop can have none, or its gain is one or its phase 180 degrees on a
@@ -76,6 +77,32 @@ pub struct Margins {
 pub fn margins(n: &QuasiPolynomial, d: &QuasiPolynomial, task: &Task) -> Result<Margins, Error> {
     refuse_what_has_none(n, d)?;
     let stable = is_stable(&d.add(n)?, true, task)?;
+    let hidden = Vec::new();
+    with_verdict(n, d, Stability { stable, hidden }, task)
+}
+
+/// [`margins`], except that roots of d + n that n and d have in common do not count: they are hidden
+/// in the ratio n/(d + n).
+///
+/// # Errors
+/// As [`margins`].
+pub fn margins_of_ratio(
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+    task: &Task,
+) -> Result<Margins, Error> {
+    refuse_what_has_none(n, d)?;
+    let found = Ratio::new(n.clone(), d.add(n)?).stability(true, task)?;
+    with_verdict(n, d, found, task)
+}
+
+fn with_verdict(
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+    verdict: Stability,
+    task: &Task,
+) -> Result<Margins, Error> {
+    let Stability { stable, hidden } = verdict;
     let (crossovers, all_gain) = gain_crossovers(n, d, task)?;
     let mut turns = Vec::with_capacity(crossovers.len());
     for omega in &crossovers {
@@ -138,6 +165,7 @@ pub fn margins(n: &QuasiPolynomial, d: &QuasiPolynomial, task: &Task) -> Result<
         phase_crossovers: phase.places,
         gain_margins: factors,
         searched: (all_gain, phase.searched),
+        hidden,
     })
 }
 

@@ -37,7 +37,7 @@ pub use delays::{delay_margin, delay_range};
 pub use further_delay::{further_delay, held_delay_range};
 pub use held::held_margins;
 pub use held_range::{Number, gain_range_held, held_range};
-pub use margins::{Margins, margins};
+pub use margins::{Margins, margins, margins_of_ratio};
 pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};
 pub use ratio::{first_term, ratio};

@@ -129,6 +129,44 @@ pub(crate) fn expansion(
     }
 }
 
+/// Bounds on the changes of the coefficients of [`expansion`] per relative change of all
+/// coefficients and delays of h.
+///
+/// With C_k as above, a change of c_j by a part ε changes the k-th coefficient by at most ε C_k, one
+/// of τ_j, which multiplies the term by −s δτ, by at most ε τ_j (|s| C_k + C_(k−1)).
+pub(crate) fn changes(
+    h: &QuasiPolynomial,
+    reference: usize,
+    s: Complex64,
+    order: usize,
+) -> Vec<f64> {
+    let own = h.delays().get(reference).copied().unwrap_or(0.0);
+    let mut totals = vec![0.0; order + 1];
+    for (row, delay) in h.terms() {
+        let gap = delay - own;
+        let (_, bounds) = shifted(row, s, order);
+        let weight = exp_above(EXPONENT_ROUNDING - gap * s.re);
+        let mut before = 0.0;
+        for (k, total) in totals.iter_mut().enumerate() {
+            let size = with_powers(&bounds, gap.abs(), k);
+            *total += ((1.0 + delay * modulus(s)) * size + delay * before) * weight;
+            before = size;
+        }
+    }
+    totals
+}
+
+/// Σ P_i |d|^(k − i)/(k − i)!.
+fn with_powers(bounds: &[f64], gap: f64, k: usize) -> f64 {
+    let mut power = 1.0;
+    let mut sum = 0.0;
+    for i in (0..=k).rev() {
+        sum += bounds.get(i).copied().unwrap_or(0.0) * power;
+        power *= gap / (k - i + 1) as f64;
+    }
+    sum
+}
+
 /// Bound on |g⁽ᵏ⁾|/k! for k = `order`, within `radius` of `s`.
 pub(crate) fn remainder(
     h: &QuasiPolynomial,
@@ -150,13 +188,7 @@ pub(crate) fn remainder(
                 carried = *bound;
             }
         }
-        // P_i |d|^(order − i)/(order − i)!, from i = order down.
-        let mut power = 1.0;
-        let mut sum = 0.0;
-        for i in (0..=order).rev() {
-            sum += bounds.get(i).copied().unwrap_or(0.0) * power;
-            power *= gap.abs() / (order - i + 1) as f64;
-        }
+        let sum = with_powers(&bounds, gap.abs(), order);
         // The exponent is below 1500 in modulus; otherwise the result is infinite or negligible.
         total += sum * exp_above(gap.abs() * radius - gap * s.re + EXPONENT_ROUNDING);
     }

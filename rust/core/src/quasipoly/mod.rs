@@ -21,7 +21,7 @@ mod value;
 pub(crate) use algebra::{convolve, equate_close_delays};
 pub(crate) use double_double::relative_turn;
 pub use expansion::Expansion;
-pub(crate) use expansion::{expansion, remainder};
+pub(crate) use expansion::{changes, expansion, remainder};
 pub use jet::Jet;
 pub(crate) use jet::modulus;
 pub use kind::Kind;

@@ -4,6 +4,7 @@
 //! * `chains` bounds the chains of roots of neutral equations.
 //! * `counting` proves how many roots a region holds; `locating` finds them, encloses each in a
 //!   disc, and decides about stability.
+//! * `ratio` leaves out the roots that a numerator has as well.
 //! * [`matrix`] answers the same questions for det M(s) without expanding the determinant.
 //!
 //! Elementary functions are those of [`crate::elementary`], whose error bounds are proved. Each
@@ -14,6 +15,7 @@ mod counting;
 mod disc;
 mod locating;
 pub mod matrix;
+mod ratio;
 mod region;
 mod root_set;
 
@@ -27,6 +29,7 @@ pub use locating::{
     Edge, count_with_edge, is_stable, rightmost, roots, roots_with_edge, sensitivity,
     spectral_abscissa, unstable_and_rightmost,
 };
+pub use ratio::{Poles, Ratio, Stability};
 pub use region::Region;
 pub use root_set::RootSet;
 

@@ -31,7 +31,7 @@ pub use edge::{Edge, count_with_edge, roots_with_edge};
 pub(crate) use isolate::{Search, Seek};
 pub(crate) use lines::{Effort, Line, Spectrum, chain_margin, half_plane_discs};
 pub(crate) use newton::Outcome;
-pub(crate) use rightmost::{first, leading};
+pub(crate) use rightmost::{abscissa_with, first, leading};
 pub use rightmost::{rightmost, spectral_abscissa, unstable_and_rightmost};
 pub use sensitivity::sensitivity;
 pub(crate) use stable::is_none;

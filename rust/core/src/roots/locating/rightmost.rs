@@ -178,6 +178,19 @@ pub(crate) fn leading<S: Spectrum>(
 pub fn spectral_abscissa(h: &QuasiPolynomial, strong: bool, task: &Task) -> Result<f64, Error> {
     let set = rightmost(h, 1, task)?;
     let isolated = set.roots.first().map_or(f64::NEG_INFINITY, |root| root.re);
+    abscissa_with(h, isolated, strong, task)
+}
+
+/// [`spectral_abscissa`], the real part of the rightmost root being known: −∞ where none was found.
+///
+/// # Errors
+/// As [`spectral_abscissa`].
+pub(crate) fn abscissa_with(
+    h: &QuasiPolynomial,
+    isolated: f64,
+    strong: bool,
+    task: &Task,
+) -> Result<f64, Error> {
     let chain = chain_abscissa(h);
     if !strong && isolated < chain {
         let Prepared { rest, zeros, .. } = Prepared::new(h)?;
