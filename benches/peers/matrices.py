@@ -102,8 +102,7 @@ def main() -> None:
     sizes, draws = given.states or [8, 10, 16, 20, 40], given.draws
     if given.quick:
         sizes, draws = [8], len(KINDS)
-    print("states | ours, ms: median, worst | numpy, ms: median | ratios | worst of a kind | ", end="")
-    print("refused | far")
+    print("states | ours, ms: median, worst | numpy, ms | ratios | worst of a kind | refused | far")
     for n in sizes:
         mine, peer, kinds = [], [], dict.fromkeys(KINDS, 0.0)
         refused = far = 0
