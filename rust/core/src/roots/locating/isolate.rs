@@ -131,6 +131,10 @@ impl<'w, W: Seek> Search<'w, W> {
         self.walker
     }
 
+    pub(crate) fn walker_mut(&mut self) -> &mut W {
+        self.walker
+    }
+
     /// A search for what is left of a cell after chains of roots have been followed.
     pub(crate) fn after_chains(walker: &'w mut W, cell: &Cell) -> Result<Self, Error> {
         let known = walker.along_chains(cell)?;

@@ -7,11 +7,12 @@
 
 use num_complex::Complex64;
 
+use super::laguerre::towards_root;
 use super::prepared::Prepared;
 use super::starts::starts;
 use super::walker::{MOST_WITH_CLUSTERS, MatrixWalker};
 use crate::order::sort_down;
-use crate::roots::disc::Disc;
+use crate::roots::disc::{Disc, with_mirror_image};
 use crate::roots::locating::{Effort, Line, Search, Spectrum, first};
 use crate::roots::root_set::RootSet;
 use crate::{Error, Task};
@@ -35,6 +36,10 @@ const POSITION: f64 = 0.45;
 /// Least part of the widest gap that is taken although a wider one lies further left, where the line
 /// is closer to more roots. Larger: wider gaps; smaller: fewer roots to enclose.
 const WIDE: f64 = 0.3;
+
+/// Distance right of a line from which roots are sought that no guess led to, in units of one over the
+/// longest delay. Larger: roots closer by are passed; smaller: those left of the line are found.
+const ASIDE: f64 = 0.1;
 
 /// The outcome of a search from guesses.
 pub(super) enum Found {
@@ -100,6 +105,15 @@ pub(super) fn from_guesses(
         guesses.clone_from(&hints);
         sort_down(&mut guesses, |guess| guess.re);
         guesses.truncate(MAX_HINTS);
+        let known: Vec<Complex64> = with_images(search.found());
+        for place in guesses.clone() {
+            let right = Complex64::new(place.re.max(sigma) + ASIDE * step, place.im);
+            match towards_root(search.walker_mut(), &known, right) {
+                Ok(nearer) => guesses.push(nearer),
+                Err(error) if error.ends_all() => return Err(error),
+                Err(_) => return Ok(open(last, &search)),
+            }
+        }
         guesses.extend(others.drain(..).filter(|guess| guess.re > sigma - step));
         last = Some(Line {
             sigma,
@@ -108,6 +122,12 @@ pub(super) fn from_guesses(
         });
     }
     Ok(open(last, &search))
+}
+
+/// The roots of discs and of their mirror images.
+fn with_images(discs: &[Disc]) -> Vec<Complex64> {
+    let images = discs.iter().copied().flat_map(with_mirror_image);
+    images.map(|disc| disc.center).collect()
 }
 
 fn open(line: Option<Line>, search: &Search<'_, MatrixWalker<'_>>) -> Found {

@@ -9,7 +9,7 @@
 //! `locating::isolate`).
 //! `simple_root` encloses one root by Newton's method for a bordered matrix, `cluster` roots that lie
 //! close together by its Taylor series, `starts` guesses the
-//! rightmost ones from a linearisation, `leading` proves that these are the rightmost.
+//! rightmost ones from a linearisation, `laguerre` leads to one amid many, `leading` proves that these are the rightmost.
 //! `outer` bounds the roots of half planes by norms, `difference` bounds the chains of neutral
 //! systems, `quotient` the roots beside them. All statements are proved for the matrices as
 //! given, however large or small their entries are. The accuracy of a root depends on how regular M
@@ -23,6 +23,7 @@ mod determinant;
 mod difference;
 mod factor;
 mod kernel;
+mod laguerre;
 mod leading;
 mod line;
 mod local_enclosure;
