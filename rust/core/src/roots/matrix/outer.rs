@@ -202,12 +202,13 @@ impl Leading {
                 best = best.min(norm(&values, y) / (1.0 - share) * MARGIN);
             }
         }
-        let neutral = !self.difference.is_trivial();
-        if (neutral || best.is_infinite())
+        // With one delayed derivative the chains take one matrix, and all its phases can be followed.
+        let followed = self.difference.number_of_terms() == 1;
+        if (followed || best.is_infinite())
             && let Some(inverse) = self.difference.inverse_bound(sigma, task)?
         {
             best = best.min(inverse * frobenius(&values) * MARGIN);
-            if neutral {
+            if followed {
                 let parts = self.products.iter().zip(&weights);
                 let parts = parts.map(|((matrix, lost), weight)| Value {
                     matrix: matrix.clone(),

@@ -33,17 +33,14 @@ pub(super) struct Value {
 }
 
 impl Difference {
-    /// The bound for Re s ≥ `sigma`, which has to lie right of the chains; `None` where there are
-    /// several delayed derivatives, or too many steps.
+    /// The bound for Re s ≥ `sigma`, which has to lie right of the chains, for one delayed
+    /// derivative; `None` where it takes too many steps.
     pub(super) fn quotient_bound(
         &self,
         sigma: f64,
         values: &[Value],
         task: &Task,
     ) -> Result<Option<f64>, Error> {
-        if self.number_of_terms() != 1 {
-            return Ok(None);
-        }
         let (late, lost) = self.at(sigma, &[]);
         let size = norm(&late);
         let (mut angle, mut half, mut most) = (0.0, STEP, 0.0f64);
