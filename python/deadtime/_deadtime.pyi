@@ -244,51 +244,6 @@ class Family:
         self, axes: _Axes, *, decay: float, damping: _Pair | None
     ) -> list[MapBoundary] | None: ...
 
-class _HeldRows(Protocol):
-    @property
-    def rows(self) -> int: ...
-    @property
-    def states(self) -> int: ...
-    @property
-    def used(self) -> _Reals: ...
-    @property
-    def A(self) -> _Reals: ...
-    @property
-    def B(self) -> _Reals: ...
-    @property
-    def K(self) -> _Reals: ...
-    @property
-    def L(self) -> _Reals: ...
-    @property
-    def K_slope(self) -> _Reals: ...
-    @property
-    def L_slope(self) -> _Reals: ...
-    @property
-    def delay(self) -> _Reals: ...
-    @property
-    def sample_time(self) -> _Reals: ...
-    @property
-    def points(self) -> _Reals: ...
-
-def held_map(
-    rows: _HeldRows,
-    column: _HeldRows | None,
-    question: _MapQuestion,
-    *,
-    shape: tuple[int, int],
-    as_columns: bool,
-    threads: int | None = None,
-    progress: _Progress = None,
-) -> MapCells: ...
-def held_boundaries(
-    rows: _HeldRows,
-    columns: _HeldRows | None,
-    *,
-    along: tuple[str, str],
-    decay: float,
-    damping: _Pair | None,
-) -> list[MapBoundary]: ...
-
 @final
 class ProvedBoxes:
     low: Final[_Reals]
@@ -379,7 +334,7 @@ class _LoopEquations(_EquationsWithReference, Protocol):
     @property
     def update(self) -> _SampleUpdate | None: ...
 
-#: As `deadtime.loops._model.LoopRun`.
+#: As `deadtime.loops._runs.LoopRun`.
 _LoopRun: TypeAlias = tuple[
     _Reals, float, float, float | _Reals, _Reals | None, _Reals | None, float
 ]
@@ -409,6 +364,7 @@ class LinearLoop:
         limit: float | None = None,
         delay_in_measurement: bool = False,
     ) -> LinearLoop: ...
+    def equations(self) -> tuple[tuple[Any, ...], tuple[_Reals, _Reals, _Reals] | None]: ...
     def outputs(self, time: _Reals, run: _LoopRun) -> _Reals: ...
     def respond(self, time: _Reals, run: _LoopRun | float) -> LoopResponse: ...
     def transition_matrix(self) -> _Reals: ...
@@ -464,16 +420,6 @@ def sampled_abscissa_grid(
     progress: _Progress = None,
 ) -> SampledCells: ...
 
-class _StateSpace(_LinearEquations, Protocol):
-    @property
-    def D(self) -> float: ...
-
-class _ControllerEquations(_EquationsWithReference, Protocol):
-    @property
-    def p(self) -> float: ...
-    @property
-    def q(self) -> float: ...
-
 class _FixedStepSettings(Protocol):
     @property
     def delay(self) -> float: ...
@@ -496,25 +442,6 @@ class _FixedStepSettings(Protocol):
 class FixedStepResponse:
     outputs: Final[_Reals]
     inputs: Final[_Reals]
-
-def fixed_step_run(
-    plant: _StateSpace,
-    controller: _ControllerEquations,
-    run: _LoopRun,
-    settings: _FixedStepSettings,
-) -> FixedStepResponse: ...
-
-class _LoopSlopes(Protocol):
-    @property
-    def row(self) -> _Reals: ...
-    @property
-    def row_slopes(self) -> _Reals: ...
-    @property
-    def state_slopes(self) -> _Reals: ...
-    @property
-    def command_slopes(self) -> _Reals: ...
-    @property
-    def output_lead_slopes(self) -> _Reals: ...
 
 @final
 class LoopSensitivities:
@@ -702,54 +629,140 @@ def held_response(
     inputs: _Reals,
     times: _Reals,
 ) -> _Reals: ...
-def loop_sensitivities(
-    slopes: _LoopSlopes,
-    run: _LoopRun,
-    output_time: _Reals,
-    input_time: _Reals,
-) -> LoopSensitivities: ...
-
 class _LoopSets(Protocol):
     @property
-    def states(self) -> int: ...
+    def values(self) -> dict[str, _Reals]: ...
+    @property
+    def given(self) -> tuple[list[Any], list[Any]] | None: ...
     @property
     def size(self) -> int: ...
     @property
-    def entries(self) -> Sequence[float | _Reals]: ...
-    @property
     def amplitude(self) -> float: ...
-    @property
-    def is_ahead(self) -> bool: ...
 
 @final
 class SweepResponses:
     outputs: Final[_Reals]
     status: Final[NDArray[np.uint8]]
 
-def sweep_metrics(
-    sets: _LoopSets,
-    *,
-    columns: Sequence[_Reals],
-    status: NDArray[np.uint8],
-    steady_state: float | _Reals,
-    slowest_time: float | _Reals,
-    span: float,
-    settling: float,
-    rise: _Pair,
-    threads: int | None = None,
-    progress: _Progress = None,
-) -> None: ...
-def sweep_abscissae(sets: _LoopSets, *, threads: int | None = None) -> _Reals: ...
-def sweep_decay(
-    sets: _LoopSets, rates: _Reals, *, threads: int | None = None
-) -> NDArray[np.bool_]: ...
-def sweep_responses(
-    sets: _LoopSets,
-    time: _Reals,
-    *,
-    threads: int | None = None,
-    progress: _Progress = None,
-) -> SweepResponses: ...
+class _PlantForm(Protocol):
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def num(self) -> Sequence[float] | None: ...
+    @property
+    def den(self) -> Sequence[float] | None: ...
+    @property
+    def lags(self) -> int: ...
+    @property
+    def has_zero(self) -> bool: ...
+    @property
+    def has_pair(self) -> bool: ...
+    @property
+    def delayed(self) -> tuple[QuasiPolynomial, QuasiPolynomial] | None: ...
+
+class _ControllerForm(Protocol):
+    @property
+    def kind(self) -> str: ...
+    @property
+    def is_filtered(self) -> bool: ...
+    @property
+    def rule(self) -> str | None: ...
+
+#: Numerator and denominator of a plant, descending.
+_Fraction: TypeAlias = tuple[list[Any], list[Any]]
+
+#: They for numbers of the plant.
+_Polynomials: TypeAlias = Callable[[list[float]], _Fraction | None]
+
+@final
+class Loop:
+    def __new__(
+        cls,
+        plant: _PlantForm,
+        controller: _ControllerForm,
+        numbers: tuple[list[float], list[float]],
+        *,
+        delay: float,
+        sample_time: float | None,
+        limit: float | None,
+        is_measured: bool,
+        given: _Fraction | None = None,
+    ) -> Loop: ...
+    def at(self, numbers: dict[str, float], given: _Fraction | None = None) -> Loop: ...
+    def check(self) -> None: ...
+    @property
+    def linear(self) -> LinearLoop: ...
+    def rest_gains(self) -> _Pair: ...
+    def rest(self, output: float, reference: float) -> tuple[_Reals, float]: ...
+    def slowest_time(self) -> float: ...
+    def characteristic(self) -> QuasiPolynomial: ...
+    def transfer(self, of: str) -> tuple[QuasiPolynomial, QuasiPolynomial]: ...
+    def terms(
+        self, names: list[str], given: _Fraction | None = None
+    ) -> list[tuple[float, list[int], int, float, list[float]]]: ...
+    def plane(self, axes: _Axes, given: _Polynomials | None = None) -> HeldPlane: ...
+    def stable_range(
+        self, name: str, free: _Fraction | None = None, given: _Polynomials | None = None
+    ) -> _Pair: ...
+    def sensitivities(
+        self,
+        names: list[str],
+        run: _LoopRun,
+        rest: _Pair,
+        output_time: _Reals,
+        input_time: _Reals,
+        given: list[_Fraction] | None = None,
+    ) -> LoopSensitivities: ...
+    def fixed_step(self, run: _LoopRun, settings: _FixedStepSettings) -> FixedStepResponse: ...
+    def sweep_metrics(
+        self,
+        sets: _LoopSets,
+        *,
+        columns: Sequence[_Reals],
+        status: NDArray[np.uint8],
+        span: float,
+        settling: float,
+        rise: _Pair,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> None: ...
+    def sweep_rest(self, sets: _LoopSets) -> tuple[_Reals, _Reals]: ...
+    def sweep_abscissae(self, sets: _LoopSets, *, threads: int | None = None) -> _Reals: ...
+    def sweep_decay(
+        self, sets: _LoopSets, rates: _Reals, *, threads: int | None = None
+    ) -> NDArray[np.bool_]: ...
+    def sweep_responses(
+        self,
+        sets: _LoopSets,
+        time: _Reals,
+        *,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> SweepResponses: ...
+
+@final
+class HeldPlane:
+    def cells(
+        self,
+        question: _MapQuestion,
+        *,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> MapCells: ...
+    def boundaries(self, decay: float, damping: _Pair | None) -> list[MapBoundary]: ...
+
+def plant_polynomials(
+    plant: _PlantForm, numbers: list[float]
+) -> tuple[list[float], list[float]]: ...
+def canonical_form(
+    num: list[float], den: list[float], output: float = 0.0
+) -> tuple[_Reals, _Reals, float, _Reals, float]: ...
+def feedback_polynomials(
+    controller: _ControllerForm, numbers: list[float]
+) -> tuple[list[float], list[float]]: ...
+def sampled_filter(
+    F: _Reals, G: _Reals, C: _Reals, sample_time: float, rule: str
+) -> tuple[_Reals, _Reals, _Reals, float]: ...
 
 # --- systems --------------------------------------------------------------------------
 

@@ -284,7 +284,9 @@ def test_equations_are_the_polynomials(plant, controller):
     from_command = model.K @ resolvent @ model.B + model.L
     from_reference = model.K @ resolvent @ model.E + model.M
     b, a = (np.polyval(p, s) for p in plant.polynomials())
-    f, g = (np.polyval(p, s) for p in controller._feedback(controller.parameters))
-    r, _ = (np.polyval(p, s) for p in controller._reference(controller.parameters))
+    feedback, h = controller.transfer_function(), loop.characteristic()
+    f, g = feedback.num(s), feedback.den(s)
     assert from_command == pytest.approx(-b / a * f / g, rel=1e-10)
+    # The reference reaches the command by R = r/g, and the output by b r e^(-s T)/h.
+    r = loop.closed_loop()(s) * h(s) / (b * np.exp(-0.1 * s))
     assert from_reference + s * model.impulse == pytest.approx(r / g, rel=1e-10)

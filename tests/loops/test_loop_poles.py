@@ -220,47 +220,11 @@ def test_fast_sampling_has_the_poles_of_continuous_time(kp, lag):
 @given(plants, controllers)
 @settings(deadline=None, max_examples=30)
 def test_numbers_may_be_symbols(plant, controller):
-    """Constant quasi-polynomials replace symbols: they support algebra only."""
     loop = dtm.ControlLoop(plant, controller, delay=0.3)
-    symbols = {
-        name: value if name == "delay" else dtm.QuasiPolynomial([[value]], [0.0])
-        for name, value in loop.parameters.items()
-    }
-    h, symbolic = loop.characteristic(), loop.specification.characteristic_at(symbols)
+    family = loop._family_of(tuple(loop.parameters))
+    h, symbolic = loop.characteristic(), family.at(**loop.parameters)
     points = np.array([0.7 + 1.9j, -0.4 + 3.0j, 2.0 - 1.0j])
     np.testing.assert_allclose(symbolic(points), h(points), rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("plant", "controller"),
-    [
-        (dtm.Integrator(), dtm.PV(1.0, 0.2)),
-        (dtm.Integrator(lag=0.1), dtm.PV(1.0, 0.2, dtm.DerivativeFilter(20.0))),
-        (dtm.kit_plant(), dtm.PID(1.0, 0.2, 0.1, dtm.DerivativeFilter(20.0))),
-        (dtm.RationalPlant([0.2, 1.0], [1.0, 1.0]), dtm.PI(0.5, 0.5)),
-    ],
-)
-def test_grids_of_sampled_loops_are_their_single_loops(plant, controller):
-    from deadtime.loops._stability import sampled_grid
-
-    rng = np.random.default_rng(7)
-    cells = 40
-    loop = dtm.ControlLoop(plant, controller, delay=0.3, sample_time=0.065)
-    values = {name: value * rng.uniform(0.3, 2.5, cells) for name, value in loop.parameters.items()}
-    if "omega" in values:
-        values["omega"] = rng.choice([15.0, 30.0], cells)
-    values["damping"] = 1.0
-    seen = []
-    abscissa, unstable, status = sampled_grid(plant, controller, values, progress=seen.append)
-    for i in range(cells):
-        numbers = {n: np.atleast_1d(v)[i % np.size(v)] for n, v in values.items()}
-        single = loop.replace(**{n: v for n, v in numbers.items() if n in loop.parameters})
-        # Gains enter in another order here than there: a last place or two of the matrix.
-        assert abscissa[i] == pytest.approx(single.spectral_abscissa(), rel=1e-9, abs=1e-9)
-        assert unstable[i] == (np.abs(np.linalg.eigvals(single.transition_matrix())) > 1).sum()
-        assert status[i] == 0
-    shared = sampled_grid(plant, controller, values, threads=1)
-    np.testing.assert_array_equal(shared[0], abscissa)
 
 
 @pytest.mark.parametrize("exponent", [-20, -7, 7, 19, 20])

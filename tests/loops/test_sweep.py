@@ -8,7 +8,6 @@ import deadtime as dtm
 import numpy as np
 import pytest
 import scipy.linalg
-from deadtime.loops._model import rest_of
 from deadtime.loops._settled import TIME_CONSTANTS
 from deadtime.loops._sweep import _Sets
 from hypothesis import assume, given, settings, strategies as st
@@ -394,10 +393,11 @@ def test_sets_stay_settled_where_their_slowest_root_says_so(loop):
 @settings(max_examples=60, deadline=None)
 @given(loop=loops())
 def test_the_rest_of_many_loops_is_that_of_each(loop):
-    gains = loop.specification.model.rest_gains
-    output, command = rest_of(loop.plant, loop.controller, loop.parameters)
-    assume(gains is not None)
-    np.testing.assert_allclose([output, command], gains, atol=1e-12)
+    gains = np.linspace(0.5, 1.5, 7) * loop.controller.Kp
+    sets = _Sets(loop, {"Kp": gains}, (7,), 1.0, 0.02, (0.1, 0.9), 1)
+    found, _ = sets.kernel.sweep_rest(sets.native)
+    alone = [loop.replace(Kp=gain).specification.kernel.rest_gains()[1] for gain in gains]
+    np.testing.assert_array_equal(found, alone)
 
 
 @settings(max_examples=40, deadline=None)

@@ -11,7 +11,6 @@ imitates block diagrams that are run in fixed steps.
 # how. `_sweep` runs many loops, `_fixed_step` imitates block diagrams in fixed steps.
 
 from deadtime._base.explorer import Explorer
-from deadtime.loops._characteristic import numbers_of as numbers_of
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._controllers import PD, PI, PID, PV, Controller, P
 from deadtime.loops._derivative_filter import (
@@ -23,8 +22,8 @@ from deadtime.loops._explored import explorer_of as explorer_of
 from deadtime.loops._factored_plant import PAIR, FactoredPlant
 from deadtime.loops._fixed_step import simulate_fixed_step
 from deadtime.loops._given_plants import PlantWithDelays
-from deadtime.loops._held import HeldFamily as HeldFamily, Question as Question
-from deadtime.loops._model import LoopModel as LoopModel, LoopRun as LoopRun, rest_of as rest_of
+from deadtime.loops._held import Question as Question, held_plane as held_plane
+from deadtime.loops._model import LoopModel as LoopModel
 from deadtime.loops._open_run import open_response as open_response
 from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import (
@@ -38,8 +37,15 @@ from deadtime.loops._plants import (
     steady_lag as steady_lag,
 )
 from deadtime.loops._rate_limits import RateLimited
+from deadtime.loops._runs import LoopRun as LoopRun
 from deadtime.loops._sampled_gain import SampledLoopGain as SampledLoopGain
-from deadtime.loops._sweep import Sweep, SweepStatus, sweep
+from deadtime.loops._specification import numbers_of as numbers_of
+from deadtime.loops._sweep import (
+    Sweep,
+    SweepStatus,
+    commands_at_rest as commands_at_rest,
+    sweep,
+)
 
 __all__ = [
     "PAIR",

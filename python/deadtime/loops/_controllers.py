@@ -1,74 +1,32 @@
 r"""Controllers: what turns the reference r and the measured output y into the command u.
 
-Each is linear in its gains and is known in two forms: as polynomials, u = R(s) r - F(s) y, for
-characteristic functions, and as equations
-
-    x' = A x + B y + E r,   u = C x + p y + q y' + M r,
-
-for simulation. The derivative is either ideal, H(s) = s, or filtered,
-H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled loop the filter
-and the integrator stay continuous and are sampled with the rest: the discretisation is exact.
+Each is linear in its gains: u = R(s) r - F(s) y. The derivative is either ideal, H(s) = s, or
+filtered, H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled loop the
+filter and the integrator stay continuous and are sampled with the rest: the discretisation is exact.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from deadtime._base.arrays import Array
 from deadtime._base.validation import finite
-from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation, discretised
-from deadtime.loops._entries import Polynomial, matrix, multiplied, vector
+from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation
 from deadtime.loops._given_plants import transfer_function_of
+from deadtime.loops._native import feedback_polynomials
 from deadtime.systems import TransferFunction
 
 
-class ControllerEquations(NamedTuple):
-    """x' = A x + B y + E r, u = C x + p y + q y' + M r, and an impulse where r jumps.
+class ControllerForm(NamedTuple):
+    """The form of a controller as the kernel takes it."""
 
-    With `update` a discretised filter has the last two states.
-    """
-
-    A: Array
-    B: Array
-    E: Array
-    C: Array
-    p: Any
-    q: Any
-    M: Any
-    impulse: Any
-    update: FilterUpdate | None = None
-
-
-class FilterUpdate(NamedTuple):
-    """What a sample does to the last two states: x becomes F x + G y + H r.
-
-    They give the row C to u, and y itself `direct`.
-    """
-
-    F: Array
-    G: Array
-    H: Array
-    row: Array
-    direct: float
-
-
-def _sampled(
-    block: list[list[Any]],
-    into: list[Any],
-    out: list[Any],
-    sample_time: float,
-    rule: Discretisation,
-    on_error: float,
-) -> FilterUpdate:
-    F, G, C = (np.array(part, dtype=np.float64) for part in (block, into, out))
-    found = discretised(F, G, C, sample_time, rule)
-    return FilterUpdate(found.F, found.G, -on_error * found.G, found.C, found.D)
+    kind: str
+    is_filtered: bool = False
+    #: How its filter runs in a sampled loop; None: continuous.
+    rule: Discretisation | None = None
 
 
 @dataclass(frozen=True)
@@ -132,7 +90,7 @@ class Controller(ABC):
         >>> 0.9 / dtm.s * dtm.delay(0.36) * dtm.PV(Kp=2.0, Kv=0.3)
         (1.8 + 0.27 s) exp(-0.36 s) / s
         """
-        return TransferFunction(*self._feedback(self.parameters))
+        return TransferFunction(*feedback_polynomials(self._form, [*self.parameters.values()]))
 
     def __mul__(self, other: object) -> TransferFunction:
         """Loop gain of this feedback and a plant, a transfer function or a system."""
@@ -152,117 +110,13 @@ class Controller(ABC):
             )
         return type(self)(**changed)
 
-    @abstractmethod
-    def _terms(self, values: Mapping[str, Any]) -> _Terms:
-        """Gains on the proportional, integral and derivative terms."""
-
-    def _feedback(self, values: Mapping[str, Any]) -> tuple[Polynomial, Polynomial]:
-        """F = num/den, descending, in numbers or symbols of `values`."""
-        terms = self._terms(values)
-        return self._rational(values, terms.proportional, terms.integral, terms.derivative)
-
-    def _reference(self, values: Mapping[str, Any]) -> tuple[Polynomial, Polynomial]:
-        """R = num/den over the denominator of F."""
-        terms = self._terms(values)
-        derivative = terms.derivative if terms.derivative_of_error else 0.0
-        return self._rational(values, terms.proportional, terms.integral, derivative)
-
-    def _rational(
-        self, values: Mapping[str, Any], p: Any, i: Any, d: Any
-    ) -> tuple[Polynomial, Polynomial]:
-        """Sum of p, i/s and d H(s) over one denominator."""
-        terms = self._terms(values)
-        integral = [1.0, 0.0] if terms.integrates else [1.0]
-        if self._filter is None or not terms.differentiates:
-            rolled_off, slope = [1.0], [d, 0.0]
-        else:
-            omega, damping = values["omega"], values["damping"]
-            rolled_off = [1.0, 2.0 * (damping * omega), omega * omega]
-            slope = [omega * omega * d, 0.0]
-        num = _scaled(p, multiplied(integral, rolled_off))
-        if terms.differentiates:
-            num = _summed(num, multiplied(integral, slope))
-        if terms.integrates:
-            num = _summed(num, _scaled(i, rolled_off))
-        return num, multiplied(integral, rolled_off)
-
-    def _equations(self, values: Mapping[str, Any]) -> ControllerEquations:
-        """Equations of the states: integral of the error first, filter after it."""
-        terms = self._terms(values)
-        on_error = 1.0 if terms.derivative_of_error else 0.0
-        update = None
-        blocks: list[list[list[Any]]] = []
-        drive: list[Any] = []
-        along: list[Any] = []
-        row: list[Any] = []
-        p, q, through = -terms.proportional, 0.0, 0.0
-        if terms.integrates:
-            blocks.append([[0.0]])
-            drive.append(-1.0)
-            along.append(1.0)
-            row.append(terms.integral)
-        if terms.differentiates and self._filter is None:
-            q = -terms.derivative
-        elif terms.differentiates and self._filter is not None:
-            omega, damping = values["omega"], values["damping"]
-            # The second state is the derivative over omega, so that both are of one size.
-            block = [[0.0, omega], [-omega, -2.0 * damping * omega]]
-            into, out = [0.0, omega], [0.0, -terms.derivative * omega]
-            rule, sample_time = self._filter.discretisation, values.get("sample_time")
-            if rule is not None and sample_time is not None:
-                # Between samples the states hold; the samples move them.
-                update = _sampled(block, into, out, sample_time, rule, on_error)
-                block, into, out = [[0.0, 0.0], [0.0, 0.0]], [0.0, 0.0], update.row.tolist()
-                p, through = p + update.direct, -on_error * update.direct
-            blocks.append(block)
-            drive += into
-            # The filter sees y, or y - r for a derivative of the error.
-            along += [-on_error * entry for entry in into]
-            row += out
-        rows: list[list[Any]] = []
-        for block in blocks:
-            before = len(rows)
-            after = len(drive) - before - len(block)
-            rows += [[0.0] * before + line + [0.0] * after for line in block]
-        return ControllerEquations(
-            matrix(rows),
-            vector(drive),
-            vector(along),
-            vector(row),
-            p,
-            q,
-            terms.proportional + through,
-            -on_error * q,
-            update,
-        )
-
-    def _rest(
-        self, values: Mapping[str, Any], output: float, reference: float, command: Any
-    ) -> Array:
-        """States after a long time at constant `output` and `reference`, giving `command`.
-
-        The integral takes the value at which the controller takes over without a bump.
-        """
-        terms = self._terms(values)
-        states: list[Any] = []
-        if terms.integrates:
-            missing = command - terms.proportional * (reference - output)
-            states.append(missing / terms.integral if terms.integral != 0.0 else 0.0)
-        if terms.differentiates and self._filter is not None:
-            seen = output - reference if terms.derivative_of_error else output
-            states += [seen, 0.0]
-        return vector(states)
-
-
-class _Terms(NamedTuple):
-    """u = p (r - y) + i ∫(r - y) - d H y, or + d H (r - y)."""
-
-    proportional: Any
-    integral: Any = 0.0
-    derivative: Any = 0.0
-    integrates: bool = False
-    differentiates: bool = False
-    derivative_of_error: bool = False
+    @property
+    def _form(self) -> ControllerForm:
+        """What it is without its numbers."""
+        kind, smooth = type(self).__name__, self._filter
+        if smooth is None:
+            return ControllerForm(kind)
+        return ControllerForm(kind, True, smooth.discretisation)
 
 
 @dataclass(frozen=True)
@@ -287,9 +141,6 @@ class P(Controller):
     """
 
     Kp: float
-
-    def _terms(self, values: Mapping[str, Any]) -> _Terms:
-        return _Terms(values["Kp"])
 
 
 @dataclass(frozen=True)
@@ -322,9 +173,6 @@ class PV(Controller):
     Kv: float
     filter: DerivativeFilter | None = None
 
-    def _terms(self, values: Mapping[str, Any]) -> _Terms:
-        return _Terms(values["Kp"], derivative=values["Kv"], differentiates=True)
-
 
 @dataclass(frozen=True)
 class PD(Controller):
@@ -355,11 +203,6 @@ class PD(Controller):
     Kd: float
     filter: DerivativeFilter | None = None
 
-    def _terms(self, values: Mapping[str, Any]) -> _Terms:
-        return _Terms(
-            values["Kp"], derivative=values["Kd"], differentiates=True, derivative_of_error=True
-        )
-
 
 @dataclass(frozen=True)
 class PI(Controller):
@@ -384,9 +227,6 @@ class PI(Controller):
 
     Kp: float
     Ki: float
-
-    def _terms(self, values: Mapping[str, Any]) -> _Terms:
-        return _Terms(values["Kp"], integral=values["Ki"], integrates=True)
 
 
 @dataclass(frozen=True)
@@ -417,26 +257,3 @@ class PID(Controller):
     Ki: float
     Kd: float
     filter: DerivativeFilter | None = None
-
-    def _terms(self, values: Mapping[str, Any]) -> _Terms:
-        return _Terms(
-            values["Kp"],
-            integral=values["Ki"],
-            derivative=values["Kd"],
-            integrates=True,
-            differentiates=True,
-            derivative_of_error=True,
-        )
-
-
-def _summed(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Sum of two polynomials."""
-    if len(p) < len(q):
-        p, q = q, p
-    head = len(p) - len(q)
-    return p[:head] + [a + b for a, b in zip(p[head:], q, strict=True)]
-
-
-def _scaled(factor: Any, p: Polynomial) -> Polynomial:
-    """A polynomial times a number or symbol."""
-    return [factor * a for a in p]

@@ -3,10 +3,6 @@
 The filter x' = F x + G v, d = C x, driven by the samples v_k of what it filters, becomes
 
     x_{k+1} = Fd x_k + Gd v_k,   d_k = Cd x_k + Dd v_k.
-
-``"hold"``: v held between samples, exact for it; ``"tustin"``: the trapezoidal rule, s for
-(2/Ts)(z - 1)/(z + 1); ``"backward"``: Euler's implicit rule, s for (z - 1)/(Ts z).
-Åström & Wittenmark, Computer-Controlled Systems (3rd ed. 1997), sections 2.3 and 8.2.
 """
 
 from __future__ import annotations
@@ -14,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
-import numpy as np
-
 from deadtime._base.arrays import Array
 from deadtime._base.validation import positive
+from deadtime.loops._native import sampled_filter
 
 Discretisation: TypeAlias = Literal["hold", "tustin", "backward"]
 
@@ -98,15 +93,4 @@ def discretised(
     F: Array, G: Array, C: Array, sample_time: float, method: Discretisation
 ) -> SampledFilter:
     """Return the filter of a sample time in s by one of the methods."""
-    from scipy.linalg import expm, solve
-
-    n, into = len(F), G[:, None]
-    if method == "hold":
-        held = expm(sample_time * np.block([[F, into], [np.zeros((1, n + 1))]]))
-        return SampledFilter(held[:n, :n], held[:n, n], C, 0.0)
-    # s for (z - 1)/(Ts (w z + 1 - w)), w the weight of the later end of a sample.
-    later = 0.5 if method == "tustin" else 1.0
-    left = np.eye(n) - later * sample_time * F
-    Fd = solve(left, np.eye(n) + (1.0 - later) * sample_time * F)
-    Gd = solve(left, sample_time * into)[:, 0]
-    return SampledFilter(Fd, Gd, solve(left.T, C), float(later * (C @ Gd)))
+    return SampledFilter(*sampled_filter(F, G, C, sample_time, method))

@@ -10,9 +10,8 @@ import numpy as np
 
 from deadtime._base.explorer import Explorer
 from deadtime.loops._factored_plant import FactoredPlant
-from deadtime.loops._model import refuse_discretised
 from deadtime.loops._plants import FirstOrder, Integrator, Plant
-from deadtime.loops._specification import LoopSpecification
+from deadtime.loops._specification import LoopSpecification, refuse_discretised
 
 #: Gains on the axes reach to so many times the loop's own.
 _REACH = 4.0

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from deadtime._base.validation import finite, non_negative, non_zero, positive, unmasked
-from deadtime.loops._entries import multiplied
-from deadtime.loops._plants import NO_GAIN, Plant
+from deadtime.loops._plants import NO_GAIN, Plant, PlantForm
 
 #: Names of the numbers of a pair of complex poles.
 PAIR = ("pole_frequency", "pole_damping")
@@ -130,19 +128,13 @@ class FactoredPlant(Plant):
         lags = [values.pop(f"lag_{i}") for i in range(1, len(self.lags) + 1)]
         return replace(self, lags=lags, **values)  # type: ignore[arg-type]
 
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        num, den = self._without_lags(values)
-        for i in range(1, len(self.lags) + 1):
-            den = multiplied(den, [values[f"lag_{i}"], 1.0])
-        if "zero" in self.parameters:
-            num = multiplied(num, [values["zero"], 1.0])
-        return num, den
-
-    def _without_lags(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        """Numerator and denominator without the lags and the zero."""
-        num, den = [values["gain"]], [1.0, 0.0] if self.integrator else [1.0]
-        if not self.has_pair:
-            return num, den
-        frequency, damping = (values[name] for name in PAIR)
-        square = frequency * frequency
-        return [square * num[0]], multiplied(den, [1.0, 2.0 * damping * frequency, square])
+    @property
+    def _form(self) -> PlantForm:
+        return PlantForm(
+            tuple(self.parameters),
+            (1.0,),
+            (1.0, 0.0) if self.integrator else (1.0,),
+            len(self.lags),
+            "zero" in self.parameters,
+            self.has_pair,
+        )

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from deadtime._base.validation import finite, positive
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._model import LoopRun, reference_jumps, refuse_discretised
-from deadtime.loops._native import fixed_step_run
-from deadtime.loops._plants import realise
+from deadtime.loops._runs import LoopRun, reference_jumps
+from deadtime.loops._specification import refuse_discretised
 from deadtime.systems import Response
 
 #: A time counts as a whole number of steps if it differs by less than this, in steps: rounding of
@@ -119,8 +118,6 @@ def simulate_fixed_step(
             "its values hold"
         )
     jumps = reference_jumps(np.zeros(1), reference, reference_time, before)
-    values = loop.parameters
-    plant = realise(*loop.plant._polynomials(values))
     past = jumps.just_before(0.0)
     run = LoopRun(*specification.rest_at(initial, past), before, jumps.values, jumps.times)
     settings = FixedStepSettings(
@@ -133,7 +130,7 @@ def simulate_fixed_step(
         steps=_steps(duration, length),
         initial_output=initial,
     )
-    found = fixed_step_run(plant, loop.controller._equations(values), run, settings)
+    found = specification.kernel.fixed_step(run, settings)
     times = length * np.arange(settings.steps + 1, dtype=np.float64)
     # As such a tool plots them.
     lines: Any = partial(np.interp, xp=times, fp=found.outputs)

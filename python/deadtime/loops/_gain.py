@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.drawing import Axes, shown_rows
 from deadtime._base.validation import real_array
-from deadtime.loops._characteristic import closed_loop, open_loop
 from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.loops._specification import LoopSpecification
 from deadtime.loops._stability import sampled_is_stable
@@ -43,7 +42,7 @@ class LoopGain:
         >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).open_loop()
         (2 + 0.3 s) exp(-0.36 s) / s
         """
-        return open_loop(*self._without_hold("open_loop").known_parts)
+        return self._without_hold("open_loop").transfer("open")
 
     def closed_loop(self) -> TransferFunction:
         """Return the transfer function from reference to output, the limit left out.
@@ -64,8 +63,7 @@ class LoopGain:
         >>> dtm.ControlLoop(dtm.Integrator(), dtm.PV(2.0, 0.3), delay=0.36).closed_loop()
         2 exp(-0.36 s) / (s + (2 + 0.3 s) exp(-0.36 s))
         """
-        loop = self._without_hold("closed_loop")
-        return closed_loop(*loop.known_parts, loop.delay_path)
+        return self._without_hold("closed_loop").transfer("output")
 
     def _without_hold(self, question: str) -> LoopSpecification:
         """The continuous loop, for a question that would leave a hold out."""

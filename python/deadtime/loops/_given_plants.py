@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from deadtime._base.validation import non_zero
-from deadtime.loops._plants import NO_GAIN, Plant, RationalPlant
+from deadtime.loops._plants import NO_GAIN, Plant, PlantForm, RationalPlant
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems import DelaySystem, TransferFunction
 
@@ -85,15 +85,10 @@ class PlantWithDelays(Plant):
         """
         return self.gain * self.transfer
 
-    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
-        return values["gain"] * self.transfer.num, self.transfer.den
-
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        raise ValueError(
-            f"plant={self.transfer!r} has delays inside, so that no state space of it exists, "
-            "which this needs: give a plant that is rational but for one delay in series, or ask "
-            "for poles, margins, stable ranges, maps or a simulation of the continuous loop"
-        )
+    @property
+    def _form(self) -> PlantForm:
+        num, den = self.transfer.num, self.transfer.den
+        return PlantForm(("gain",), delayed=(num._native, den._native))
 
 
 def plant_and_delay(given: object) -> tuple[Plant, float]:

@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, one_dimensional
-from deadtime.loops._characteristic import closed_loop
-from deadtime.loops._model import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._native import LoopResponse, on_samples
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
+from deadtime.loops._runs import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
 from deadtime.loops._settled import stays_settled
 from deadtime.loops._specification import LoopSpecification
@@ -215,7 +214,7 @@ class LoopInTime:
                 f"limit={loop.limit}: the command that an impulse causes is beyond any limit; "
                 "leave it out with loop.replace(limit=None)"
             )
-        found = closed_loop(*loop.known_parts, loop.delay_path).impulse_response(time)
+        found = loop.transfer("output").impulse_response(time)
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
 
 

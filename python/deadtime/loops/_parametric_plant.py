@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from deadtime._base.frozen import FrozenDict
 from deadtime._base.validation import finite, non_zero
-from deadtime.loops._plants import NO_GAIN, Plant, RationalPlant, steady_lag
+from deadtime.loops._plants import NO_GAIN, Plant, PlantForm, RationalPlant, steady_lag
 
 #: Numerator and denominator, descending, from the named numbers.
 Polynomials: TypeAlias = Callable[..., tuple[Sequence[Any], Sequence[Any]]]
@@ -98,7 +98,15 @@ class ParametricPlant(Plant):
         gain = values.pop("gain")
         return ParametricPlant(self.polynomials_of, values, gain)
 
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
+    @property
+    def _form(self) -> PlantForm:
+        return PlantForm(("gain", *self.numbers))
+
+    def _polynomials(self, values: Mapping[str, float]) -> tuple[list[float], list[float]]:
+        num, den = self._given(values)
+        return [values["gain"] * c for c in num], den
+
+    def _given(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
         try:
             num, den = self.polynomials_of(**{name: values[name] for name in self.numbers})
         except TypeError as error:
@@ -111,4 +119,4 @@ class ParametricPlant(Plant):
                 f"polynomials({', '.join(self.numbers)}) failed: {error}; it returns two lists, "
                 "(num, den)"
             ) from error
-        return [values["gain"] * one for one in num], list(den)
+        return list(num), list(den)

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, SupportsFloat, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, non_negative, non_zero, unmasked
-from deadtime.loops._entries import number, vector
-from deadtime.roots import s
+from deadtime.loops._native import canonical_form, plant_polynomials
 from deadtime.systems import TransferFunction
 
 
@@ -40,6 +40,22 @@ class StateSpace(NamedTuple):
     B: NDArray[np.float64]
     C: NDArray[np.float64]
     D: float
+
+
+class PlantForm(NamedTuple):
+    """The form of a plant as the kernel takes it: gain num/den, and the factors by their numbers.
+
+    Without `num` and `den` its polynomials are given with its numbers, or it has delays inside.
+    """
+
+    names: tuple[str, ...]
+    num: Sequence[float] | None = None
+    den: Sequence[float] | None = None
+    lags: int = 0
+    has_zero: bool = False
+    has_pair: bool = False
+    #: Numerator and denominator of a plant with delays inside.
+    delayed: tuple[Any, Any] | None = None
 
 
 class Plant(ABC):
@@ -64,14 +80,19 @@ class Plant(ABC):
         """Return the same plant with other numbers."""
         return cast(Plant, replace(cast(Any, self), **numbers))
 
+    @property
     @abstractmethod
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        """Numerator and denominator, descending, in numbers, arrays or symbols of `values`."""
+    def _form(self) -> PlantForm:
+        """What it is without its numbers."""
 
-    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
-        """Numerator and denominator as quasi-polynomials, or families of them."""
-        num, den = self._polynomials(values)
-        return in_s(num), in_s(den)
+    def _given(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]] | None:
+        """Polynomials for a gain of one, in numbers, arrays or symbols; None where `_form` has them."""
+        return None
+
+    def _polynomials(self, values: Mapping[str, float]) -> tuple[list[float], list[float]]:
+        """Numerator and denominator, descending, for these numbers."""
+        form = self._form
+        return plant_polynomials(form, [values[name] for name in form.names])
 
     def polynomials(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Numerator and denominator of the transfer function.
@@ -164,8 +185,9 @@ class Integrator(Plant):
         """``gain`` and ``lag``."""
         return {"gain": self.gain, "lag": self.lag}
 
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        return [values["gain"]], [values["lag"], 1.0, 0.0]
+    @property
+    def _form(self) -> PlantForm:
+        return PlantForm(("gain", "lag"), (1.0,), (1.0, 0.0), lags=1)
 
 
 @dataclass(frozen=True)
@@ -206,8 +228,9 @@ class FirstOrder(Plant):
         """``gain`` and ``time_constant``."""
         return {"gain": self.gain, "time_constant": self.time_constant}
 
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        return [values["gain"]], [values["time_constant"], 1.0]
+    @property
+    def _form(self) -> PlantForm:
+        return PlantForm(("gain", "time_constant"), (1.0,), (1.0,), lags=1)
 
 
 @dataclass(frozen=True)
@@ -254,8 +277,9 @@ class RationalPlant(Plant):
         """``gain``."""
         return {"gain": self.gain}
 
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        return [values["gain"] * b for b in self.num], list(self.den)
+    @property
+    def _form(self) -> PlantForm:
+        return PlantForm(("gain",), self.num, self.den)
 
 
 def kit_plant() -> RationalPlant:
@@ -298,68 +322,16 @@ def steady_lag(num: Sequence[float], den: Sequence[float]) -> float:
     return slope(den) - slope(num)
 
 
-def realise(num: Sequence[Any], den: Sequence[Any]) -> StateSpace:
-    """Observable canonical form of num/den (descending, proper); entries may be arrays."""
-    a, b = _led(den), _led(num)
-    lead, n = a[0], len(a) - 1
-    poles = [c / lead for c in a[1:]]
-    if len(b) > n:
-        direct = b[0] / lead
-        drive = [gain / lead - pole * direct for gain, pole in zip(b[1:], poles, strict=True)]
-    else:
-        direct = 0.0
-        drive = [0.0] * (n - len(b)) + [gain / lead for gain in b]
-    flat = [0.0] * (n * n)
-    for i, pole in enumerate(poles):
-        flat[i * n] = 0.0 - pole
-        if i:
-            flat[(i - 1) * n + i] = 1.0
-    first = np.zeros(n)
-    if n:
-        first[0] = 1.0
-    return StateSpace(vector(flat).reshape(n, n), vector(drive), first, number(direct))
+def realise(num: Sequence[float], den: Sequence[float]) -> StateSpace:
+    """Observable canonical form of num/den (descending, proper)."""
+    A, B, D, *_ = canonical_form(list(num), list(den))
+    return StateSpace(A, B, np.eye(1, len(B))[0], D)
 
 
-def rest(
-    num: Sequence[Any], den: Sequence[Any], output: float, plant: StateSpace | None = None
-) -> tuple[Any, Any]:
-    """State and command of a plant at rest with the given output, for `realise`'s state.
-
-    `plant` is what `realise` makes of `num` and `den`, where that is known.
-    """
-    plant = realise(num, den) if plant is None else plant
-    n = len(plant.B)
-    zeros, poles = num[-1], den[-1]
-    if poles == 0.0 or output == 0.0:
-        command: Any = 0.0
-    elif zeros == 0.0:
-        raise ValueError(
-            f"initial_output={output}: this plant has no steady gain and rests only at zero, "
-            "start it there"
-        )
-    else:
-        command = output * poles / zeros
-    state: list[Any] = []
-    if n:
-        state.append(output - plant.D * command)
-        for i in range(n - 1):
-            state.append(-(plant.A[i, 0] * state[0] + plant.B[i] * command))
-    return vector(state), command
-
-
-def _led(coefficients: Sequence[Any]) -> list[Any]:
-    """Drop leading entries that are zero throughout, keep at least one."""
-    for first, c in enumerate(coefficients):
-        if _is_something(c):
-            return list(coefficients[first:])
-    return list(coefficients[-1:])
-
-
-def _is_something(coefficient: Any) -> bool:
-    """Whether a number, or any of an array, is other than zero."""
-    if type(coefficient) is float:
-        return coefficient != 0.0
-    return bool(np.any(coefficient != 0.0))
+def rest(num: Sequence[float], den: Sequence[float], output: float) -> tuple[Array, float]:
+    """State and command of a plant at rest with the given output, for `realise`'s state."""
+    *_, state, command = canonical_form(list(num), list(den), output)
+    return state, command
 
 
 def _trimmed(coefficients: Sequence[float]) -> NDArray[np.float64]:
@@ -379,12 +351,3 @@ def _coefficients(name: str, given: Sequence[SupportsFloat]) -> tuple[float, ...
     if numbers.size == 0 or not numbers.any():
         raise ValueError(f"{name}={listed}: give at least one coefficient other than zero")
     return tuple(float(c) for c in _trimmed(numbers.tolist()))
-
-
-def in_s(coefficients: Sequence[Any]) -> Any:
-    """The quasi-polynomial, with symbols the family, of these descending coefficients."""
-    total: Any = 0.0 * s
-    for power, c in enumerate(reversed(coefficients)):
-        if not (isinstance(c, float) and c == 0.0):
-            total = total + c * s**power
-    return total

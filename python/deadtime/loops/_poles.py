@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import SupportsFloat, cast
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.validation import OpenRange, Range, whole_number
-from deadtime.loops._characteristic import family_of_loop
 from deadtime.loops._sampled_regions import sampled_poles_in
 from deadtime.loops._specification import LoopSpecification
 from deadtime.loops._stability import (
@@ -61,7 +60,7 @@ class LoopPoles:
         )
         loop = self.specification
         _ = loop.known_delay
-        return cast("QuasiPolynomial", loop.characteristic_at(loop.parameters))
+        return QuasiPolynomial._wrap(loop.kernel.characteristic())
 
     def count(self, re: OpenRange | None = None, im: OpenRange | None = None) -> int:
         """Count the poles in a region, with multiplicity.
@@ -211,7 +210,7 @@ class LoopPoles:
         loop = self.specification
         if loop.sample_time is None:
             return self.characteristic().spectral_abscissa(strong)
-        return sampled_abscissa(loop.model, loop.known_delay, loop.sample_time)
+        return loop.native.abscissa()
 
     def is_stable(self, strong: bool = True) -> bool:
         """Whether every pole lies left of the imaginary axis, limit left out.
@@ -235,7 +234,7 @@ class LoopPoles:
         loop = self.specification
         if loop.sample_time is None:
             return self.characteristic().is_stable(strong)
-        return sampled_is_stable(loop.model, loop.known_delay, loop.sample_time)
+        return loop.native.unstable_poles() == 0
 
     def crossings(
         self, ranges: Mapping[str, Range], *, at: Mapping[str, SupportsFloat] | None = None
@@ -326,8 +325,7 @@ class LoopPoles:
                 f"the loop is not stable at {name}={values[name]}: start from a stable one, for "
                 "example with lower gains"
             )
-        seek = continuous_range if loop.sample_time is None else sampled_range
-        return seek(loop.plant, loop.controller, values, name)
+        return loop.stable_range(name)
 
     def transition_matrix(self) -> NDArray[np.float64]:
         """Return the matrix that takes a sampled loop, limit left out, from sample to sample.
@@ -368,4 +366,4 @@ class LoopPoles:
             "loop.continuous() for the loop without its hold, or look at single cells with "
             "dtm.stability_map"
         )
-        return family_of_loop(loop.characteristic_at, loop.parameters, names)
+        return loop.family_of(tuple(names))

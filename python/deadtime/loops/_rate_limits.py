@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import positive
 from deadtime.loops._native import rate_limited
-from deadtime.loops._plants import Plant, RationalPlant
+from deadtime.loops._plants import Plant, PlantForm, RationalPlant
 from deadtime.systems import TransferFunction
 
 #: Pieces into which a command that holds is cut. The output of an integrator is exact at their
@@ -173,10 +173,8 @@ class RateLimited(Plant):
         """
         self._refuse()
 
-    def _polynomials(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        self._refuse()
-
-    def _fraction(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
+    @property
+    def _form(self) -> PlantForm:
         self._refuse()
 
     def _refuse(self) -> NoReturn:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from deadtime._base.validation import one_dimensional
-from deadtime.loops._characteristic import closed_loop, reference_to_command
-from deadtime.loops._model import RunArguments, reference_jumps
+from deadtime.loops._runs import RunArguments, reference_jumps
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, TransferFunction
 
@@ -74,11 +73,11 @@ def settled_step_with_delays(loop: LoopSpecification, amplitude: float) -> Respo
 
 def _driven(loop: LoopSpecification) -> tuple[TransferFunction, TransferFunction]:
     """From the reference to the output, and to the command."""
-    command = reference_to_command(*loop.known_parts)
+    command = loop.transfer("command")
     if not command.is_proper:
         raise ValueError(
             "a step of the reference is an impulse of the command of this loop: give its "
             "derivative a DerivativeFilter, or take the derivative of the measurement alone, as PV "
             "does"
         )
-    return closed_loop(*loop.known_parts, loop.delay_path), command
+    return loop.transfer("output"), command

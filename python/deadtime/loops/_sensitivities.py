@@ -1,41 +1,23 @@
 """Slopes of a response with respect to numbers of its loop.
 
-The stepper runs in numbers that carry a slope, so breaking points, arrivals and samples move with
-the parameter. What it needs are the slopes of the loop's matrices and of its start: the equations
-are evaluated at value + 1e-30 i, whose imaginary part is the slope to rounding (complex step;
-Squire & Trapp 1998).
+The kernel runs in numbers that carry a slope, so breaking points, arrivals and samples move with
+the parameter.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from deadtime._base.arrays import Array
-from deadtime.loops._model import LoopRun, refuse_discretised, state_at_rest
-from deadtime.loops._native import loop_sensitivities
-from deadtime.loops._specification import LoopSpecification
+from deadtime.loops._runs import LoopRun
+from deadtime.loops._specification import LoopSpecification, refuse_discretised
 
 Slopes = dict[str, Array]
 
 _STEP = 1e-30
-
-
-class LoopSlopes(NamedTuple):
-    """A loop as the stepper takes it, and derivatives by parameters, a row a parameter.
-
-    They are derivatives of the row, of the state and the command before the start, and of how much
-    earlier than its measurement the output is.
-    """
-
-    row: Array
-    row_slopes: Array
-    state_slopes: Array
-    command_slopes: Array
-    output_lead_slopes: Array
 
 
 def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...]:
@@ -76,32 +58,29 @@ def output_and_input_slopes(
     """
     if not names:
         return {}, {}
-    values: dict[str, Any] = dict(loop.parameters)
-    # In units of their own size, all slopes are comparable with the values.
-    units = {name: abs(values[name]) or 1.0 for name in names}
-    rows, states, commands, leads = [], [], [], []
-    for name in names:
-        stepped = values | {name: complex(values[name], _STEP * units[name])}
-        rows.append(_row(loop, stepped).imag / _STEP)
-        begin, held = state_at_rest(loop.plant, loop.controller, stepped, *initial)
-        states.append(np.imag(begin) / _STEP)
-        commands.append(np.imag(held) / _STEP)
-        moves = name == "delay" and loop.delay_path == "measurement"
-        leads.append(units[name] if moves else 0.0)
-    slopes = LoopSlopes(
-        row=_row(loop, values),
-        row_slopes=np.array(rows),
-        state_slopes=np.array(states),
-        command_slopes=np.array(commands),
-        output_lead_slopes=np.array(leads),
+    found = loop.kernel.sensitivities(
+        list(names), run, initial, since + loop.output_lead, since, _given_slopes(loop, names)
     )
-    found = loop_sensitivities(slopes, run, since + loop.output_lead, since)
     return (
-        {name: row / units[name] for name, row in zip(names, found.outputs, strict=True)},
-        {name: row / units[name] for name, row in zip(names, found.inputs, strict=True)},
+        dict(zip(names, found.outputs, strict=True)),
+        dict(zip(names, found.inputs, strict=True)),
     )
 
 
-def _row(loop: LoopSpecification, values: dict[str, Any]) -> NDArray[Any]:
-    model = loop.model_at(values)
-    return model.row(values["delay"], values.get("sample_time"), values.get("limit"))
+def _given_slopes(loop: LoopSpecification, names: Sequence[str]) -> list[Any] | None:
+    """Value and slope of the polynomials of a plant that gives them, for each of the numbers.
+
+    The slopes are those by the complex step (Squire & Trapp 1998), in units of the number.
+    """
+    values: dict[str, Any] = dict(loop.parameters)
+    if loop.plant._given(values) is None:
+        return None
+    found = []
+    for name in names:
+        unit = abs(values[name]) or 1.0
+        given = loop.plant._given(values | {name: complex(values[name], _STEP * unit)})
+        parts = [] if given is None else given
+        found.append(
+            tuple([(float(np.real(c)), float(np.imag(c)) / _STEP) for c in part] for part in parts)
+        )
+    return found

@@ -6,8 +6,8 @@ them take the specification.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 
 from deadtime._base.frozen import PickledByFields
 from deadtime._base.validation import non_negative, positive
-from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
-from deadtime.loops._model import LoopModel, LoopRun, rest_of, state_at_rest
+from deadtime.loops._model import LoopModel
+from deadtime.loops._native import Loop
 from deadtime.loops._plants import Plant
+from deadtime.roots import Parameter, ParametricQuasiPolynomial, QuasiPolynomial
+from deadtime.systems import TransferFunction
 
 if TYPE_CHECKING:
     from deadtime.loops._native import LinearLoop, LoopResponse
+    from deadtime.loops._runs import LoopRun
 
 
 #: Where the delay of a loop can sit.
@@ -56,9 +59,7 @@ class LoopSpecification(PickledByFields):
                 f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, DELAY_PATHS))}"
             )
         if self.plant.is_rational:
-            # Building the model checks that its parts fit. A cached property takes a lock in Python
-            # 3.11, for a tenth of the time of all this.
-            vars(self)["model"] = self.model_at(self.parameters)
+            self.kernel.check()
             return
         if not self.plant.is_linear:
             return
@@ -89,10 +90,11 @@ class LoopSpecification(PickledByFields):
             )
         return self.delay
 
-    @property
-    def known_parts(self) -> tuple[Plant, Controller, dict[str, float]]:
-        """Plant, controller and all numbers; raises where the delay is None."""
-        return self.plant, self.controller, self.parameters | {"delay": self.known_delay}
+    def transfer(self, of: str) -> TransferFunction:
+        """The loop gain (`open`), or from the reference to `output` or `command`."""
+        _ = self.known_delay
+        num, den = self.kernel.transfer(of)
+        return TransferFunction(QuasiPolynomial._wrap(num), QuasiPolynomial._wrap(den))
 
     def refuse_hold(self, why: str) -> None:
         """Raise where the loop is sampled."""
@@ -105,55 +107,71 @@ class LoopSpecification(PickledByFields):
         return self.known_delay if self.delay_path == "measurement" else 0.0
 
     @cached_property
-    def model(self) -> LoopModel:
-        """The equations of the loop with its own numbers."""
-        return self.model_at(self.parameters)
+    def kernel(self) -> Loop:
+        """The loop of the kernel; a delay that is None counts as zero there."""
+        plant, controller = self.plant, self.controller
+        numbers = plant.parameters
+        return Loop(
+            plant._form,
+            controller._form,
+            ([*numbers.values()], [*controller.parameters.values()]),
+            delay=0.0 if self.delay is None else self.delay,
+            sample_time=self.sample_time,
+            limit=self.limit,
+            is_measured=self.delay_path == "measurement",
+            given=plant._given(numbers),
+        )
 
-    def model_at(self, values: Mapping[str, Any]) -> LoopModel:
-        """The equations with other numbers, arrays of them, or complex ones."""
-        return LoopModel.build(self.plant, self.controller, values)
+    def kernel_at(self, values: Mapping[str, float]) -> Loop:
+        """The loop of the kernel with other numbers."""
+        numbers = self.plant.parameters
+        given = self.plant._given(numbers | values) if numbers.keys() & values.keys() else None
+        return self.kernel.at(dict(values), given)
 
-    def abscissa_at(self, values: Mapping[str, Any]) -> float:
+    def abscissa_at(self, values: Mapping[str, float]) -> float:
         """Spectral abscissa in 1/s with other numbers, also beyond what a loop may have."""
         _ = self.known_delay
+        changed = self.kernel_at(values)
         if self.sample_time is None:
-            return float(self.characteristic_at(values).spectral_abscissa())
-        native = self._closed_at(values).native(values["delay"], values["sample_time"])
-        found = native.abscissa()
-        return float(native.poles()[0].real) if found is None else found
+            return float(QuasiPolynomial._wrap(changed.characteristic()).spectral_abscissa())
+        found = changed.linear.abscissa()
+        return float(changed.linear.poles()[0].real) if found is None else found
 
-    def _closed_at(self, values: Mapping[str, Any]) -> LoopModel:
-        """Equations whose poles are those with other numbers; from parts where gains alone differ.
+    def polynomials_of(self, numbers: list[float]) -> tuple[list[Any], list[Any]] | None:
+        """Polynomials for a gain of one, of a plant that gives them, for other numbers of it."""
+        return self.plant._given(dict(zip(self.plant.parameters, numbers, strict=True)))
 
-        The feedback is linear in the gains, and nothing else that the poles depend on has them.
-        """
-        gains = self.controller._gains()
-        own = self.parameters
-        fixed = (name for name in own if name not in (*gains, "delay", "limit"))
-        if self.model.update is not None or any(values[name] != own[name] for name in fixed):
-            return self.model_at(values)
-        K, L = np.zeros_like(self.model.K), 0.0
-        for name, (row, direct) in self._shares.items():
-            K, L = K + values[name] * row, L + values[name] * direct
-        return replace(self.model, K=K, L=L)
+    def _symbols(self, names: Sequence[str]) -> Any:
+        """Those polynomials, in these numbers of the loop."""
+        given = self.plant._given({**self.parameters, **{n: Parameter(n) for n in names}})
+        return given and tuple([_monomials(c, names) for c in part] for part in given)
 
-    @cached_property
-    def _shares(self) -> dict[str, tuple[NDArray[np.float64], float]]:
-        """The feedback K and L of each gain alone, for a gain of one."""
-        gains = self.controller._gains()
-        alone = {name: self.parameters | dict.fromkeys(gains, 0.0) | {name: 1.0} for name in gains}
-        models = {name: self.model_at(values) for name, values in alone.items()}
-        return {name: (model.K, float(model.L)) for name, model in models.items()}
+    def family_of(self, names: Sequence[str]) -> ParametricQuasiPolynomial:
+        """The characteristic function with these numbers as its parameters."""
+        numbers_of(self.parameters, names)
+        terms: dict[Any, float] = {}
+        for number, powers, power, constant, slopes in self.kernel.terms(
+            list(names), self._symbols(names)
+        ):
+            key = (_named(names, powers), power, (constant, _named(names, slopes)))
+            terms[key] = terms.get(key, 0.0) + number
+        return ParametricQuasiPolynomial._of(tuple(names), terms)
 
-    def characteristic_at(self, values: Mapping[str, Any]) -> Any:
-        """The characteristic function with numbers or symbols, one for each of `parameters`."""
-        return characteristic(self.plant, self.controller, values)
+    def stable_range(self, name: str) -> tuple[float, float]:
+        """Stable values of one number of a stable loop, around its present one."""
+        free = None if self.sample_time is not None else self._symbols((name,))
+        return self.kernel.stable_range(name, free, self.polynomials_of)
 
     @cached_property
     def native(self) -> LinearLoop:
         """The loop as the stepper holds it."""
-        is_ahead = self.delay_path == "measurement"
-        return self.model.native(self.known_delay, self.sample_time, self.limit, is_ahead)
+        _ = self.known_delay
+        return self.kernel.linear
+
+    @cached_property
+    def model(self) -> LoopModel:
+        """The equations of the loop."""
+        return LoopModel.of(self.kernel.linear)
 
     @cached_property
     def respond(self) -> Callable[[NDArray[np.float64], LoopRun | float], LoopResponse] | None:
@@ -165,33 +183,60 @@ class LoopSpecification(PickledByFields):
 
     def rest_at(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
         """State in which the plant rests at `output`, and the command that keeps it there."""
-        if output == 0.0 and reference == 0.0:
-            return self._rest_at_zero
-        return self._rest_at(output, reference)
-
-    @cached_property
-    def _rest_at_zero(self) -> tuple[NDArray[np.float64], float]:
-        return np.zeros(len(self.model.B)), 0.0
-
-    def _rest_at(self, output: float, reference: float) -> tuple[NDArray[np.float64], float]:
-        numbers, space = self.parameters, self.model.plant
-        return state_at_rest(self.plant, self.controller, numbers, output, reference, space)
+        return self.kernel.rest(output, reference)
 
     def steady_state(self, reference: float) -> float | None:
         """Output at rest under a constant reference; None without such a rest within the limit."""
         command = self.command_at_rest(reference)
         if command is None or (self.limit is not None and abs(command) > self.limit):
             return None
-        return self._rest_gains[0] * reference if self._rest_gains else None
+        return self.kernel.rest_gains()[0] * reference
 
     def command_at_rest(self, reference: float) -> float | None:
         """Command at rest under a constant reference, limit left out; None without such a rest."""
-        return self._rest_gains[1] * reference if self._rest_gains else None
+        output, command = self.kernel.rest_gains()
+        return None if np.isnan(output) else command * reference
 
-    @cached_property
-    def _rest_gains(self) -> tuple[float, float] | None:
-        """Output and command at rest under a unit reference, None where there is no such rest."""
-        if self.model.update is not None:
-            return self.model.rest_gains
-        output, command = rest_of(self.plant, self.controller, self.parameters)
-        return None if np.isnan(output) else (float(output), float(command))
+
+def numbers_of(parameters: Mapping[str, float | None], names: Collection[str]) -> dict[str, Any]:
+    """Return the numbers of a loop that stability depends on; `names` must be among them."""
+    values: dict[str, Any] = {**parameters}
+    values.pop("limit", None)
+    unknown = [name for name in names if name not in values and name != "delay"]
+    if unknown:
+        raise ValueError(
+            f"ranges for {', '.join(unknown)}: stability depends on no such number of this loop, "
+            f"but on {', '.join(dict.fromkeys([*values, 'delay']))}"
+        )
+    if "delay" not in values and "delay" not in names:
+        raise ValueError(
+            "the delay of this loop is None: give it a range, or set it with "
+            "loop.replace(delay=...)"
+        )
+    return values
+
+
+def refuse_discretised(controller: Controller, sample_time: float | None, what: str) -> None:
+    """Raise where a filter runs in samples, which `what` cannot do."""
+    smooth = controller._filter
+    if sample_time is not None and smooth is not None and smooth.discretisation is not None:
+        raise ValueError(
+            f"{what} cannot run a filter in samples (discretisation={smooth.discretisation!r}): "
+            "leave its discretisation out, or take loops one by one"
+        )
+
+
+def _named(names: Sequence[str], numbers: Sequence[Any]) -> tuple[tuple[str, Any], ...]:
+    """Names and numbers that are not zero, by name."""
+    return tuple(sorted((n, x) for n, x in zip(names, numbers, strict=True) if x))
+
+
+def _monomials(coefficient: Any, names: Sequence[str]) -> list[tuple[float, list[int]]]:
+    """A coefficient of a plant as factors and powers of `names`."""
+    if not isinstance(coefficient, ParametricQuasiPolynomial):
+        return [(float(coefficient), [])]
+    found = []
+    for (powers, _, _), factor in coefficient._terms.items():
+        exponents = dict(powers)
+        found.append((factor, [exponents.get(name, 0) for name in names]))
+    return found

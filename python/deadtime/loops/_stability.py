@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import deadtime.loops._native as native
-from deadtime.loops._characteristic import characteristic
 from deadtime.loops._controllers import Controller
 from deadtime.loops._factored_plant import PAIR
-from deadtime.loops._model import LoopModel, refuse_discretised
+from deadtime.loops._model import LoopModel
+from deadtime.loops._specification import refuse_discretised
 from deadtime.loops._native import sampled_abscissa_grid
 from deadtime.loops._parametric_plant import ParametricPlant
 from deadtime.loops._plants import Plant
@@ -130,7 +130,6 @@ def continuous_range(
 ) -> tuple[float, float]:
     """Stable values of one number of a continuous loop, around its present one."""
     value = values[name]
-    family = characteristic(plant, controller, {**values, name: Parameter(name)})
     if name == "delay":
         return native.delay_range(family._family, value)
     if name in _OF_FILTER:

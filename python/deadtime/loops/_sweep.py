@@ -1,17 +1,17 @@
 """Step responses of many loops at once, one for each set of numbers: their metrics or outputs.
 
-The equations of a loop are evaluated on arrays, which gives the matrices of all sets together. They
-are passed to the native part in blocks, so that memory stays bounded. Over a quarter of
-the file is documentation, and the blocks and their results are used nowhere else: one file.
+The kernel takes the numbers of all sets and simulates them. Over a quarter of the file is
+documentation, and the sets and their results are used nowhere else: one file.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, NamedTuple, TypeAlias
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,25 +29,15 @@ from deadtime._base.validation import (
     thread_number,
 )
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._entries import Each
-from deadtime.loops._model import refuse_discretised, rest_of
-from deadtime.loops._native import sweep_abscissae, sweep_decay, sweep_metrics, sweep_responses
+from deadtime.loops._native import Loop
 from deadtime.loops._settled import (
     TIME_CONSTANTS,
     counts_as_settled,
     rests_at_limit,
-    slowest_rates,
-    slowest_times,
     time_inside,
 )
-from deadtime.loops._stability import sampled_grid
+from deadtime.loops._specification import refuse_discretised
 from deadtime.systems import first_duration
-
-_Places: TypeAlias = slice | Indices
-
-#: Number of sets that are built and simulated together: more leave the caches, fewer take more
-#: calls.
-_BLOCK = 1 << 13
 
 # Sets that have not settled are simulated again over a longer time. The simulation times are the
 # first one times powers of 2^(1/_PER_DOUBLING), so that sets with the same time run together: a
@@ -297,15 +287,13 @@ def sweep(
 
 
 class LoopSets(NamedTuple):
-    """Loops with the same states, and the step of their reference."""
+    """The numbers of loops that differ, one for each, and the step of their reference."""
 
-    states: int
+    values: dict[str, Array]
+    #: The polynomials of a plant that gives them.
+    given: tuple[list[Any], list[Any]] | None
     size: int
-    #: `LoopModel.entries`.
-    entries: list[float | Array]
     amplitude: float
-    #: Whether the output is ahead of the time of the native simulation by the delay.
-    is_ahead: bool
 
 
 class _Run(NamedTuple):
@@ -343,33 +331,26 @@ class _Sets:
         }
         return replace(self, arrays=arrays, shape=places.shape)
 
-    def blocks(
-        self, progress: Report | None
-    ) -> Iterator[tuple[_Places, dict[str, Any], LoopSets, Any]]:
-        """Yield for each block its places, numbers, native sets and progress function."""
+    @cached_property
+    def native(self) -> LoopSets:
+        """The sets as the kernel takes them."""
         flat = {name: np.broadcast_to(a, self.shape).reshape(-1) for name, a in self.arrays.items()}
-        loop, done = self.loop, 0
-        for place, part in _blocks(loop, flat, math.prod(self.shape)):
-            numbers: dict[str, Any] = loop.parameters | part
-            each = numbers | {name: Each(array) for name, array in part.items()}
-            model = loop.specification.model_at(each)
-            entries = model.entries(*(each.get(name) for name in ("delay", "sample_time", "limit")))
-            ahead = loop.delay_path == "measurement"
-            report = None if progress is None else lambda n, done=done: progress(done + n)
-            size = len(next(iter(part.values())))
-            sets = LoopSets(len(model.B), size, entries, self.amplitude, ahead)
-            yield place, numbers, sets, report
-            done += size
+        given = self.loop.plant._given(self.loop.parameters | flat)
+        return LoopSets(flat, given, math.prod(self.shape), self.amplitude)
+
+    @property
+    def kernel(self) -> Loop:
+        """The loop with the numbers that are the same in all sets."""
+        return self.loop.specification.kernel
 
     def outputs(self, times: Array, progress: Report | None) -> Sweep:
         """Outputs at given times."""
-        count = math.prod(self.shape)
-        found, status = np.full((count, len(times)), np.nan), np.empty(count, dtype=np.uint8)
-        for place, _, sets, report in self.blocks(progress):
-            part = sweep_responses(sets, times - times[0], threads=self.threads, progress=report)
-            found[place], status[place] = part.outputs, part.status
-        outputs = found.reshape(*self.shape, len(times))
-        return Sweep(dict(self.arrays), self.shape, times, status.reshape(self.shape), {}, outputs)
+        found = self.kernel.sweep_responses(
+            self.native, times - times[0], threads=self.threads, progress=progress
+        )
+        outputs = found.outputs.reshape(*self.shape, len(times))
+        status = found.status.reshape(self.shape)
+        return Sweep(dict(self.arrays), self.shape, times, status, {}, outputs)
 
     def measured(self, span: float, progress: Report | None = None) -> _Run:
         """Metrics of `span` seconds of each response."""
@@ -378,26 +359,16 @@ class _Sets:
         # system and cleared by it each time, at a tenth of the cost of a sweep.
         found = np.empty((len(_METRICS) + 1, count))
         status = np.empty(count, dtype=np.uint8)
-        for place, numbers, sets, report in self.blocks(progress):
-            # Views of the results where `place` is a slice, else copies.
-            columns = [values[place] for values in found]
-            outcomes = status[place]
-            sweep_metrics(
-                sets,
-                columns=columns,
-                status=outcomes,
-                steady_state=_steady(self.loop, numbers, self.amplitude),
-                slowest_time=slowest_times(self.loop.plant, self.loop.controller, numbers),
-                span=span,
-                settling=self.settling,
-                rise=self.rise,
-                threads=self.threads,
-                progress=report,
-            )
-            if not isinstance(place, slice):
-                status[place] = outcomes
-                for values, column in zip(found, columns, strict=True):
-                    values[place] = column
+        self.kernel.sweep_metrics(
+            self.native,
+            columns=list(found),
+            status=status,
+            span=span,
+            settling=self.settling,
+            rise=self.rise,
+            threads=self.threads,
+            progress=progress,
+        )
         return _Run(dict(zip(_METRICS, found, strict=False)), status, found[-1])
 
     def decided(self, times: Array, progress: Report | None) -> Sweep:
@@ -473,12 +444,11 @@ class _Sets:
 
     def at_limit(self) -> tuple[Array, Mask]:
         """Decay rates of plant and controller alone, 1/s, and which commands rest at the limit."""
-        loop = self.loop
-        numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
-        _, command = rest_of(loop.plant, loop.controller, numbers)
-        rests = rests_at_limit(command * self.amplitude, numbers.get("limit", np.inf))
-        rates = slowest_rates(loop.plant, loop.controller, numbers)
-        return np.broadcast_to(rates, self.shape), np.broadcast_to(rests, self.shape)
+        command, slowest = self.kernel.sweep_rest(self.native)
+        limit = self.native.values.get("limit", self.loop.limit or np.inf)
+        with np.errstate(divide="ignore"):
+            rates = 1.0 / slowest
+        return rates.reshape(self.shape), rests_at_limit(command, limit).reshape(self.shape)
 
     def stay(self, settled: Array, limited_until: Array, end: float) -> Mask:
         """Whether sets that are in their bands at the end since `settled` count as settled."""
@@ -486,32 +456,16 @@ class _Sets:
         inside, stays = time_inside(settled, limited_until, end, rests)
         if self.loop.is_sampled:
             return counts_as_settled(inside, np.where(stays, alone, self.rates()))
-        found = self._decay(inside)
-        return np.where(stays, counts_as_settled(inside, alone), found)
-
-    def _decay(self, inside: Array) -> Mask:
-        """Whether continuous loops without their limits decay within the times `inside`, s."""
         # None of them decays fast enough for no time at all.
         with np.errstate(divide="ignore"):
             least = TIME_CONSTANTS / np.maximum(inside, 0.0)
-        found = np.empty(self.shape, dtype=bool)
-        for place, _, sets, _ in self.blocks(None):
-            found[place] = sweep_decay(sets, least[place], threads=self.threads)
-        return found
+        found = self.kernel.sweep_decay(self.native, least, threads=self.threads)
+        return np.where(stays, counts_as_settled(inside, alone), found.reshape(self.shape))
 
     def rates(self) -> Array:
         """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""
-        loop = self.loop
-        if loop.is_sampled:
-            numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
-            numbers.pop("limit", None)
-            cells = sampled_grid(loop.plant, loop.controller, numbers, threads=self.threads)
-            # Sets that differ in their limits alone have one loop.
-            return np.broadcast_to(-cells.abscissa, self.shape)
-        found = np.empty(self.shape)
-        for place, _, sets, _ in self.blocks(None):
-            found[place] = sweep_abscissae(sets, threads=self.threads)
-        return -found
+        found = self.kernel.sweep_abscissae(self.native, threads=self.threads)
+        return -found.reshape(self.shape)
 
 
 def _is_open(status: NDArray[np.uint8]) -> Mask:
@@ -521,6 +475,13 @@ def _is_open(status: NDArray[np.uint8]) -> Mask:
 def _longer(steps: Any) -> Any:
     """Ratio of the simulation time after `steps` steps to the first one."""
     return 2.0 ** (steps / _PER_DOUBLING)
+
+
+def commands_at_rest(loop: ControlLoop, values: Mapping[str, Array], amplitude: float) -> Array:
+    """Commands at rest under a constant reference, the limit left out, of loops with these numbers."""
+    (size,) = np.broadcast_shapes(*(np.shape(array) for array in values.values()))
+    sets = LoopSets({n: np.broadcast_to(v, size) for n, v in values.items()}, None, size, amplitude)
+    return loop.specification.kernel.sweep_rest(sets)[0]
 
 
 def require_loop(loop: object) -> None:
@@ -587,38 +548,3 @@ def _times(time: ArrayLike | None, responses: bool) -> Array:
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     return times
-
-
-def _blocks(
-    loop: ControlLoop, flat: Mapping[str, Array], count: int
-) -> Iterator[tuple[_Places, dict[str, Array]]]:
-    """Yield places and numbers of at most `_BLOCK` sets that have the same number of states."""
-    for first in range(0, count, _BLOCK):
-        places = slice(first, min(first + _BLOCK, count))
-        part = {name: array[places] for name, array in flat.items()}
-        # A leading coefficient of zero, for example with a lag of zero, removes a state.
-        orders: Any = 0
-        for coefficients in loop.plant._polynomials(loop.parameters | part):
-            leads: Any = True
-            for c in coefficients:
-                leads = leads & np.equal(c, 0.0)
-                orders = 2 * orders + leads
-                if not np.any(leads):
-                    leads = False
-        if np.ndim(orders) == 0:
-            yield places, part
-            continue
-        for order in np.unique(orders):
-            chosen = np.flatnonzero(orders == order)
-            if len(chosen) == len(orders):
-                yield places, part
-            else:
-                yield first + chosen, {name: array[chosen] for name, array in part.items()}
-
-
-def _steady(loop: ControlLoop, numbers: Mapping[str, Any], amplitude: float) -> float | Array:
-    """Steady output of every set; NaN if the command it needs exceeds the limit."""
-    output, command = rest_of(loop.plant, loop.controller, numbers)
-    limit = numbers.get("limit", np.inf)
-    steady = np.where(np.abs(command * amplitude) <= limit, output * amplitude, np.nan)
-    return float(steady) if steady.ndim == 0 else steady

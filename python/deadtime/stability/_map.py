@@ -19,7 +19,7 @@ from deadtime._base.frozen import ReadOnlyArrays, read_only
 from deadtime._base.notebook import Pictured
 from deadtime._base.progress import Progress, reported
 from deadtime._base.validation import Points, finite, numbers_at, thread_number
-from deadtime.loops import ControlLoop, Explorer, HeldFamily, Question, numbers_of
+from deadtime.loops import ControlLoop, Explorer, Question, held_plane, numbers_of
 from deadtime.roots import HasFamily, ParametricQuasiPolynomial, family_of
 from deadtime.stability._arguments import damping_demand, map_axes, sides
 from deadtime.stability._boundaries import Boundary, boundaries_along, boundaries_of
@@ -78,7 +78,6 @@ class StabilityMap(ReadOnlyArrays, Pictured):
     decay: float = 0.0
     damping: tuple[float, float] | None = None
     family: ParametricQuasiPolynomial | None = None
-    _held: HeldFamily | None = None
     _loop: ControlLoop | None = None
 
     @cached_property
@@ -107,8 +106,8 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         >>> bool(np.allclose(curve.values["Kv"], -np.cos(0.36 * curve.omega)))
         True
         """
-        held = self._held
-        if held is not None:
+        if self.family is None and self._loop is not None:
+            held = held_plane(self._loop.specification, {}, self.axes)
             return boundaries_along(held.boundaries(self.decay, self.damping), self.axes)
         if self.family is None:
             raise ValueError("the map was made without what it judges: it has no boundaries")
@@ -382,11 +381,10 @@ def stability_map(
     size = len(axes[first]), len(axes[second])
     judged: ParametricQuasiPolynomial | None = None
     with reported(progress, math.prod(size)) as report:
-        held: HeldFamily | None = None
         if isinstance(family, ControlLoop) and family.is_sampled:
-            numbers = numbers_of(family.parameters, (*names, *fixed)) | fixed
-            held = HeldFamily(family.plant, family.controller, numbers, axes)
-            cells = held.cells(question, threads, report)
+            numbers_of(family.parameters, (*names, *fixed))
+            held = held_plane(family.specification, fixed, axes)
+            cells = held.cells(question, threads=threads, progress=report)
         else:
             judged = family_of(family, names, fixed)
             cells = judged._family.map(axes, question, threads=threads, progress=report)
@@ -403,6 +401,5 @@ def stability_map(
         question.decay,
         question.damping,
         judged,
-        held,
         family.replace(**fixed) if isinstance(family, ControlLoop) else None,
     )

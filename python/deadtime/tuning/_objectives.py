@@ -23,7 +23,7 @@ from typing import get_args
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.loops import ControlLoop, rest_of, sweep
+from deadtime.loops import ControlLoop, commands_at_rest, sweep
 from deadtime.tuning._problem import ObjectiveName, Problem, Scenario
 from deadtime.tuning._settling import BAND, proved_step
 
@@ -232,6 +232,6 @@ def _figures(
     # An output that the limit keeps away from its rest has not settled, even if it is constant.
     loop = problem.loop
     limit = np.inf if loop.limit is None else loop.limit
-    _, command = rest_of(loop.plant, loop.controller, loop.parameters | values)
-    short = np.abs(command * problem.amplitude) > limit
+    command = commands_at_rest(loop, values, problem.amplitude)
+    short = np.abs(command) > limit
     return np.where(short, np.nan, found["settling_time"]), found["overshoot"]

@@ -141,6 +141,12 @@ pub(crate) struct PyLinearLoop {
     output_lead: f64,
 }
 
+impl PyLinearLoop {
+    pub(crate) fn of(inner: LinearLoop, output_lead: f64) -> Self {
+        Self { inner, output_lead }
+    }
+}
+
 #[pymethods]
 impl PyLinearLoop {
     #[new]
@@ -178,6 +184,54 @@ impl PyLinearLoop {
         });
         let output_lead = if delay_in_measurement { delay } else { 0.0 };
         converted(made).map(|inner| Self { inner, output_lead })
+    }
+
+    /// A, B, E, K, L, M, C, D, the impulse, and what a sample does to the states.
+    #[expect(clippy::type_complexity, reason = "a tuple of arrays for Python")]
+    fn equations<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        (
+            Matrix<'py>,
+            Vector<'py>,
+            Vector<'py>,
+            Vector<'py>,
+            f64,
+            f64,
+            Vector<'py>,
+            f64,
+            f64,
+        ),
+        Option<(Matrix<'py>, Vector<'py>, Vector<'py>)>,
+    )> {
+        let own = self.inner.equations();
+        let n = own.states();
+        let row = |values: &[f64]| PyArray1::from_slice(py, values);
+        let square = |values: &[f64]| row(values).reshape([n, n]);
+        let update = match self.inner.update() {
+            Some(update) => Some((
+                square(&update.states)?,
+                row(&update.command),
+                row(&update.reference),
+            )),
+            None => None,
+        };
+        let (l, m, d) = (own.l, own.m, own.d);
+        Ok((
+            (
+                square(&own.a)?,
+                row(&own.b),
+                row(&own.e),
+                row(&own.k),
+                l,
+                m,
+                row(&own.c),
+                d,
+                own.impulse,
+            ),
+            update,
+        ))
     }
 
     /// Outputs at some times; these and those of the run count from its start.

@@ -9,8 +9,8 @@ mod errors;
 mod estimation;
 mod fixed_step;
 mod frequency;
-mod held;
 mod loading;
+mod loops;
 mod matrix;
 mod online;
 mod pointers;
@@ -47,14 +47,17 @@ mod _deadtime {
         FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
     };
     #[pymodule_export]
-    use super::fixed_step::{FixedStepResponse, fixed_step_run};
+    use super::fixed_step::FixedStepResponse;
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
     };
     #[pymodule_export]
-    use super::held::{held_boundaries, held_map};
+    use super::loops::{
+        LoopSensitivities, PyHeldPlane, PyLoop, SweepResponses, canonical_form,
+        feedback_polynomials, plant_polynomials, sampled_filter,
+    };
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]
@@ -71,11 +74,6 @@ mod _deadtime {
     use super::special::{dde_root_number, lambertw_number, lambertw0_number, lambertwm1_number};
     #[pymodule_export]
     use super::stability::{MapBoundary, MapCells, PyFamily};
-    #[pymodule_export]
-    use super::sweeps::{
-        LoopSensitivities, SweepResponses, loop_sensitivities, sweep_abscissae, sweep_decay,
-        sweep_metrics, sweep_responses,
-    };
     #[pymodule_export]
     use super::systems::{
         LegendreTables, LinearSystemResponse, PyLinearSystem, PySignal, legendre_tables,

@@ -281,6 +281,11 @@ impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for ByName<T> {
 }
 
 impl<T> ByName<T> {
+    /// Names and values, in the order of the dict.
+    pub(crate) fn items(&self) -> impl Iterator<Item = &(String, T)> {
+        self.0.iter()
+    }
+
     /// The values, in the order of the dict.
     pub(crate) fn values(&self) -> impl Iterator<Item = &T> {
         self.0.iter().map(|(_, value)| value)

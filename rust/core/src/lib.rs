@@ -3,7 +3,8 @@
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
 //! Python. Dependencies run one way: error, simd ← linear_algebra, lambertw, elementary ← quasipoly
-//! ← roots ← stability ← frequency; linear_algebra ← dde ← stability; linear_algebra ← estimation.
+//! ← roots ← stability ← frequency ← loops; linear_algebra ← dde ← stability; linear_algebra ←
+//! estimation.
 
 #[macro_use]
 pub mod error;
@@ -14,6 +15,7 @@ pub mod estimation;
 pub mod frequency;
 pub mod lambertw;
 mod linear_algebra;
+pub mod loops;
 pub mod memory;
 mod order;
 mod parallel;

@@ -7,15 +7,10 @@
 
 #![expect(unsafe_code, reason = "names of exports are not mangled")]
 
-mod control_loop;
-mod equations;
 mod estimate;
 mod exchange;
-mod family;
-mod held;
 mod maps;
 mod margins;
-mod polynomial;
 mod request;
 mod responses;
 mod roots;

@@ -1,6 +1,7 @@
 //! A request: numbers one after the other, lists with their length before them.
 
 use deadtime::Error;
+use deadtime::loops::{ControlLoop, Controller, Factors, Kind, Path, Place, Plant, Values};
 
 /// What is left to read.
 pub(crate) struct Request<'a> {
@@ -61,6 +62,110 @@ impl<'a> Request<'a> {
                 Ok(list)
             }
             None => Err(Error::argument("the request ends inside a list")),
+        }
+    }
+
+    /// A loop: does it integrate, differentiate, is the derivative that of the error (0 or 1); ω (0 for
+    /// no filter) and ζ; Kp, Ki, Kd, gain, lag, delay, sample time (0 for none); limit (infinite for
+    /// none); the lists num and den, descending. The plant is gain num/(den (lag s + 1)).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a request that ends too early or numbers without sense.
+    pub(crate) fn control_loop(&mut self) -> Result<ControlLoop, Error> {
+        let terms = (self.flag()?, self.flag()?, self.flag()?);
+        let (omega, damping) = (self.number()?, self.number()?);
+        let mut numbers = [0.0; 8];
+        for number in &mut numbers {
+            *number = self.number()?;
+        }
+        let [kp, ki, kd, gain, lag, delay, sample_time, limit] = numbers;
+        let (num, den) = (self.list()?.to_vec(), self.list()?.to_vec());
+        let finite = numbers[..7].iter().chain(&num).chain(&den);
+        if let Some(number) = finite.clone().find(|number| !number.is_finite()) {
+            return Err(Error::argument(format!(
+                "{number} in a loop: its numbers must be finite"
+            )));
+        }
+        let leads = |list: &[f64]| list.first().is_some_and(|first| *first != 0.0);
+        if !leads(&num) || !leads(&den) || num.len() > den.len() {
+            return Err(Error::argument(
+                "a plant is num/den with leading coefficients other than zero and a degree of den \
+                 at least that of num",
+            ));
+        }
+        if let Some(time) = [lag, delay, sample_time]
+            .into_iter()
+            .find(|time| *time < 0.0)
+        {
+            return Err(Error::argument(format!(
+                "{time} s in a loop: lags, delays and sample times are zero or more"
+            )));
+        }
+        let (kind, mut own) = match terms {
+            (false, false, _) => (Kind::P, vec![kp]),
+            (false, true, false) => (Kind::PV, vec![kp, kd]),
+            (false, true, true) => (Kind::PD, vec![kp, kd]),
+            (true, false, _) => (Kind::PI, vec![kp, ki]),
+            (true, true, true) => (Kind::PID, vec![kp, ki, kd]),
+            (true, true, false) => {
+                return Err(Error::argument(
+                    "an integral beside a derivative of the output alone: there is no such controller",
+                ));
+            }
+        };
+        let is_filtered = kind.differentiates() && omega > 0.0;
+        if is_filtered {
+            own.extend([omega, damping]);
+        }
+        let controller = Controller {
+            kind,
+            is_filtered,
+            rule: None,
+        };
+        let plant = Plant::Factors(Factors {
+            num,
+            den,
+            lags: 1,
+            has_zero: false,
+            has_pair: false,
+        });
+        let values = Values {
+            plant: vec![gain, lag],
+            controller: own,
+            delay,
+            sample_time: (sample_time > 0.0).then_some(sample_time),
+            limit: limit.is_finite().then_some(limit),
+            given: None,
+        };
+        let names = ["gain", "lag"].map(String::from).to_vec();
+        ControlLoop::new(plant, names, controller, values, Path::Command)
+    }
+
+    /// A number of a loop, by its index among Kp, Ki, Kd, gain, lag, delay and sample time.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where the loop has no such number.
+    pub(crate) fn place(&mut self, of: &ControlLoop) -> Result<Place, Error> {
+        let derivative = match of.controller().kind {
+            Kind::PV => "Kv",
+            _ => "Kd",
+        };
+        let names = [
+            "Kp",
+            "Ki",
+            derivative,
+            "gain",
+            "lag",
+            "delay",
+            "sample_time",
+        ];
+        let index = self.whole()?;
+        match names.get(index) {
+            Some(name) => of.place(name),
+            None => Err(Error::argument(format!(
+                "number {index} of a loop: there are {}",
+                names.len()
+            ))),
         }
     }
 }

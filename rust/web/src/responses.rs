@@ -1,17 +1,16 @@
 //! Responses of a loop from rest at zero.
 
 use deadtime::dde::{Request as Asked, Start};
+use deadtime::loops::Input;
 use deadtime::{Error, Task};
 
-use crate::control_loop::{ControlLoop, Number};
-use crate::equations::Input;
 use crate::request::Request;
 
 /// After the loop, whether the load steps instead of the reference (0 or 1), the height of the step,
 /// whether the delay is that of the measurement (0 or 1), and the list of times from the step on, in s.
 /// The answer has the outputs and then the commands at these times.
 pub(crate) fn step(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
-    let control_loop = ControlLoop::read(request)?;
+    let control_loop = request.control_loop()?;
     let input = if request.flag()? {
         Input::Load
     } else {
@@ -23,7 +22,7 @@ pub(crate) fn step(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let asked = Asked {
         time,
         output_lead: if is_measured {
-            control_loop.number(Number::Delay)
+            control_loop.values().delay
         } else {
             0.0
         },

@@ -1,24 +1,23 @@
 //! Characteristic roots of a loop.
 
 use deadtime::dde::sampled;
+use deadtime::loops::Input;
 use deadtime::roots::{
     Region, RootSet, chain_abscissa, rightmost as search, roots, spectral_abscissa,
 };
 use deadtime::stability::HeldLoop;
 use deadtime::{Error, Task};
 
-use crate::control_loop::ControlLoop;
-use crate::equations::Input;
 use crate::request::Request;
 
 /// After the loop, how many. The answer has the spectral abscissa and that of the chains (−∞ for
 /// none), both in 1/s, and for each root its real and imaginary part, multiplicity and the radius of
 /// its disc (of a sampled loop all poles s = ln(z)/Ts, rightmost first, without discs).
 pub(crate) fn rightmost(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
-    let control_loop = ControlLoop::read(request)?;
+    let control_loop = request.control_loop()?;
     let many = request.whole()?;
     let task = Task::new();
-    if control_loop.sample_time().is_some() {
+    if control_loop.values().sample_time.is_some() {
         let linear = control_loop.linear(Input::Reference)?;
         let poles = sampled::poles(&linear)?;
         let rightmost = poles.first().map_or(f64::NEG_INFINITY, |pole| pole.re);
@@ -40,7 +39,7 @@ pub(crate) fn rightmost(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
 /// After the loop, the ends of a region: least and largest real part, least and largest imaginary part.
 /// The answer has the roots in it, as [`rightmost`] lists them.
 pub(crate) fn in_region(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
-    let h = ControlLoop::read(request)?.characteristic()?;
+    let h = request.control_loop()?.characteristic()?;
     let mut range = || Ok::<_, Error>((request.number()?, request.number()?));
     let region = Region {
         re: range()?,

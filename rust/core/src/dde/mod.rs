@@ -19,7 +19,7 @@ pub mod system;
 
 pub use control_loop::{
     Criteria, Equations, LinearLoop, Metrics, Reference, Request, Response, Start, Trajectory,
-    Update, ensemble, fixed_step, on_sample, sampled, sensitivity,
+    Update, ensemble, fixed_step, on_sample, sampled,
 };
 pub(crate) use limits::countable;
 pub use rate_limits::RateLimits;

@@ -20,7 +20,7 @@ mod requested_output;
 mod response;
 mod row;
 pub mod sampled;
-pub mod sensitivity;
+mod sensitivity;
 mod series;
 mod simulate;
 mod step_metrics;

@@ -1,0 +1,198 @@
+//! The equations of a loop: x′ = A x + B w + E r, u = K x + L w + M r, y = C x + D w.
+//!
+//! The plant's states come first in x, the controller's after them.
+
+use crate::Error;
+use crate::dde::fixed_step::Blocks;
+use crate::dde::{Equations, LinearLoop, Scalar, Update};
+
+use super::control_loop::{ControlLoop, Values};
+use super::controller::ControllerEquations;
+use super::entry::Number;
+use super::filter::SampledFilter;
+use super::plant::StateSpace;
+
+/// What moves the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Input {
+    /// The reference.
+    Reference,
+    /// A load, which is added to the command where it reaches the plant.
+    Load,
+}
+
+impl ControlLoop {
+    /// The equations for these numbers.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for an ideal derivative of a plant that passes its command straight to its
+    /// output, a load of such a plant, or a plant without a state space.
+    pub fn equations<S: Number>(
+        &self,
+        values: &Values<S>,
+        input: Input,
+        sampled: Option<&SampledFilter>,
+    ) -> Result<Equations<S>, Error> {
+        let fraction = self
+            .plant()
+            .fraction(&values.plant, values.given.as_ref())?;
+        let plant = fraction.state_space()?;
+        let controller = self.controller().equations(&values.controller, sampled);
+        refuse_if!(
+            !plant.d.is_zero() && !controller.q.is_zero(),
+            "the plant passes its command straight to its output, so its output has no ideal \
+             derivative: give the controller a DerivativeFilter"
+        );
+        refuse_if!(
+            !plant.d.is_zero() && input == Input::Load,
+            "the plant passes its command straight to its output: it has no response to a load here"
+        );
+        Ok(closed(plant, controller, input))
+    }
+
+    /// The loop for the kernels that take steps in time.
+    ///
+    /// # Errors
+    /// As [`equations`](Self::equations), and for numbers that these kernels refuse.
+    pub fn linear(&self, input: Input) -> Result<LinearLoop, Error> {
+        let values = self.values();
+        let sampled = self
+            .controller()
+            .sampled(&values.controller, values.sample_time)?;
+        let equations = self.equations(values, input, sampled.as_ref())?;
+        let update = sampled.map(|filter| self.update(&filter, &equations));
+        let plain = LinearLoop::new(equations, values.delay, values.sample_time, values.limit)?;
+        match update {
+            Some(update) => plain.with_update(update),
+            None => Ok(plain),
+        }
+    }
+
+    /// The loop in numbers with slopes; its filter must be continuous.
+    ///
+    /// # Errors
+    /// As [`linear`](Self::linear).
+    pub fn linear_in<S: Scalar>(&self, values: &Values<S>) -> Result<LinearLoop<S>, Error> {
+        let equations = self.equations(values, Input::Reference, None)?;
+        LinearLoop::new(equations, values.delay, values.sample_time, values.limit)
+    }
+
+    /// Plant and controller for a run in fixed steps.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a plant without a state space.
+    pub fn blocks(&self) -> Result<Blocks, Error> {
+        let values = self.values();
+        let fraction = self
+            .plant()
+            .fraction(&values.plant, values.given.as_ref())?;
+        let plant = fraction.state_space()?;
+        let controller = self.controller().equations(&values.controller, None);
+        let mut output = vec![0.0; plant.b.len()];
+        output.iter_mut().take(1).for_each(|first| *first = 1.0);
+        Ok(Blocks {
+            plant_matrix: plant.a,
+            plant_input: plant.b,
+            plant_output: output,
+            plant_direct: plant.d,
+            controller_matrix: controller.a,
+            controller_input: controller.b,
+            controller_reference: controller.e,
+            controller_output: controller.c,
+            proportional: controller.p,
+            derivative: controller.q,
+            reference: controller.m,
+            reference_derivative: controller.impulse,
+        })
+    }
+
+    /// What a sample does to all states: the filter reads the output, and its states come last.
+    fn update(&self, filter: &SampledFilter, equations: &Equations) -> Update {
+        let (n, m) = (equations.b.len(), filter.g.len());
+        let mut states = vec![0.0; n * n];
+        (0..n).for_each(|i| states[i * n + i] = 1.0);
+        let (mut command, mut reference) = (vec![0.0; n], vec![0.0; n]);
+        let on_error = f64::from(u8::from(self.controller().kind.derivative_of_error()));
+        for i in 0..m {
+            let row = n - m + i;
+            for j in 0..m {
+                states[row * n + n - m + j] = filter.f[i * m + j];
+            }
+            if equations.c[0] != 0.0 {
+                states[row * n] = filter.g[i] * equations.c[0];
+            }
+            command[row] = filter.g[i] * equations.d;
+            reference[row] = -on_error * filter.g[i];
+        }
+        Update {
+            states,
+            command,
+            reference,
+        }
+    }
+}
+
+fn closed<S: Number>(
+    plant: StateSpace<S>,
+    controller: ControllerEquations<S>,
+    input: Input,
+) -> Equations<S> {
+    let (n, m) = (plant.b.len(), controller.b.len());
+    let (zero, one) = (S::from(0.0), S::from(1.0));
+    let size = n + m;
+    let mut a = vec![zero.clone(); size * size];
+    for i in 0..n {
+        for j in 0..n {
+            a[i * size + j] = plant.a[i * n + j].clone();
+        }
+    }
+    for i in 0..m {
+        for j in 0..m {
+            a[(n + i) * size + n + j] = controller.a[i * m + j].clone();
+        }
+        // y = x₁ + D w.
+        if n > 0 {
+            a[(n + i) * size] = controller.b[i].clone();
+        }
+    }
+    let is_ideal = !controller.q.is_zero();
+    let direct = plant.b.first().cloned().unwrap_or_else(|| zero.clone());
+    let mut l = controller.p.clone() * plant.d.clone();
+    let mut k = vec![zero.clone(); n];
+    if let Some(first) = k.first_mut() {
+        *first = controller.p;
+    }
+    if is_ideal {
+        for (k, slope) in k.iter_mut().zip(&plant.a) {
+            *k = k.clone() + controller.q.clone() * slope.clone();
+        }
+        l = l + controller.q.clone() * direct.clone();
+    }
+    k.extend(controller.c);
+    let d = plant.d;
+    let fed = controller.b.into_iter().map(|b| b * d.clone());
+    let b: Vec<S> = plant.b.into_iter().chain(fed).collect();
+    let (e, m, impulse) = match input {
+        Input::Reference => {
+            let still = std::iter::repeat_n(zero.clone(), n);
+            let e = still.chain(controller.e).collect();
+            (e, controller.m, controller.impulse)
+        }
+        Input::Load => (b.clone(), controller.q * direct, zero.clone()),
+    };
+    let mut c = vec![zero; size];
+    if let Some(first) = c.first_mut().filter(|_| n > 0) {
+        *first = one;
+    }
+    Equations {
+        a,
+        b,
+        e,
+        k,
+        l,
+        m,
+        c,
+        d,
+        impulse,
+    }
+}

@@ -1,0 +1,86 @@
+//! Polynomials in the free numbers of a loop.
+
+use std::ops::{Add, Mul};
+
+use super::entry::Entry;
+
+/// A factor, and the power of each free number; powers that are left out at the end are zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Monomial {
+    /// The factor, not zero.
+    pub factor: f64,
+    /// The powers.
+    pub powers: Vec<u32>,
+}
+
+/// A sum of monomials, each with other powers.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Symbol(pub Vec<Monomial>);
+
+impl Symbol {
+    /// A free number itself.
+    pub fn free(place: usize) -> Self {
+        let mut powers = vec![0; place];
+        powers.push(1);
+        Self(vec![Monomial {
+            factor: 1.0,
+            powers,
+        }])
+    }
+
+    fn put(&mut self, new: Monomial) {
+        match self.0.iter_mut().find(|known| known.powers == new.powers) {
+            Some(known) => known.factor += new.factor,
+            None => self.0.push(new),
+        }
+    }
+}
+
+impl From<f64> for Symbol {
+    fn from(factor: f64) -> Self {
+        let powers = Vec::new();
+        Self(if factor == 0.0 {
+            Vec::new()
+        } else {
+            vec![Monomial { factor, powers }]
+        })
+    }
+}
+
+impl Add for Symbol {
+    type Output = Self;
+
+    fn add(mut self, other: Self) -> Self {
+        for monomial in other.0 {
+            self.put(monomial);
+        }
+        self.0.retain(|monomial| monomial.factor != 0.0);
+        self
+    }
+}
+
+impl Mul for Symbol {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        let mut product = Self::default();
+        for x in &self.0 {
+            for y in &other.0 {
+                let length = x.powers.len().max(y.powers.len());
+                let power = |of: &Monomial, i: usize| of.powers.get(i).copied().unwrap_or(0);
+                product.put(Monomial {
+                    factor: x.factor * y.factor,
+                    powers: (0..length).map(|i| power(x, i) + power(y, i)).collect(),
+                });
+            }
+        }
+        product.0.retain(|monomial| monomial.factor != 0.0);
+        product
+    }
+}
+
+impl Entry for Symbol {
+    fn is_zero(&self) -> bool {
+        self.0.is_empty()
+    }
+}
