@@ -40,7 +40,6 @@ from deadtime.loops._settled import (
     slowest_times,
     time_inside,
 )
-from deadtime.loops._stability import sampled_grid
 from deadtime.systems import first_duration
 
 _Places: TypeAlias = slice | Indices
@@ -501,13 +500,6 @@ class _Sets:
 
     def rates(self) -> Array:
         """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""
-        loop = self.loop
-        if loop.is_sampled:
-            numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
-            numbers.pop("limit", None)
-            cells = sampled_grid(loop.plant, loop.controller, numbers, threads=self.threads)
-            # Sets that differ in their limits alone have one loop.
-            return np.broadcast_to(-cells.abscissa, self.shape)
         found = np.empty(self.shape)
         for place, _, sets, _ in self.blocks(None):
             found[place] = sweep_abscissae(sets, threads=self.threads)

@@ -141,7 +141,7 @@ pub(crate) fn sweep_metrics<'py>(
     })
 }
 
-/// Spectral abscissae of continuous loops without their limits, 1/s; NaN where none is found.
+/// Spectral abscissae of loops without their limits, 1/s; NaN where none is found.
 #[pyfunction]
 #[pyo3(signature = (sets, *, threads=None))]
 pub(crate) fn sweep_abscissae<'py>(
