@@ -7,7 +7,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
 use deadtime::dde::ensemble::{self, Measures, Sets};
 use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
-use deadtime::dde::sampled::{self, LoopCells};
+use deadtime::dde::sampled;
 use deadtime::dde::{Criteria, Equations, LinearLoop, Reference, Start};
 
 const DELAY: f64 = 0.36;
@@ -124,24 +124,6 @@ fn poles(criterion: &mut Criterion) {
             });
         }
     }
-    let k: Vec<f64> = (1..=10_000).map(|i| -6e-4 * f64::from(i)).collect();
-    let cells = LoopCells {
-        cells: k.len(),
-        states: 1,
-        a: &[0.0],
-        b: &[1.0],
-        k: &k,
-        l: &[0.0],
-        gain: &[1.0],
-        delay: &[DELAY],
-        sample_time: &[SAMPLE_TIME],
-    };
-    group.throughput(Throughput::Elements(k.len() as u64));
-    group.sample_size(10);
-    group.bench_function("grid over kp", |bencher| {
-        let task = Task::new();
-        bencher.iter(|| sampled::abscissa_grid(black_box(&cells), 0.0, &task));
-    });
     group.finish();
 }
 

@@ -68,6 +68,7 @@ ORDER = {
         "margins",
         "gain_crossovers",
         "circle",
+        "held_gain",
         "held_range",
         "further_delay",
         "held",

@@ -243,12 +243,83 @@ def test_the_unit_of_the_command_changes_no_verdict(exponent, delay):
         assert poles[1][1] == pytest.approx(poles[0][1], rel=1e-8)
 
 
-def test_a_sampled_loop_slower_than_rounding_is_refused():
-    """z = 1 - 7e-19 rounds to one, and the loop was called unstable."""
+def test_a_pole_next_to_one_is_decided_and_one_on_the_circle_refused():
+    """z = 1 - 7e-19 rounds to one: it was refused, and the loop called unstable before."""
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.4e-17), delay=0.1, sample_time=0.05)
-    with pytest.raises(ValueError, match="beyond double precision"):
-        loop.is_stable()
+    assert loop.is_stable()
+    assert loop.rightmost().roots[0] == pytest.approx(-1.4e-17, rel=1e-12)
     assert not loop.replace(Kp=1e20).is_stable()
+    # z = 1 - Kp Ts = -1.
+    with pytest.raises(ValueError, match="beyond double precision"):
+        loop.replace(Kp=20.0, delay=0.0, sample_time=0.1).is_stable()
+
+
+def exact_poles(loop, digits=60):
+    """ln(z)/Ts of the eigenvalues z of the transition matrix, all in many digits."""
+    import mpmath as mp
+
+    with mp.workdps(digits):
+        model, period = loop.specification.model, mp.mpf(loop.sample_time)
+        n = len(model.B)
+        joined = mp.zeros(n + 1)
+        joined[:n, :n] = mp.matrix(model.A.tolist())
+        joined[:n, n] = mp.matrix(model.B.tolist())
+        whole = int(mp.floor(mp.mpf(loop.delay) / period))
+        early = mp.mpf(loop.delay) - whole * period
+        late, first = (mp.expm(joined * time) for time in (period - early, early))
+        matrix = mp.zeros(n + whole + 1)
+        matrix[:n, :n] = late[:n, :n] * first[:n, :n]
+        feedback = mp.matrix(model.K.tolist()).T
+        # The command that arrives within the sample, and the one before it.
+        older, newer = late[:n, :n] * first[:n, n], late[:n, n]
+        matrix[:n, n + whole] = older
+        if whole:
+            matrix[:n, n + whole - 1] = newer
+        else:
+            matrix[:n, :n] += newer * feedback
+            matrix[:n, n] += newer * mp.mpf(float(model.L))
+        matrix[n, :n] = feedback
+        matrix[n, n + whole] += mp.mpf(float(model.L))
+        for row in range(n + 1, n + whole + 1):
+            matrix[row, row - 1] = 1
+        z = [value for value in mp.eig(matrix, left=False, right=False) if abs(value) > 1e-25]
+        return [mp.log(value) / period for value in z]
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        # Two poles meet at z = 1/2.
+        dtm.ControlLoop(INTEGRATOR, dtm.P(2.5), delay=0.1, sample_time=0.1),
+        dtm.ControlLoop(INTEGRATOR, dtm.P(1e-9), delay=0.36, sample_time=0.065),
+        dtm.ControlLoop(
+            dtm.Integrator(0.85, 0.1), dtm.PI(2.0, 0.2), delay=0.3, sample_time=1e-3
+        ).replace(delay=5.5e-3),
+        dtm.ControlLoop(INTEGRATOR, dtm.PV(2.0, 0.2), delay=0.36, sample_time=0.065),
+        dtm.ControlLoop(
+            dtm.FactoredPlant(pole_frequency=18.0, pole_damping=0.01),
+            dtm.PID(0.1, 0.5, 0.01, dtm.DerivativeFilter(60.0)),
+            delay=0.1,
+            sample_time=0.03,
+        ),
+    ],
+    ids=["double", "slow", "fast samples", "direct", "light mode"],
+)
+def test_discs_hold_the_poles_of_a_sampled_loop(loop):
+    """Radii were of first order in the rounding: two simple poles where there is a double one."""
+    pytest.importorskip("mpmath")
+    exact = exact_poles(loop)
+    found = loop.rightmost(20)
+    assert found.counted == found.multiplicities.sum() == len(exact)
+    for root, radius, multiplicity in zip(
+        found.roots.tolist(), found.radii.tolist(), found.multiplicities.tolist(), strict=True
+    ):
+        top = math.pi / loop.sample_time
+        far = [
+            min(abs(pole - root), abs(pole.conjugate() - root) if abs(root.imag) == top else 9e9)
+            for pole in exact
+        ]
+        assert sum(distance <= radius for distance in far) == multiplicity
 
 
 def test_poles_of_a_sampled_loop_in_a_region_are_its_eigenvalues():
@@ -276,7 +347,7 @@ def test_a_pole_of_a_sampled_loop_on_the_edge_is_refused():
         loop.count(re=(pole.real, None))
     assert refused.value.place == pole
     assert refused.value.inside == 0
-    with pytest.raises(ValueError, match="low < high"):
+    with pytest.raises(ValueError, match="lower end below"):
         loop.count(re=(1, 0))
     with pytest.raises(ValueError, match="finitely many"):
         loop.certify(re=(0, None))

@@ -92,6 +92,23 @@ def test_the_loop_gain_is_what_closes_to_the_poles(loop):
     np.testing.assert_allclose(turned, expected / np.abs(expected), atol=2e-3)
 
 
+def test_the_phase_of_a_sampled_loop_is_that_of_the_continuous_one_but_for_the_hold():
+    # Past an undamped mode it drops by half a turn, as past one that is hardly damped.
+    undamped = dtm.RationalPlant([1.0], [1.0, 0.0, 4.0])
+    light = dtm.RationalPlant([1.0], [1.0, 1e-7, 4.0])
+    omega = np.array([0.1, 1.9, 2.1, 60.0])
+    found = [sampled(plant, dtm.P(0.5), 0.1, 0.05).phase(omega) for plant in (undamped, light)]
+    np.testing.assert_allclose(found[0], found[1], atol=1e-5)
+    # At zero frequency minus a quarter turn for each integrator, whatever the delay.
+    for loop, integrators in ((LOOPS[3], 1), (LOOPS[7], 2), (LOOPS[9], 1)):
+        assert loop.phase(0.0) == pytest.approx(-integrators * math.pi / 2, abs=1e-12)
+    # The hold is late by half a sample at low frequencies.
+    slow = np.array([1e-3, 1e-2])
+    for loop in LOOPS[3:8]:
+        late = loop.continuous().phase(slow) - loop.phase(slow)
+        np.testing.assert_allclose(late, 0.5 * slow * PERIOD, rtol=0.2)
+
+
 @pytest.mark.parametrize(
     "controller", [dtm.P(1.5), dtm.PV(2.0, 0.2, SMOOTH), dtm.PI(1.0, 0.2), dtm.PV(2.0, 0.2)]
 )

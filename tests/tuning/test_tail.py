@@ -32,6 +32,18 @@ def test_the_tail_is_bounded(loop, times):
         assert after <= bound * (1.0 + 1e-6) + 1e-11
 
 
+def test_the_unit_of_the_command_changes_no_bound():
+    """States in other units than the transition of a sample: 5.8 times the bound, or none."""
+    bounds = []
+    for unit in (1.0, 100.0, 1e3, 0.02):
+        controller = dtm.PID(0.5 / unit, 0.01 / unit, 0.025 / unit, dtm.DerivativeFilter(80.0))
+        plant = dtm.Integrator(unit, 0.05)
+        loop = dtm.ControlLoop(plant, controller, delay=0.1, sample_time=0.05, limit=100.0 / unit)
+        bounds.append(tail_bound(loop, 1.0, 10.0))
+    np.testing.assert_allclose(bounds, bounds[0], rtol=1e-6)
+    assert bounds[0] < 1.0
+
+
 @settings(max_examples=40, deadline=None)
 @given(
     loop=loops(),

@@ -6,9 +6,9 @@ imitates block diagrams that are run in fixed steps.
 """
 
 # The files. `_control_loop` is the loop, `_plants`, `_controllers` and `_derivative_filter` are its
-# parts. `_specification` checks them and builds the equations of `_model`; `_in_time`, `_poles` and
-# `_gain` hold the questions that a loop answers, `_run`, `_stability` and the `_sampled_*` files
-# how. `_sweep` runs many loops, `_fixed_step` imitates block diagrams in fixed steps.
+# parts. `_specification` checks them and hands them to the kernel; `_in_time`, `_poles` and `_gain`
+# hold the questions that a loop answers. `_held` makes maps of sampled loops, `_sweep` runs many
+# loops, `_fixed_step` imitates block diagrams in fixed steps.
 
 from deadtime._base.explorer import Explorer
 from deadtime.loops._control_loop import ControlLoop

@@ -1,13 +1,12 @@
 r"""Controllers: what turns the reference r and the measured output y into the command u.
 
 Each is linear in its gains: u = R(s) r - F(s) y. The derivative is either ideal, H(s) = s, or
-filtered, H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled loop the
-filter and the integrator stay continuous and are sampled with the rest: the discretisation is exact.
+filtered, H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled
+loop filter and integrator stay continuous and are sampled with the rest: this is exact.
 """
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
@@ -30,7 +29,7 @@ class ControllerForm(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Controller(ABC):
+class Controller:
     """Base of all controllers: gains, and a filter where there is a derivative."""
 
     # NumPy and packages built on it leave `G * controller` to this class.

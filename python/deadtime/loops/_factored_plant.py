@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from deadtime._base.validation import finite, non_negative, non_zero, positive, unmasked
+from deadtime.loops._native import plant_polynomials
 from deadtime.loops._plants import NO_GAIN, Plant, PlantForm
 
 #: Names of the numbers of a pair of complex poles.
@@ -138,3 +139,9 @@ class FactoredPlant(Plant):
             "zero" in self.parameters,
             self.has_pair,
         )
+
+    def _without_lags(self, values: Mapping[str, float]) -> tuple[list[float], list[float]]:
+        """Numerator and denominator without the lags and the zero."""
+        names = ("gain", *PAIR) if self.has_pair else ("gain",)
+        form = self._form._replace(names=names, lags=0, has_zero=False)
+        return plant_polynomials(form, [values[name] for name in names])

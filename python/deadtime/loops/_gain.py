@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from deadtime._base.drawing import Axes, shown_rows
 from deadtime._base.validation import real_array
-from deadtime.loops._sampled_gain import SampledLoopGain
 from deadtime.loops._specification import LoopSpecification
-from deadtime.loops._stability import sampled_is_stable
 from deadtime.systems import Margins, TransferFunction, margins, margins_of
 
 
@@ -141,7 +137,8 @@ class LoopGain:
         [-0.7647-1.8473j -0.7058-0.7064j] -2.3558
         """
         if self.specification.sample_time is not None:
-            return self._sampled_gain.frequency_response(omega)
+            given = real_array("omega", omega)
+            return self.specification.native.held_gain(given).reshape(given.shape)
         return self.open_loop().frequency_response(omega)
 
     def phase(self, omega: ArrayLike) -> NDArray[np.float64]:
@@ -162,7 +159,8 @@ class LoopGain:
             As in `frequency_response`.
         """
         if self.specification.sample_time is not None:
-            return self._sampled_gain.phase(omega)
+            given = real_array("omega", omega)
+            return self.specification.native.held_phase(given).reshape(given.shape)
         return self.open_loop().phase(omega)
 
     def bode(
@@ -207,11 +205,6 @@ class LoopGain:
         loop = self.specification
         if loop.sample_time is None:
             return self.margin()._delay_margin()
-        if not sampled_is_stable(loop.model, loop.known_delay, loop.sample_time):
+        if not loop.native.is_stable():
             raise ValueError("the loop is not stable as it is: it has no delay margin")
         return loop.native.further_delay()[0]
-
-    @cached_property
-    def _sampled_gain(self) -> SampledLoopGain:
-        loop = self.specification
-        return SampledLoopGain.of(loop.model, loop.known_delay, cast(float, loop.sample_time))

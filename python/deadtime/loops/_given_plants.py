@@ -6,9 +6,7 @@ that of the loop. Anything else with delays becomes a `PlantWithDelays`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from deadtime._base.validation import non_zero
 from deadtime.loops._plants import NO_GAIN, Plant, PlantForm, RationalPlant

@@ -86,7 +86,7 @@ class Plant(ABC):
         """What it is without its numbers."""
 
     def _given(self, values: Mapping[str, Any]) -> tuple[list[Any], list[Any]] | None:
-        """Polynomials for a gain of one, in numbers, arrays or symbols; None where `_form` has them."""
+        """Polynomials for a gain of one, in what `values` hold; None where `_form` has them."""
         return None
 
     def _polynomials(self, values: Mapping[str, float]) -> tuple[list[float], list[float]]:

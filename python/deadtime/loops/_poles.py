@@ -8,22 +8,15 @@ from typing import SupportsFloat
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime._base.validation import OpenRange, Range, whole_number
-from deadtime.loops._sampled_regions import sampled_poles_in
+from deadtime._base.validation import OpenRange, Range, open_interval, whole_number
 from deadtime.loops._specification import LoopSpecification
-from deadtime.loops._stability import (
-    continuous_range,
-    sampled_abscissa,
-    sampled_is_stable,
-    sampled_range,
-    sampled_roots,
-)
 from deadtime.roots import (
     Crossings,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
     RootSet,
     crossings,
+    root_set,
 )
 from deadtime.roots.certificate import Certificate
 
@@ -73,7 +66,7 @@ class LoopPoles:
         Returns
         -------
         int
-            Of a continuous loop proved, as in `QuasiPolynomial.count`.
+            Proved, as in `QuasiPolynomial.count`.
 
         Raises
         ------
@@ -121,7 +114,7 @@ class LoopPoles:
         loop = self.specification
         if loop.sample_time is None:
             return self.characteristic().roots(re, im)
-        return sampled_poles_in(loop.native.balanced_matrix(), loop.sample_time, re, im)
+        return root_set(loop.native.poles_in(open_interval("re", re), open_interval("im", im)))
 
     def certify(self, re: OpenRange | None = None, im: OpenRange | None = None) -> Certificate:
         """Count the poles of a continuous loop in a region and write the proof down.
@@ -162,11 +155,9 @@ class LoopPoles:
         Returns
         -------
         RootSet
-            Of a continuous loop: roots of `characteristic`, with proved discs. Of a sampled loop:
-            s = ln(z)/sample_time for the eigenvalues z of `transition_matrix`; the radii are no
-            proof but bound the rounding error to first order, and a pole is ``resolved`` where
-            its disc keeps clear of the others. Eigenvalues z = 0, whose motion is gone after a
-            sample, are left out, so that there may be fewer than `n`.
+            Roots of `characteristic`, or s = ln(z)/sample_time for the eigenvalues z of
+            `transition_matrix`, in discs that are proved to hold them. Eigenvalues z = 0, whose
+            motion is gone after a sample, are left out, so that there may be fewer than `n`.
 
         Raises
         ------
@@ -177,7 +168,7 @@ class LoopPoles:
         number = whole_number("n", n)
         if period is None:
             return self.characteristic().rightmost(number)
-        return sampled_roots(self.specification.native.balanced_matrix(), period, number)
+        return root_set(self.specification.native.rightmost(number))
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Return the largest real part of the poles in 1/s, limit left out.
@@ -234,7 +225,16 @@ class LoopPoles:
         loop = self.specification
         if loop.sample_time is None:
             return self.characteristic().is_stable(strong)
-        return loop.native.unstable_poles() == 0
+        found = loop.native.is_stable()
+        if found is None:
+            near = self.rightmost()
+            raise ValueError(
+                f"a pole at {near[0]:.6g} 1/s, known to {near.radii[0]:.1e}, is as near to the "
+                "imaginary axis as rounding: whether this loop is stable is beyond double "
+                "precision; change a gain, or take a sample_time nearer to the time constants of "
+                "the loop"
+            )
+        return found
 
     def crossings(
         self, ranges: Mapping[str, Range], *, at: Mapping[str, SupportsFloat] | None = None

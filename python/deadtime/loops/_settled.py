@@ -15,16 +15,11 @@ slow poles of a continuous loop is enough; where it is to be found, they are com
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array, Mask
 from deadtime._base.errors import ConvergenceError
-from deadtime.loops._controllers import Controller
-from deadtime.loops._plants import Plant
 from deadtime.loops._specification import LoopSpecification
 
 #: Time for which a response must have been in its band to count as settled, in slowest time
@@ -60,6 +55,12 @@ def counts_as_settled(inside: ArrayLike, rates: ArrayLike) -> Mask:
         return np.asarray(np.multiply(inside, rates) >= TIME_CONSTANTS)
 
 
+def slowest_rates(times: ArrayLike) -> Array:
+    """Decay rates in 1/s of plants and controllers with these slowest time constants, s."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.divide(1.0, times))
+
+
 def stays_settled(
     loop: LoopSpecification, times: Array, inputs: Array, reference: float, settled: float
 ) -> bool:
@@ -79,54 +80,7 @@ def stays_settled(
     last = min(int(limited[-1]) + 1, len(times) - 1) if limited.size else 0
     inside, stays = time_inside(settled, float(times[last]), float(times[-1]), rests)
     try:
-        rate = (
-            slowest_rates(loop.plant, loop.controller, loop.parameters)
-            if stays
-            else -loop.abscissa_at(loop.parameters)
-        )
+        rate = slowest_rates(loop.kernel.slowest_time()) if stays else -loop.abscissa_at({})
     except ConvergenceError:
         return False
     return bool(counts_as_settled(inside, rate))
-
-
-def slowest_rates(
-    plant: Plant, controller: Controller, numbers: Mapping[str, Any]
-) -> float | Array:
-    """Lower bound in 1/s on abs(root) of plant and controller, except for roots at zero."""
-    with np.errstate(divide="ignore"):
-        return np.divide(1.0, slowest_times(plant, controller, numbers))
-
-
-def _any(values: Any) -> bool:
-    """Whether a number, or any of an array, is not zero."""
-    return bool(values.any() if isinstance(values, np.ndarray) else values)
-
-
-def slowest_times(
-    plant: Plant, controller: Controller, numbers: Mapping[str, Any]
-) -> float | Array:
-    """Upper bound in s on 1/abs(root) of plant and controller, except for roots at zero.
-
-    1/abs(root) <= 2 max_k abs(c_k/c_0)^(1/k) for c_0 + c_1 s + ... + c_n s^n, where c_n counts by
-    half (Fujiwara 1916).
-    """
-    longest: Any = 0.0
-    parts = (*plant._polynomials(numbers), *controller._feedback(numbers))
-    for coefficients in parts:
-        rising = [abs(c) for c in coefficients[::-1]]
-        open_: Any = True
-        for low, c in enumerate(rising[:-1]):
-            # c_0 is the first coefficient that is not zero: lower powers are roots at zero.
-            here = open_ & (c > 0.0)
-            for k, other in enumerate([*rising[low + 1 : -1], 0.5 * rising[-1]], 1):
-                if not (_any(here) and _any(other)):
-                    continue
-                if here is True:
-                    ratio = other / c
-                else:
-                    ratio = np.where(here, other, 0.0) / np.where(here, c, 1.0)
-                longest = np.maximum(longest, 2.0 * ratio ** (1.0 / k))
-            open_ = open_ & (c == 0.0)
-            if not _any(open_):
-                break
-    return float(longest) if np.ndim(longest) == 0 else np.asarray(longest)

@@ -134,8 +134,7 @@ class LoopSpecification(PickledByFields):
         changed = self.kernel_at(values)
         if self.sample_time is None:
             return float(QuasiPolynomial._wrap(changed.characteristic()).spectral_abscissa())
-        found = changed.linear.abscissa()
-        return float(changed.linear.poles()[0].real) if found is None else found
+        return changed.linear.abscissa()
 
     def polynomials_of(self, numbers: list[float]) -> tuple[list[Any], list[Any]] | None:
         """Polynomials for a gain of one, of a plant that gives them, for other numbers of it."""

@@ -34,6 +34,7 @@ from deadtime.loops._settled import (
     TIME_CONSTANTS,
     counts_as_settled,
     rests_at_limit,
+    slowest_rates,
     time_inside,
 )
 from deadtime.loops._specification import refuse_discretised
@@ -446,9 +447,9 @@ class _Sets:
         """Decay rates of plant and controller alone, 1/s, and which commands rest at the limit."""
         command, slowest = self.kernel.sweep_rest(self.native)
         limit = self.native.values.get("limit", self.loop.limit or np.inf)
-        with np.errstate(divide="ignore"):
-            rates = 1.0 / slowest
-        return rates.reshape(self.shape), rests_at_limit(command, limit).reshape(self.shape)
+        return slowest_rates(slowest).reshape(self.shape), rests_at_limit(command, limit).reshape(
+            self.shape
+        )
 
     def stay(self, settled: Array, limited_until: Array, end: float) -> Mask:
         """Whether sets that are in their bands at the end since `settled` count as settled."""
@@ -478,7 +479,7 @@ def _longer(steps: Any) -> Any:
 
 
 def commands_at_rest(loop: ControlLoop, values: Mapping[str, Array], amplitude: float) -> Array:
-    """Commands at rest under a constant reference, the limit left out, of loops with these numbers."""
+    """Commands at rest of loops with these numbers, the limit left out."""
     (size,) = np.broadcast_shapes(*(np.shape(array) for array in values.values()))
     sets = LoopSets({n: np.broadcast_to(v, size) for n, v in values.items()}, None, size, amplitude)
     return loop.specification.kernel.sweep_rest(sets)[0]

@@ -8,8 +8,8 @@ use deadtime::dde::{
     Equations, LinearLoop, RateLimits, Reference, Request, Response, Start, Update, on_sample,
 };
 use deadtime::frequency::{self, Number};
-use deadtime::stability::{HeldLoop, Specification};
-use deadtime::status::CellStatus;
+use deadtime::roots::Region;
+use deadtime::stability::HeldLoop;
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -17,6 +17,7 @@ use pyo3::types::PyFloat;
 
 use crate::arrays::{column, converted, frozen, in_order, owned, part_of};
 use crate::frequency::PyMargins;
+use crate::quasipoly::{Range, RootSet};
 use crate::runtime::{run_attached, run_here};
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -287,29 +288,54 @@ impl PyLinearLoop {
         matrix.into_pyarray(py).reshape([size, size])
     }
 
-    /// The transition matrix in units of states and commands that make its norm small.
-    fn balanced_matrix<'py>(&self, py: Python<'py>) -> PyResult<Matrix<'py>> {
-        let (matrix, size) = run_here(py, |_| sampled::balanced_matrix(&self.inner))?;
-        matrix.into_pyarray(py).reshape([size, size])
-    }
-
     /// Poles s = ln(z)/Ts of a sampled loop, limit left out, rightmost first.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
         Ok(run_here(py, |_| sampled::poles(&self.inner))?.into_pyarray(py))
     }
 
-    /// Number of poles of a sampled loop outside the unit circle, proved; None where a pole is on it
-    /// to working precision, or the count is beyond that.
-    fn unstable_poles(&self, py: Python<'_>) -> PyResult<Option<i32>> {
-        let cell = run_here(py, |task| {
-            let held = HeldLoop::new(&self.inner)?;
-            held.at(held.delay())?.count(Specification::default(), task)
+    /// Poles of a sampled loop in a region, with discs proved to hold them.
+    fn poles_in(&self, py: Python<'_>, re: Range, im: Range) -> PyResult<RootSet> {
+        let found = run_here(py, |_| {
+            HeldLoop::new(&self.inner)?.poles_in(&Region::new(re, im)?)
         })?;
-        Ok((cell.status == CellStatus::Ok).then_some(cell.unstable))
+        Ok(RootSet::new(py, found))
     }
 
-    /// ln(ρ)/Ts of a sampled loop, ρ its spectral radius; None where it is not found.
-    fn abscissa(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+    /// The `n` rightmost of them and their mirror images.
+    fn rightmost(&self, py: Python<'_>, n: usize) -> PyResult<RootSet> {
+        let found = run_here(py, |_| HeldLoop::new(&self.inner)?.rightmost_poles(n))?;
+        Ok(RootSet::new(py, found))
+    }
+
+    /// Are all poles of a sampled loop inside the unit circle, proved? None where rounding decides.
+    fn is_stable(&self, py: Python<'_>) -> PyResult<Option<bool>> {
+        run_here(py, |task| HeldLoop::new(&self.inner)?.is_stable(task))
+    }
+
+    /// The gain of a sampled loop at frequencies in rad/s, in C order.
+    fn held_gain<'py>(
+        &self,
+        py: Python<'py>,
+        omega: Floats<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+        let omega = in_order(&omega)?;
+        let found = run_here(py, |_| {
+            frequency::held_gain(HeldLoop::new(&self.inner)?, &omega)
+        })?;
+        Ok(found.into_pyarray(py))
+    }
+
+    /// Its argument in rad, continuous from zero on.
+    fn held_phase<'py>(&self, py: Python<'py>, omega: Floats<'py>) -> PyResult<Vector<'py>> {
+        let omega = in_order(&omega)?;
+        let found = run_here(py, |_| {
+            frequency::held_phase(HeldLoop::new(&self.inner)?, &omega)
+        })?;
+        Ok(found.into_pyarray(py))
+    }
+
+    /// ln(ρ)/Ts of a sampled loop, ρ its spectral radius.
+    fn abscissa(&self, py: Python<'_>) -> PyResult<f64> {
         run_here(py, |task| HeldLoop::new(&self.inner)?.abscissa(task))
     }
 

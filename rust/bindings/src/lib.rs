@@ -17,7 +17,6 @@ mod pointers;
 mod quasipoly;
 mod reserve;
 mod runtime;
-mod sampled;
 mod solver;
 mod special;
 mod stability;
@@ -67,7 +66,6 @@ mod _deadtime {
     #[pymodule_export]
     use super::quasipoly::{RootSet, Sensitivity};
     #[pymodule_export]
-    use super::sampled::{SampledCells, sampled_abscissa_grid};
     #[pymodule_export]
     use super::solver::{DelayPieces, DelayRun, solve_dde};
     #[pymodule_export]

@@ -13,7 +13,7 @@
 //! Where w is as close to 1 at a crossover as rounding, or the sum is not close to a multiple of π,
 //! nothing is known.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use num_complex::Complex64;
 
@@ -23,8 +23,10 @@ use crate::quasipoly::modulus;
 use crate::stability::HeldNumbers;
 use crate::{Error, Task};
 
-/// Halvings of a stretch before a zero of the polynomial counts as on the circle.
+/// Halvings of a stretch before a zero of the polynomial counts as on the circle, and before one is
+/// passed there: the latter leave enough of its value beside rounding for its argument.
 const HALVINGS: u32 = 200;
+const PASSED: u32 = 36;
 
 /// Upper limit on the stretches between two crossovers.
 const STRETCHES: u32 = 100_000;
@@ -107,7 +109,7 @@ fn growth(numbers: &HeldNumbers, (a, b): (&[f64], &[f64]), low: f64, high: f64) 
         angle(rest.im, rest.re)
     };
     let leading = if is_small { a } else { b };
-    let own = turned(numbers, leading, low, high)?;
+    let own = turned(numbers, leading, low, high, false)?;
     let delayed = if is_small {
         0.0
     } else {
@@ -116,8 +118,15 @@ fn growth(numbers: &HeldNumbers, (a, b): (&[f64], &[f64]), low: f64, high: f64) 
     Some(own - delayed + bracket(high) - bracket(low))
 }
 
-/// The growth of the argument of a polynomial in σ between two frequencies.
-fn turned(numbers: &HeldNumbers, p: &[f64], low: f64, high: f64) -> Option<f64> {
+/// The growth of the argument of a polynomial in σ between two frequencies. Where it has a zero on
+/// the circle that is `None`, or half a turn, as past one just inside, if it `passes`.
+pub(super) fn turned(
+    numbers: &HeldNumbers,
+    p: &[f64],
+    low: f64,
+    high: f64,
+    passes: bool,
+) -> Option<f64> {
     let at = |omega: f64| shifted(p, numbers.variable(omega));
     let value = |omega: f64| at(omega).first().copied().unwrap_or_default();
     let mut open = vec![(low, high, 0)];
@@ -141,6 +150,14 @@ fn turned(numbers: &HeldNumbers, p: &[f64], low: f64, high: f64) -> Option<f64> 
                 angle(ratio.im, ratio.re)
             });
             sum += change[0] - change[1];
+        } else if passes && halvings >= PASSED {
+            let ratio = value(to) * value(from).conj();
+            let change = angle(ratio.im, ratio.re);
+            sum += if change < -FRAC_PI_2 {
+                change + TAU
+            } else {
+                change
+            };
         } else if halvings < HALVINGS {
             open.push((middle, to, halvings + 1));
             open.push((from, middle, halvings + 1));

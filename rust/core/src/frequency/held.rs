@@ -23,7 +23,10 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
     let found = crossovers(&numbers, task)?;
     let stable = match is_stable(&numbers, &found, task)? {
         Some(stable) => stable,
-        None => held.abscissa(task)?.is_some_and(|abscissa| abscissa < 0.0),
+        None => match held.abscissa(task) {
+            Err(error) if error.ends_all() => return Err(error),
+            found => found.is_ok_and(|abscissa| abscissa < 0.0),
+        },
     };
     let (places, turns): (Vec<f64>, Vec<f64>) = found.iter().map(|at| (at.omega, at.turn)).unzip();
     let degrees: Vec<f64> = turns

@@ -99,6 +99,10 @@ const ZERO: f64 = 1e-13;
 const RANGE: f64 = 4.0;
 const WIDER: f64 = 32.0;
 
+/// Changes of a number, relative to it, for which the loop is compared to find whether its poles
+/// depend on it: any two that are not special values.
+const CHANGES: [f64; 2] = [0.37, 0.71];
+
 /// What varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Number {
@@ -173,6 +177,9 @@ pub fn held_range(
     (low, high): (f64, f64),
     task: &Task,
 ) -> Result<(f64, f64), Error> {
+    if number == Number::Other && is_idle(at, start)? {
+        return Ok((low, high));
+    }
     let keeps_sign = number != Number::Delay && (low == 0.0 || high == 0.0) && start != 0.0;
     let mut search = Search {
         at,
@@ -182,6 +189,21 @@ pub fn held_range(
         task,
     };
     Ok((search.end(low)?, search.end(high)?))
+}
+
+/// Do the poles not depend on the number?
+fn is_idle(
+    at: &mut dyn FnMut(f64) -> Result<LinearLoop, Error>,
+    start: f64,
+) -> Result<bool, Error> {
+    let here = at(start)?;
+    let size = if start == 0.0 { 1.0 } else { start.abs() };
+    for part in CHANGES {
+        if !at(start + part * size)?.has_poles_of(&here) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// The first loss of stability of a loop as its delay alone goes from one to another, or `None`.

@@ -5,7 +5,7 @@
 //! to the frequencies of `bounds`. From these are `margins` of a loop, and of an `equation` in which
 //! one number varies the `crossings`, those of `delays` and `multiples` of one, and stable `ranges`.
 //! Of loops with a hold `gain_crossovers` has those, `circle` counts poles by them, `held_range` follows one
-//! number, `further_delay` the delay, and `held` has the margins. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
+//! number, `further_delay` the delay, `held` has the margins, and `held_gain` values and phases. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
 //! their phases; `polynomial` finds roots of small polynomials.
 
 mod argument;
@@ -18,6 +18,7 @@ mod equation;
 mod further_delay;
 mod gain_crossovers;
 mod held;
+mod held_gain;
 mod held_range;
 mod margins;
 mod multiples;
@@ -36,6 +37,7 @@ pub use crossings::{Crossings, crossings};
 pub use delays::{delay_margin, delay_range};
 pub use further_delay::{further_delay, held_delay_range};
 pub use held::held_margins;
+pub use held_gain::{held_gain, held_phase};
 pub use held_range::{Number, gain_range_held, held_range};
 pub use margins::{Margins, margins, margins_of_ratio};
 pub use passage::Crossing;

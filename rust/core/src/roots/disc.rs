@@ -9,13 +9,13 @@ pub(super) const RESOLVED: f64 = 1e-12;
 
 /// A disc in which the number of roots is proved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Disc {
-    pub(super) center: Complex64,
+pub(crate) struct Disc {
+    pub(crate) center: Complex64,
     /// All `multiplicity` roots are within this distance of the centre.
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
     /// No other root is within this distance.
-    pub(super) isolation: f64,
-    pub(super) multiplicity: u32,
+    pub(crate) isolation: f64,
+    pub(crate) multiplicity: u32,
 }
 
 impl Disc {

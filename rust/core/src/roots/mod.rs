@@ -24,7 +24,9 @@ pub(crate) use counting::radius_right_of;
 pub use counting::{
     Certificate, Contour, RealPart, Segment, certify, count, count_right_of, exact_chain_abscissa,
 };
+pub(crate) use disc::Disc;
 pub(crate) use locating::chain_margin;
+pub(crate) use locating::within;
 pub use locating::{
     Edge, count_with_edge, is_stable, rightmost, roots, roots_with_edge, sensitivity,
     spectral_abscissa, unstable_and_rightmost,

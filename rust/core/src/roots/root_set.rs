@@ -28,7 +28,7 @@ pub struct RootSet {
 
 impl RootSet {
     /// Sort the discs; `counted` is the sum of their multiplicities.
-    pub(super) fn new(mut discs: Vec<Disc>, region: Region) -> Self {
+    pub(crate) fn new(mut discs: Vec<Disc>, region: Region) -> Self {
         discs.sort_by(|a, b| {
             rank(a)
                 .partial_cmp(&rank(b))
@@ -48,7 +48,7 @@ impl RootSet {
     }
 
     /// The roots, selected by their index with `kept`, as those of `region`.
-    pub(super) fn part(&self, region: Region, kept: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn part(&self, region: Region, kept: impl Fn(usize) -> bool) -> Self {
         fn chosen<T: Copy>(list: &[T], kept: impl Fn(usize) -> bool) -> Vec<T> {
             let numbered = list.iter().enumerate();
             numbered

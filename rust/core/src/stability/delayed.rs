@@ -1,6 +1,6 @@
-//! How fast continuous loops decay, their limits left out.
+//! How fast loops decay, their limits left out.
 //!
-//! The poles are the zeros of a(s) − (L a(s) + K adj(s − A) B) e^(−s T), where a(s) = det(s − A) and
+//! Loops with a hold are those of `held`. Of continuous ones the poles are the zeros of a(s) − (L a(s) + K adj(s − A) B) e^(−s T), where a(s) = det(s − A) and
 //! the adjugate follow from the recursion of Faddeev and LeVerrier (Gantmacher 1959).
 
 use crate::dde::ensemble::Sets;
@@ -11,11 +11,15 @@ use crate::quasipoly::QuasiPolynomial;
 use crate::roots::spectral_abscissa;
 use crate::{Error, Task};
 
+use super::held::HeldLoop;
 use super::one_delay::are_left_of;
 
 /// The largest real part of a pole of each loop, 1/s; NaN where it is not found.
 pub fn abscissae(sets: &Sets<'_>, task: &Task) -> Result<Vec<f64>, Error> {
     each(sets, task, |_, plant| {
+        if plant.sample_time().is_some() {
+            return HeldLoop::new(plant)?.abscissa(task);
+        }
         let function = match Poles::of(plant) {
             Poles::Root(abscissa) => return Ok(abscissa),
             Poles::Function(function) => function,
@@ -30,7 +34,7 @@ pub fn abscissae(sets: &Sets<'_>, task: &Task) -> Result<Vec<f64>, Error> {
     })
 }
 
-/// Does each loop decay at its rate in 1/s at least? Not where that is not found.
+/// Does each continuous loop decay at its rate in 1/s at least? Not where that is not found.
 pub fn decay(sets: &Sets<'_>, rates: &[f64], task: &Task) -> Result<Vec<bool>, Error> {
     let found = each(sets, task, |set, plant| {
         let least = rates.get(set).copied().unwrap_or(f64::INFINITY);

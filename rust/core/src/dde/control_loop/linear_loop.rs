@@ -197,6 +197,20 @@ impl<S: Scalar> LinearLoop<S> {
         self.update.as_ref()
     }
 
+    /// Has another loop the same poles, as far as its matrices say, with its delay and samples alike?
+    pub fn has_poles_of(&self, other: &Self) -> bool
+    where
+        S: PartialEq,
+    {
+        let (own, its) = (&self.equations, &other.equations);
+        let moved = |plant: &Self| {
+            let update = plant.update.clone();
+            update.map(|update| (update.states, update.command))
+        };
+        (&own.a, &own.b, &own.k, &own.l) == (&its.a, &its.b, &its.k, &its.l)
+            && moved(self) == moved(other)
+    }
+
     /// The matrices.
     pub fn equations(&self) -> &Equations<S> {
         &self.equations

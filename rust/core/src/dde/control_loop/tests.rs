@@ -4,9 +4,7 @@
 use proptest::prelude::*;
 
 use super::sampled;
-use super::sampled::LoopCells;
 use crate::dde::{Equations, LinearLoop, Reference, Start, Trajectory};
-use crate::status::CellStatus;
 use crate::{Error, Task};
 
 /// y′ = w, u = kp (r − y) − kv y′.
@@ -182,33 +180,6 @@ fn bad_numbers_are_refused_by_name() {
     uneven.k.push(1.0);
     assert!(LinearLoop::new(uneven, 0.1, None, None).is_err());
     assert!(Reference::new(0.0, vec![1.0, 0.5], vec![1.0, 2.0]).is_err());
-}
-
-#[test]
-fn the_grid_is_the_single_call() {
-    let gains: Vec<f64> = (1..40).map(|i| 0.15 * f64::from(i)).collect();
-    let k: Vec<f64> = gains.iter().map(|kp| -kp).collect();
-    let cells = LoopCells {
-        cells: gains.len(),
-        states: 1,
-        a: &[0.0],
-        b: &[1.0],
-        k: &k,
-        l: &[0.0],
-        gain: &[1.0],
-        delay: &[0.36],
-        sample_time: &[0.065],
-    };
-    let found = sampled::abscissa_grid(&cells, 0.0, &Task::new()).unwrap();
-    for (kp, cell) in gains.iter().zip(&found) {
-        let plant = LinearLoop::new(drone(*kp, 0.0), 0.36, Some(0.065), None).unwrap();
-        let poles = sampled::poles(&plant).unwrap();
-        assert_eq!(cell.abscissa, poles[0].re);
-        let unstable = poles.iter().filter(|pole| pole.re > 0.0).count();
-        assert_eq!(cell.unstable as usize, unstable);
-        assert_eq!(cell.unstable > 0, *kp > 4.024);
-        assert_eq!(cell.status, CellStatus::Ok);
-    }
 }
 
 proptest! {

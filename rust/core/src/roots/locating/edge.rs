@@ -101,27 +101,33 @@ fn sorted(
             // For example, a chain of roots within the margin.
             Err(_) => return Err(refusal),
         };
-        let sides: Vec<Side> = (0..set.roots.len())
-            .map(|i| side(&set, i, region))
-            .collect();
-        let wanted =
-            |side: &Side| *side == Side::Inside || (*side == Side::OnEdge && edge == Edge::Inside);
-        if edge == Edge::Refused && sides.contains(&Side::OnEdge) {
-            let listed = set.roots.iter().zip(&set.radii).zip(&set.multiplicities);
-            let on_edge = listed
-                .zip(&sides)
-                .filter(|(_, side)| **side == Side::OnEdge)
-                .map(|(((root, radius), multiplicity), _)| (*root, *radius, *multiplicity));
-            return Err(Error::OnEdge {
-                inside: set
-                    .part(*region, |i| sides.get(i) == Some(&Side::Inside))
-                    .counted,
-                roots: on_edge.collect(),
-            });
-        }
-        return Ok(set.part(*region, |i| sides.get(i).is_some_and(wanted)));
+        return within(&set, region, edge);
     }
     Err(refusal)
+}
+
+/// The roots of `region` among those of a set that has them all.
+///
+/// # Errors
+/// [`Error::OnEdge`] for roots on the edge where they are refused.
+pub(crate) fn within(set: &RootSet, region: &Region, edge: Edge) -> Result<RootSet, Error> {
+    let sides: Vec<Side> = (0..set.roots.len()).map(|i| side(set, i, region)).collect();
+    let wanted =
+        |side: &Side| *side == Side::Inside || (*side == Side::OnEdge && edge == Edge::Inside);
+    if edge == Edge::Refused && sides.contains(&Side::OnEdge) {
+        let listed = set.roots.iter().zip(&set.radii).zip(&set.multiplicities);
+        let on_edge = listed
+            .zip(&sides)
+            .filter(|(_, side)| **side == Side::OnEdge)
+            .map(|(((root, radius), multiplicity), _)| (*root, *radius, *multiplicity));
+        return Err(Error::OnEdge {
+            inside: set
+                .part(*region, |i| sides.get(i) == Some(&Side::Inside))
+                .counted,
+            roots: on_edge.collect(),
+        });
+    }
+    Ok(set.part(*region, |i| sides.get(i).is_some_and(wanted)))
 }
 
 /// The region with its finite edges moved out by `margin` times the smaller of its shorter side and

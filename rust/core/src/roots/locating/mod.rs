@@ -27,6 +27,7 @@ mod unstable;
 
 pub(crate) use all_roots::all_discs;
 pub use all_roots::roots;
+pub(crate) use edge::within;
 pub use edge::{Edge, count_with_edge, roots_with_edge};
 pub(crate) use isolate::{Search, Seek};
 pub(crate) use lines::{Effort, Line, Spectrum, chain_margin, half_plane_discs};

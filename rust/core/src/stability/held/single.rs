@@ -3,11 +3,13 @@
 use num_complex::Complex64;
 
 use super::model::{LoopPolynomials, share_of_errors};
+use super::poles::Poles;
 use crate::dde::LinearLoop;
 use crate::dde::control_loop::sampled;
 use crate::linear_algebra::balance::balanced_norm;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::quasipoly::{QuasiPolynomial, modulus};
+use crate::roots::{Region, RootSet};
 use crate::stability::branches::rightmost;
 use crate::stability::cell::Cell;
 use crate::stability::crossings::{Crossing, count, crossings};
@@ -118,18 +120,50 @@ impl<'a> HeldLoop<'a> {
         self.plant.equations().l != 0.0
     }
 
-    /// ln(ρ)/Ts, ρ the spectral radius; `None` where it is not found. With few samples in the delay
-    /// the eigenvalues of the transition matrix cost least, with many the search of `rightmost`.
+    /// ln(ρ)/Ts, ρ the spectral radius. With few samples in the delay, and where the search of
+    /// `rightmost` finds none, from the eigenvalues of the transition matrix.
     ///
     /// # Errors
-    /// As [`at`](Self::at); [`Error::Convergence`] where the QR algorithm fails.
-    pub fn abscissa(&self, task: &Task) -> Result<Option<f64>, Error> {
-        if self.delay() <= FEW * self.sample_time {
-            let found = sampled::poles(self.plant)?;
-            return Ok(found.first().map(|pole| pole.re));
+    /// As [`at`](Self::at); [`Error::TooMuch`] and [`Error::Convergence`] of the eigenvalues.
+    pub fn abscissa(&self, task: &Task) -> Result<f64, Error> {
+        if self.delay() > FEW * self.sample_time {
+            let numbers = self.at(self.delay())?;
+            let found = rightmost(&numbers.h()?, numbers.hold, task)?;
+            if let Some(abscissa) = found.abscissa {
+                return Ok(abscissa);
+            }
         }
-        let numbers = self.at(self.delay())?;
-        Ok(rightmost(&numbers.h()?, numbers.hold, task)?.abscissa)
+        let found = sampled::poles(self.plant)?;
+        Ok(found.first().map_or(f64::NEG_INFINITY, |pole| pole.re))
+    }
+
+    /// The poles s = ln(z)/Ts in a region, in discs that are proved to hold them; z = 0 is none.
+    ///
+    /// # Errors
+    /// [`Error::OnEdge`] where a disc meets the edge; [`Error::Argument`] and [`Error::Convergence`]
+    /// where numbers are beyond double precision; [`Error::TooMuch`] for too many samples of delay.
+    pub fn poles_in(&self, region: &Region) -> Result<RootSet, Error> {
+        Poles::of(self.plant, self.sample_time)?.within(region)
+    }
+
+    /// The `n` rightmost of them and their mirror images.
+    ///
+    /// # Errors
+    /// As [`poles_in`](Self::poles_in).
+    pub fn rightmost_poles(&self, n: usize) -> Result<RootSet, Error> {
+        Ok(Poles::of(self.plant, self.sample_time)?.rightmost(n))
+    }
+
+    /// Are all poles inside the circle, by a proved count, or by discs where a pole is close to it?
+    /// `None` where rounding decides.
+    ///
+    /// # Errors
+    /// As [`at`](Self::at); [`Error::Interrupted`]; [`Error::TooMuch`] for too many samples of delay.
+    pub fn is_stable(&self, task: &Task) -> Result<Option<bool>, Error> {
+        match self.at(self.delay())?.is_stable(task)? {
+            None => Ok(Poles::of(self.plant, self.sample_time)?.are_inside()),
+            known => Ok(known),
+        }
     }
 
     /// The values in `range` of a gain, whose factor is the feedback of `slope`, at which a pole of
@@ -259,19 +293,38 @@ impl HeldNumbers {
     /// # Errors
     /// [`Error::Interrupted`].
     pub fn factors(&self, range: (f64, f64), task: &Task) -> Result<Option<Vec<Crossing>>, Error> {
-        let zeros = |row: &[f64]| row.iter().take_while(|c| **c == 0.0).count();
         if self.b.iter().all(|c| *c == 0.0) {
             return Ok(Some(Vec::new()));
         }
-        let common = zeros(&self.a).min(zeros(&self.b));
+        let common = self.common_powers();
         let b = self.b[common..].iter().map(|c| -c).collect();
         let a = QuasiPolynomial::new(vec![self.a[common..].to_vec()], vec![0.0])?;
         let b = QuasiPolynomial::new(vec![b], vec![self.delay])?;
         crossings(&a, &b, Specification::default(), self.hold, range, task)
     }
 
+    /// Powers of σ that a and b have in common.
+    fn common_powers(&self) -> usize {
+        let zeros = |row: &[f64]| row.iter().take_while(|c| **c == 0.0).count();
+        zeros(&self.a).min(zeros(&self.b))
+    }
+
+    /// The loop gain at s = jω; infinite at a pole.
+    pub fn gain(&self, omega: f64) -> Complex64 {
+        let common = self.common_powers();
+        let (of_a, of_b) = self.parts_of(&self.a[common..], &self.b[common..], omega);
+        if of_a == Complex64::ZERO {
+            return Complex64::new(f64::INFINITY, 0.0);
+        }
+        -of_b / of_a
+    }
+
     /// a and e^(−s d) b at s = jω: the loop gain is minus their ratio.
     pub fn parts(&self, omega: f64) -> (Complex64, Complex64) {
+        self.parts_of(&self.a, &self.b, omega)
+    }
+
+    fn parts_of(&self, a: &[f64], b: &[f64], omega: f64) -> (Complex64, Complex64) {
         let sigma = self.variable(omega);
         let value = |row: &[f64]| {
             row.iter()
@@ -279,9 +332,6 @@ impl HeldNumbers {
                 .fold(Complex64::ZERO, |sum, c| sum * sigma + c)
         };
         let (sine, cosine) = crate::elementary::sin_cos(omega * self.delay);
-        (
-            value(&self.a),
-            value(&self.b) * Complex64::new(cosine, -sine),
-        )
+        (value(a), value(b) * Complex64::new(cosine, -sine))
     }
 }

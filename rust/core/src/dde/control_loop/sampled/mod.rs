@@ -6,14 +6,12 @@
 //! s = ln(z)/Ts. Everything here is exact to rounding. A delay within rounding of a whole number
 //! of samples is taken as that number.
 
-mod grid;
 mod run;
 mod timing;
 mod transition;
 mod window;
 
-pub use grid::{CellPoles, LoopCells, abscissa_grid};
 pub(crate) use run::run;
 pub use timing::Timing;
-pub(crate) use transition::eigenvalues;
-pub use transition::{balanced_matrix, poles, transition_matrix};
+pub(crate) use transition::{eigenvalues, multipliers};
+pub use transition::{poles, transition_matrix};

@@ -23,7 +23,7 @@ use super::timing::Timing;
 const MOST_STATES: usize = 2000;
 
 /// The open-loop pieces Φ, Γ₀, Γ₁ of one sample.
-pub(super) struct Sample {
+struct Sample {
     phi: Vec<f64>,
     now: Vec<f64>,
     past: Vec<f64>,
@@ -31,7 +31,7 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    pub(super) fn new(a: &[f64], b: &[f64], delay: f64, sample_time: f64) -> Self {
+    fn new(a: &[f64], b: &[f64], delay: f64, sample_time: f64) -> Self {
         let timing = Timing::new(delay, sample_time);
         let late = Propagator::new(a, &[b], timing.late);
         let early = Propagator::new(a, &[b], timing.early);
@@ -58,33 +58,32 @@ impl Sample {
     }
 
     /// Side of the transition matrix.
-    pub(super) fn size(&self) -> usize {
+    fn size(&self) -> usize {
         self.states() + self.lag + 1
     }
 
     /// Number of states without the commands in the delay.
-    pub(super) fn states(&self) -> usize {
+    fn states(&self) -> usize {
         self.now.len()
     }
 
-    /// The loop closed with u = K x + L w and the command scaled by `gain` on its way to the
-    /// plant; row-major.
-    pub(super) fn close(&self, k: &[f64], l: f64, gain: f64) -> Vec<f64> {
+    /// The loop closed with u = K x + L w; row-major.
+    fn close(&self, k: &[f64], l: f64) -> Vec<f64> {
         let (n, size) = (self.now.len(), self.size());
         let oldest = size - 1;
         let mut matrix = vec![0.0; size * size];
         for row in 0..n {
             let line = &mut matrix[row * size..(row + 1) * size];
             line[..n].copy_from_slice(&self.phi[row * n..(row + 1) * n]);
-            line[oldest] += gain * self.past[row];
+            line[oldest] += self.past[row];
             if self.lag == 0 {
                 // u_{k−m} is the command of this sample itself.
                 for (entry, k) in line.iter_mut().zip(k) {
-                    *entry += gain * self.now[row] * k;
+                    *entry += self.now[row] * k;
                 }
-                line[oldest] += gain * self.now[row] * l;
+                line[oldest] += self.now[row] * l;
             } else {
-                line[oldest - 1] += gain * self.now[row];
+                line[oldest - 1] += self.now[row];
             }
         }
         let newest = &mut matrix[n * size..(n + 1) * size];
@@ -106,17 +105,6 @@ pub fn transition_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error>
     Ok((matrix, sample.size()))
 }
 
-/// The transition matrix in units of states and commands that make its norm small: similar to
-/// [`transition_matrix`] by powers of two, so that the eigenvalues are the same.
-///
-/// # Errors
-/// As [`transition_matrix`].
-pub fn balanced_matrix(plant: &LinearLoop) -> Result<(Vec<f64>, usize), Error> {
-    let (mut matrix, sample, _) = closed(plant)?;
-    balance(&mut matrix, sample.states(), sample.size());
-    Ok((matrix, sample.size()))
-}
-
 /// The transition matrix, its sample and the sample time.
 fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
     let Some(sample_time) = plant.sample_time() else {
@@ -128,7 +116,7 @@ fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
     if let Some(update) = plant.update() {
         sample = sample.updated(update);
     }
-    let matrix = sample.close(&equations.k, equations.l, 1.0);
+    let matrix = sample.close(&equations.k, equations.l);
     Ok((matrix, sample, sample_time))
 }
 
@@ -137,13 +125,23 @@ fn closed(plant: &LinearLoop) -> Result<(Vec<f64>, Sample, f64), Error> {
 /// # Errors
 /// As [`transition_matrix`]; [`Error::Convergence`] where the QR algorithm fails.
 pub fn poles(plant: &LinearLoop) -> Result<Vec<Complex64>, Error> {
-    let (matrix, sample, sample_time) = closed(plant)?;
-    let mut poles: Vec<_> = eigenvalues(matrix, sample.states(), sample.size())?
+    let (multipliers, sample_time) = multipliers(plant)?;
+    let mut poles: Vec<_> = multipliers
         .into_iter()
         .map(|z| Complex64::new(z.norm().ln() / sample_time, z.arg() / sample_time))
         .collect();
     poles.sort_by(|p, q| q.re.total_cmp(&p.re).then(q.im.total_cmp(&p.im)));
     Ok(poles)
+}
+
+/// The eigenvalues z of the transition matrix, and the sample time.
+///
+/// # Errors
+/// As [`poles`].
+pub(crate) fn multipliers(plant: &LinearLoop) -> Result<(Vec<Complex64>, f64), Error> {
+    let (matrix, sample, sample_time) = closed(plant)?;
+    let found = eigenvalues(matrix, sample.states(), sample.size())?;
+    Ok((found, sample_time))
 }
 
 /// Choose units of the states and one unit of all commands; `matrix` is row-major.
@@ -170,7 +168,7 @@ fn balance(matrix: &mut [f64], states: usize, size: usize) {
 }
 
 /// Refuse a dense eigenvalue problem that is too large.
-pub(super) fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), Error> {
+fn check_size(n: usize, delay: f64, sample_time: f64) -> Result<(), Error> {
     if delay / sample_time + n as f64 > MOST_STATES as f64 {
         return Err(Error::TooMuch {
             what: "the transition matrix",
@@ -191,13 +189,44 @@ pub(crate) fn eigenvalues(
     states: usize,
     size: usize,
 ) -> Result<Vec<Complex64>, Error> {
-    balance(&mut matrix, states, size);
-    eigenvalues::eigenvalues(&matrix, size).ok_or_else(|| Error::Convergence {
+    let (mut found, places) = alone(&matrix, size);
+    let (states, side) = (
+        places.iter().filter(|place| **place < states).count(),
+        places.len(),
+    );
+    if side < size {
+        let entry = |k: usize| matrix[places[k / side] * size + places[k % side]];
+        matrix = (0..side * side).map(entry).collect();
+    }
+    if side > states {
+        balance(&mut matrix, states, side);
+    }
+    let rest = eigenvalues::eigenvalues(&matrix, side).ok_or_else(|| Error::Convergence {
         what: "the eigenvalues of the transition matrix",
         best: Complex64::new(f64::NAN, f64::NAN),
         advice: "the loop is scaled too badly: choose units in which its gains are moderate"
             .to_owned(),
-    })
+    })?;
+    found.extend(rest);
+    Ok(found)
+}
+
+/// Eigenvalues on the diagonal, in rows or columns that hold nothing else, and the other rows: an
+/// integrator of an open loop, and commands that have no effect.
+fn alone(matrix: &[f64], size: usize) -> (Vec<Complex64>, Vec<usize>) {
+    let (mut found, mut places) = (Vec::new(), (0..size).collect::<Vec<_>>());
+    let is_alone = |i: usize, places: &[usize]| {
+        let empty = |at: &dyn Fn(usize) -> usize| {
+            let mut others = places.iter().filter(|j| **j != i);
+            others.all(|j| matrix[at(*j)] == 0.0)
+        };
+        empty(&|j| i * size + j) || empty(&|j| j * size + i)
+    };
+    while let Some(at) = places.iter().position(|i| is_alone(*i, &places)) {
+        let i = places.remove(at);
+        found.push(Complex64::from(matrix[i * size + i]));
+    }
+    (found, places)
 }
 
 /// `out` += A B for square matrices of side n.
