@@ -23,6 +23,7 @@ CORE_ARROWS = {
     "stability": {"linear_algebra", "elementary", "lambertw", "quasipoly", "roots", "dde"},
     "frequency": {"elementary", "quasipoly", "roots", "dde", "stability"},
     "dde": {"linear_algebra", "elementary"},
+    "loops": {"linear_algebra", "quasipoly", "dde", "stability", "frequency"},
     "estimation": {"linear_algebra"},
 }
 
@@ -80,6 +81,25 @@ ORDER = {
         "ranges",
     ],
     "dde": ["scalar", "limits", "rate_limits", "propagator", "control_loop", "system", "spectral"],
+    "loops": [
+        "entry",
+        "each",
+        "symbol",
+        "polynomial",
+        "plant",
+        "filter",
+        "controller",
+        "control_loop",
+        "equations",
+        "rest",
+        "settled",
+        "slopes",
+        "sweep",
+        "characteristic",
+        "held",
+        "plane",
+        "range",
+    ],
     "estimation": [
         "plant",
         "disturbance",

@@ -1,7 +1,6 @@
 """Margins of sampled loops, held against the eigenvalues of their transition matrices."""
 
 import math
-from dataclasses import replace
 
 import deadtime as dtm
 import numpy as np
@@ -36,7 +35,7 @@ def cut(loop):
     """Transition matrix with the loop opened at the command, and its input and output vectors."""
     model = loop.specification.model
     matrices = [
-        replace(model, K=np.zeros_like(model.K), L=direct)
+        model._replace(K=np.zeros_like(model.K), L=direct)
         .native(loop.delay, loop.sample_time)
         .transition_matrix()
         for direct in (0.0, 1.0)

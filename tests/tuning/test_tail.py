@@ -1,10 +1,8 @@
 """Bounds on a response after the end of its simulation, against longer simulations."""
 
-from dataclasses import replace
-
 import deadtime as dtm
 import numpy as np
-from deadtime.loops._model import LoopRun
+from deadtime.loops._runs import LoopRun
 from deadtime.tuning._tail import Fundamental, tail_bound
 from hypothesis import assume, example, given, settings, strategies as st
 from loops import loops
@@ -69,7 +67,7 @@ def test_a_period_is_bounded_by_what_it_begins_with(loop, state, pulse, delays):
     time = h * np.arange(begin + delays * FINE + 1)
     jumps = h * np.array([0.0, FINE - 4, FINE])
     run = LoopRun(np.array(state[:n]), 0.0, 0.0, np.array([0.0, pulse, 0.0]), jumps)
-    rows = [replace(model, C=row, D=0.0) for row in np.eye(n)]
+    rows = [model._replace(C=row, D=0.0) for row in np.eye(n)]
     x = np.array([one.native(late, None, None).outputs(time, run) for one in rows])
     # Commands from one delay before the first time on.
     u = np.concatenate([np.zeros(FINE), model.K @ x])

@@ -360,9 +360,10 @@ class _Sets:
         # system and cleared by it each time, at a tenth of the cost of a sweep.
         found = np.empty((len(_METRICS) + 1, count))
         status = np.empty(count, dtype=np.uint8)
+        # Rows without elements would lie at one address.
         self.kernel.sweep_metrics(
             self.native,
-            columns=list(found),
+            columns=list(found) if count else [],
             status=status,
             span=span,
             settling=self.settling,
@@ -480,9 +481,9 @@ def _longer(steps: Any) -> Any:
 
 def commands_at_rest(loop: ControlLoop, values: Mapping[str, Array], amplitude: float) -> Array:
     """Commands at rest of loops with these numbers, the limit left out."""
-    (size,) = np.broadcast_shapes(*(np.shape(array) for array in values.values()))
-    sets = LoopSets({n: np.broadcast_to(v, size) for n, v in values.items()}, None, size, amplitude)
-    return loop.specification.kernel.sweep_rest(sets)[0]
+    shape = np.broadcast_shapes(*(np.shape(array) for array in values.values()))
+    sets = _Sets(loop, values, shape, amplitude, 0.0, (0.0, 0.0), None)
+    return sets.kernel.sweep_rest(sets.native)[0].reshape(shape)
 
 
 def require_loop(loop: object) -> None:

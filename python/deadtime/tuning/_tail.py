@@ -25,7 +25,6 @@ of length h states change by at most (exp(abs(A) h) - I) abs(x) and what the com
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -311,7 +310,7 @@ def states_at(
     """Every state of a continuous loop after a step, nothing under way at time 0."""
     run = LoopRun(start, command=0.0, reference=amplitude)
     found = [
-        replace(model, C=row, D=0.0).native(delay, None, limit).outputs(times, run)
+        model._replace(C=row, D=0.0).native(delay, None, limit).outputs(times, run)
         for row in np.eye(len(model.B))
     ]
     return np.array(found)
