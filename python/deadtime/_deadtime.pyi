@@ -674,6 +674,18 @@ class Loop:
     def stable_range(
         self, name: str, free: _Fraction | None = None, given: _Polynomials | None = None
     ) -> _Pair: ...
+    def outputs(
+        self,
+        numbers: dict[str, float],
+        time: _Reals,
+        reference: _Reals,
+        reference_time: _Reals,
+        initial_output: float,
+        *,
+        command_history: _Reals,
+        sample_phase: float,
+        given: _Fraction | None = None,
+    ) -> _Reals: ...
     def sensitivities(
         self,
         names: list[str],

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import PickledByFields
 from deadtime._base.validation import non_negative, positive
 from deadtime.loops._controllers import Controller
@@ -127,6 +128,30 @@ class LoopSpecification(PickledByFields):
         numbers = self.plant.parameters
         given = self.plant._given(numbers | values) if numbers.keys() & values.keys() else None
         return self.kernel.at(dict(values), given)
+
+    def outputs_at(
+        self,
+        values: Mapping[str, float],
+        time: Array,
+        reference: tuple[Array, Array],
+        initial_output: float,
+        past: tuple[Array, float],
+    ) -> Array:
+        """Outputs with other numbers, as `ControlLoop.simulate` with these arguments gives them.
+
+        `reference` are values and their times, `past` the command history and the sample phase.
+        """
+        numbers = self.plant.parameters
+        given = self.plant._given(numbers | values)
+        return self.kernel.outputs(
+            dict(values),
+            time,
+            *reference,
+            initial_output,
+            command_history=past[0],
+            sample_phase=past[1],
+            given=given,
+        )
 
     def abscissa_at(self, values: Mapping[str, float]) -> float:
         """Spectral abscissa in 1/s with other numbers, also beyond what a loop may have."""

@@ -3,9 +3,9 @@
 use std::sync::OnceLock;
 
 use deadtime::Error;
-use deadtime::dde::Criteria;
 use deadtime::dde::ensemble::Measures;
 use deadtime::dde::fixed_step::{self, Rest};
+use deadtime::dde::{Criteria, Request};
 use deadtime::loops::{
     ControlLoop, Controller, Each, Factors, Fraction, GivenPlant, HeldPlane, Input, Kind, Monomial,
     Path, Place, Plant, Rule, SampledFilter, SlopesAsked, SweptLoops, Symbol, Values,
@@ -396,6 +396,38 @@ impl PyLoop {
                     .stable_range(place, GivenPlant { free, at }, task)
             })
         })
+    }
+
+    /// Outputs with other numbers at times after a rest at `initial_output`, under references that hold from
+    /// their times on; `given` as in `at`.
+    #[pyo3(signature = (numbers, time, reference, reference_time, initial_output, *, command_history, sample_phase, given=None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
+    fn outputs<'py>(
+        &self,
+        py: Python<'py>,
+        numbers: ByName<f64>,
+        time: Floats<'_>,
+        reference: Floats<'_>,
+        reference_time: Floats<'_>,
+        initial_output: f64,
+        command_history: Floats<'_>,
+        sample_phase: f64,
+        given: Option<Given<f64>>,
+    ) -> PyResult<Vector<'py>> {
+        let changed = self.at(numbers, given)?.inner;
+        let (time, reference) = (in_order(&time)?, in_order(&reference)?);
+        let (reference_time, history) = (in_order(&reference_time)?, owned(&command_history)?);
+        let asked = Request {
+            time: &time,
+            output_lead: changed.output_lead(),
+            reference_before: initial_output,
+            reference_time: &reference_time,
+            reference: &reference,
+        };
+        let found = run_here(py, |task| {
+            changed.outputs_after_rest(initial_output, (history, sample_phase), &asked, task)
+        })?;
+        Ok(found.into_pyarray(py))
     }
 
     /// Derivatives of outputs and inputs by numbers of the loop, at times since the start of the run;

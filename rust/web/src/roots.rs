@@ -20,10 +20,7 @@ pub(crate) fn rightmost(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     if control_loop.values().sample_time.is_some() {
         let linear = control_loop.linear(Input::Reference)?;
         let poles = sampled::poles(&linear)?;
-        let rightmost = poles.first().map_or(f64::NEG_INFINITY, |pole| pole.re);
-        let abscissa = HeldLoop::new(&linear)?
-            .abscissa(&task)?
-            .unwrap_or(rightmost);
+        let abscissa = HeldLoop::new(&linear)?.abscissa(&task)?;
         let mut answer = vec![abscissa, f64::NEG_INFINITY];
         for pole in poles.iter().take(many) {
             answer.extend([pole.re, pole.im, 1.0, f64::NAN]);

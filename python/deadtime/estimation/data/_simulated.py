@@ -135,7 +135,15 @@ class SimulatedRecording:
 
     def output(self, values: Mapping[str, float], start: float) -> Array:
         """Output of the loop with these parameters, from rest at the output `start`."""
-        return self._run(values, start).outputs
+        window, loop = self.recording, self.loop.specification
+        late, phase = self._clock(values)
+        return loop.outputs_at(
+            _of_the_loop(values),
+            window.time - late,
+            (window.reference, window.time),
+            start,
+            (self._past, phase),
+        )
 
     def slopes(self, values: Mapping[str, float], start: float) -> dict[str, Array]:
         """Derivatives of the output by each of `values` and its start (``initial output``).
@@ -184,14 +192,8 @@ class SimulatedRecording:
         self, values: Mapping[str, float], start: float, sensitivities: Sequence[str] = ()
     ) -> Response:
         window = self.recording
-        # The clock of the output is late: its time stamp t was at t - late.
-        late = values.get("start", 0.0)
-        loop = self.loop.replace(**_of_the_loop(values))
-        phase = 0.0
-        if loop.sample_time is not None:
-            phase = late % loop.sample_time
-            phase = 0.0 if phase >= loop.sample_time else phase
-        return loop.simulate(
+        late, phase = self._clock(values)
+        return self.loop.replace(**_of_the_loop(values)).simulate(
             window.time - late,
             window.reference,
             reference_time=window.time,
@@ -200,6 +202,15 @@ class SimulatedRecording:
             sample_phase=phase,
             sensitivities=sensitivities,
         )
+
+    def _clock(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """How late the clock of the output is, s, and the time of the first sample.
+
+        The time stamp t of an output was at t - late.
+        """
+        late, period = values.get("start", 0.0), self.loop.sample_time
+        phase = 0.0 if period is None else late % period
+        return late, 0.0 if phase == period else phase
 
     def residuals(self, values: Mapping[str, float], start: float) -> Array:
         """Recorded minus simulated output."""

@@ -1,11 +1,12 @@
 //! A loop at rest.
 
-use crate::Error;
-use crate::dde::{Scalar, Start};
+use crate::dde::{Request, Scalar, Start};
+use crate::{Error, Task};
 
 use super::control_loop::{ControlLoop, Values};
 use super::controller::Paths;
 use super::entry::{Entry, Number};
+use super::equations::Input;
 use super::plant::Fraction;
 
 /// A loop counts as one without a rest where its determinant is below this part of its summands: more
@@ -65,5 +66,32 @@ impl ControlLoop {
             command,
             ..Start::default()
         })
+    }
+
+    /// Outputs from rest at `output` on, of which `past` are the commands at the samples before the start
+    /// and the time of the first sample.
+    ///
+    /// # Errors
+    /// As [`start_at_rest`](Self::start_at_rest), and as a simulation.
+    pub fn outputs_after_rest(
+        &self,
+        output: f64,
+        past: (Vec<f64>, f64),
+        asked: &Request<'_>,
+        task: &Task,
+    ) -> Result<Vec<f64>, Error> {
+        let first = asked.time.first().copied().unwrap_or(0.0);
+        let before = asked.reference_time.partition_point(|time| *time < first);
+        let reference = match before.checked_sub(1) {
+            Some(index) => asked.reference.get(index).copied(),
+            None => None,
+        };
+        let start = Start {
+            command_history: past.0,
+            sample_phase: past.1,
+            ..self.start_at_rest(self.values(), output, reference.unwrap_or(output))?
+        };
+        let linear = self.linear(Input::Reference)?;
+        Ok(linear.respond(&start, asked, task)?.outputs)
     }
 }
