@@ -24,7 +24,7 @@ SOURCES = ("rust/core/src", "rust/web/src")
 FILES = ("Cargo.toml", "Cargo.lock", "rust/core/Cargo.toml", "rust/web/Cargo.toml")
 
 #: Largest size of the compressed module, in bytes.
-MOST = 405_000
+MOST = 420_000
 
 
 def sources_hash() -> str:

@@ -26,7 +26,7 @@ def held_plane(
 ) -> HeldPlane:
     """A sampled loop of which two numbers vary, and others are `fixed`."""
     refuse_discretised(loop.controller, 1.0, "a map")
-    values = loop.parameters | fixed
+    values = {**loop.parameters, **fixed}
     for name in ("delay", "sample_time"):
         low = float(np.min(axes.get(name, np.array(values[name]))))
         if low < 0.0 or (name == "sample_time" and low == 0.0):

@@ -39,7 +39,7 @@ class LoopModel(NamedTuple):
     def of(cls, loop: LinearLoop) -> LoopModel:
         """Read the equations of a loop."""
         equations, update = loop.equations()
-        return cls(*equations, update=None if update is None else SampleUpdate(*update))
+        return cls(*equations)._replace(update=update and SampleUpdate(*update))
 
     def native(
         self, delay: float, sample_time: float | None = None, limit: float | None = None

@@ -126,7 +126,7 @@ class LoopSpecification(PickledByFields):
     def kernel_at(self, values: Mapping[str, float]) -> Loop:
         """The loop of the kernel with other numbers."""
         numbers = self.plant.parameters
-        given = self.plant._given(numbers | values) if numbers.keys() & values.keys() else None
+        given = self.plant._given({**numbers, **values}) if numbers.keys() & values.keys() else None
         return self.kernel.at(dict(values), given)
 
     def outputs_at(
@@ -142,7 +142,7 @@ class LoopSpecification(PickledByFields):
         `reference` are values and their times, `past` the command history and the sample phase.
         """
         numbers = self.plant.parameters
-        given = self.plant._given(numbers | values)
+        given = self.plant._given({**numbers, **values})
         return self.kernel.outputs(
             dict(values),
             time,

@@ -116,7 +116,7 @@ impl ControlLoop {
     pub fn loop_gain(&self) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
         let [b, a] = self.ratio(self.values())?;
         let Paths { f, g, .. } = self.controller().paths(&self.values().controller);
-        Ok((self.late(&times(&b, &f)?)?, times(&a, &g)?))
+        Ok((times(&b, &f, self.values().delay)?, times(&a, &g, 0.0)?))
     }
 
     /// The characteristic function.
@@ -135,13 +135,9 @@ impl ControlLoop {
     /// As [`loop_gain`](Self::loop_gain).
     pub fn to_output(&self) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
         let [b, _] = self.ratio(self.values())?;
-        let num = times(&b, &self.controller().paths(&self.values().controller).r)?;
-        let num = if self.is_measured() {
-            num
-        } else {
-            self.late(&num)?
-        };
-        Ok((num, self.characteristic()?))
+        let r = self.controller().paths(&self.values().controller).r;
+        let late = self.values().delay - self.output_lead();
+        Ok((times(&b, &r, late)?, self.characteristic()?))
     }
 
     /// From the reference to the command: a r over the characteristic function.
@@ -150,25 +146,19 @@ impl ControlLoop {
     /// As [`loop_gain`](Self::loop_gain).
     pub fn to_command(&self) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
         let [_, a] = self.ratio(self.values())?;
-        let num = times(&a, &self.controller().paths(&self.values().controller).r)?;
-        Ok((num, self.characteristic()?))
-    }
-
-    /// h e^(−s T).
-    fn late(&self, h: &QuasiPolynomial) -> Result<QuasiPolynomial, Error> {
-        let delay = self.values().delay;
-        h.mul(&QuasiPolynomial::new(vec![vec![1.0]], vec![delay])?)
+        let r = self.controller().paths(&self.values().controller).r;
+        Ok((times(&a, &r, 0.0)?, self.characteristic()?))
     }
 }
 
-/// Each polynomial times another one.
-fn times(sums: &Sums<f64>, other: &[f64]) -> Result<QuasiPolynomial, Error> {
+/// Each polynomial times another one and e^(−s `late`).
+fn times(sums: &Sums<f64>, other: &[f64], late: f64) -> Result<QuasiPolynomial, Error> {
     let rows = sums.iter().map(|(_, row)| {
         let mut ascending = product(row, other);
         ascending.reverse();
         ascending
     });
-    let delays = sums.iter().map(|(delay, _)| *delay).collect();
+    let delays = sums.iter().map(|(delay, _)| delay + late).collect();
     QuasiPolynomial::new(rows.collect(), delays)
 }
 
