@@ -7,10 +7,10 @@ use std::f64::consts::{PI, TAU};
 
 use super::circle::is_stable;
 use super::further_delay::further_delay;
-use super::gain_crossovers::{FAR, crossovers, is_zero};
+use super::gain_crossovers::{Crossover, FAR, crossovers, is_zero};
 use super::margins::{Margins, least};
 use crate::order::sort_up;
-use crate::stability::HeldLoop;
+use crate::stability::{HeldLoop, HeldNumbers};
 use crate::{Error, Task};
 
 /// Margins of a loop with a hold; without `delay_margin` that is NaN. Further delays change the
@@ -25,6 +25,31 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
         Some(stable) => stable,
         None => held.abscissa(task)?.is_some_and(|abscissa| abscissa < 0.0),
     };
+    let late = match (stable, delay_margin) {
+        (true, true) => further_delay(held, task)?,
+        _ => (f64::NAN, f64::NAN),
+    };
+    with_verdict(&numbers, &found, stable, late, task)
+}
+
+/// [`held_margins`] without the delay margin, of a loop that is known to be stable.
+///
+/// # Errors
+/// As [`held_margins`].
+pub fn held_margins_of_stable(held: HeldLoop<'_>, task: &Task) -> Result<Margins, Error> {
+    let numbers = held.at(held.delay())?;
+    let found = crossovers(&numbers, task)?;
+    with_verdict(&numbers, &found, true, (f64::NAN, f64::NAN), task)
+}
+
+/// The margins where stability, gain crossovers and delay margin are known.
+fn with_verdict(
+    numbers: &HeldNumbers,
+    found: &[Crossover],
+    stable: bool,
+    late: (f64, f64),
+    task: &Task,
+) -> Result<Margins, Error> {
     let (places, turns): (Vec<f64>, Vec<f64>) = found.iter().map(|at| (at.omega, at.turn)).unzip();
     let degrees: Vec<f64> = turns
         .iter()
@@ -51,10 +76,6 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
         -down.0
     };
     let turned = least(&degrees, &places, |turn| Some(turn.abs()));
-    let late = match (stable, delay_margin) {
-        (true, true) => further_delay(held, task)?,
-        _ => (f64::NAN, f64::NAN),
-    };
     let shown = |pair: (f64, f64)| if stable { pair } else { (f64::NAN, f64::NAN) };
     let [up, down, turned] = [up, down, turned].map(shown);
     Ok(Margins {

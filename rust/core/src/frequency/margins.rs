@@ -81,6 +81,20 @@ pub fn margins(n: &QuasiPolynomial, d: &QuasiPolynomial, task: &Task) -> Result<
     with_verdict(n, d, Stability { stable, hidden }, task)
 }
 
+/// [`margins`] of a loop that is known to be stable.
+///
+/// # Errors
+/// As [`margins`].
+pub fn margins_of_stable(
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+    task: &Task,
+) -> Result<Margins, Error> {
+    refuse_what_has_none(n, d)?;
+    let (stable, hidden) = (true, Vec::new());
+    with_verdict(n, d, Stability { stable, hidden }, task)
+}
+
 /// [`margins`], except that roots of d + n that n and d have in common do not count: they are hidden
 /// in the ratio n/(d + n).
 ///
