@@ -3,6 +3,7 @@
 import functools
 import itertools
 import math
+import sys
 
 import deadtime as dtm
 import numpy as np
@@ -191,6 +192,25 @@ def test_a_gain_margin_at_half_the_sampling_rate_is_found(share):
     gains = np.array([[share / 0.065]])
     found = problem.candidates(problem.corners).all_margins(gains, None)[0, 0]
     assert found[0] == pytest.approx(2.0 / share, rel=1e-9)
+
+
+@pytest.mark.parametrize("loop", [LOOP, LOOP.replace(sample_time=0.065)])
+def test_a_design_makes_few_calls(loop):
+    """It made 130 000: margins in numpy, and a loop anew for each of a thousand gains."""
+    calls = 0
+
+    def count(frame, event, argument):
+        nonlocal calls
+        calls += event == "call"
+
+    options = {"controller": dtm.PV, "delay": (0.3, 0.4), "shape": (15, 15)}
+    dtm.design(loop, **options)  # what is imported first is not counted
+    sys.setprofile(count)
+    try:
+        dtm.design(loop, **options, gain_margin=2.0, phase_margin=45.0)
+    finally:
+        sys.setprofile(None)
+    assert 0 < calls < 10_000
 
 
 def posed(loop, controller):

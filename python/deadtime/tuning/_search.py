@@ -192,7 +192,7 @@ class Search:
     def _least(self, points: Array, judge: Judge) -> tuple[int, float]:
         """Place and cost of the best of the points."""
         if not self.objective.simulated:
-            return self._loops.least(points, self._goal, self.problem.threads)
+            return self._loops.least(points, self._goal)
         costs = self._simulated(points, judge)
         place = int(np.argmin(costs))
         return place, float(costs[place])
@@ -200,12 +200,13 @@ class Search:
     def _simulated(self, points: Array, judge: Judge) -> Array:
         """Costs of points, of which only those that may be taken are simulated."""
         costs = np.full(len(points), np.inf)
-        stable = np.isfinite(self._loops.stable_abscissae(points, self.problem.threads))
-        short = self.shortfalls(points[stable])
-        costs[stable] = NEVER * (1.0 + short)
-        good = np.flatnonzero(stable)[short <= _MET]
+        late = self._loops.stable_abscissae(points, self.problem.threads)
+        stable = np.flatnonzero(np.isfinite(late))
+        good = stable[self.shortfalls(points[stable], _MET) <= _MET]
         if good.size:
             costs[good] = judge(self.problem, points[good], self.scenarios).max(axis=1)
+        else:
+            costs[stable] = NEVER * (1.0 + self.shortfalls(points[stable]))
         return costs
 
     @property

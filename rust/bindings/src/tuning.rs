@@ -1,7 +1,7 @@
 //! Bindings of `deadtime::tuning`.
 
 use deadtime::Error;
-use deadtime::tuning::{self, Candidates, Goal, Loops, Objective, Scenario, Within};
+use deadtime::tuning::{self, Candidates, Decisive, Goal, Loops, Objective, Scenario, Within};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -151,23 +151,19 @@ impl PyCandidates {
     }
 
     /// Place and cost of the best row of gains.
-    fn least(
-        &self,
-        py: Python<'_>,
-        points: Points<'_>,
-        goal: GivenGoal,
-        threads: Option<usize>,
-    ) -> PyResult<(usize, f64)> {
-        let goal = goal.into();
-        self.of_points(py, &points, threads, |points, task| {
-            tuning::least(&self.inner, &goal, points, task)
-        })
+    fn least(&self, py: Python<'_>, points: Points<'_>, goal: GivenGoal) -> PyResult<(usize, f64)> {
+        let (goal, points) = (goal.into(), rows(&points));
+        let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        run_here(py, |task| tuning::least(&self.inner, &goal, &points, task))
     }
 
     /// The cost of gains with what they miss of the margins.
     fn total(&self, py: Python<'_>, gains: Vec<f64>, goal: GivenGoal) -> PyResult<f64> {
         let goal = Goal::from(goal);
-        run_here(py, |task| goal.total(&self.inner, &gains, task))
+        let mut last = Decisive::default();
+        run_here(py, |task| {
+            goal.total(&self.inner, &gains, f64::INFINITY, &mut last, task)
+        })
     }
 
     /// The best gains within reach of a start, between the bounds in the rows of a matrix.

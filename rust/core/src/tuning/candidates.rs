@@ -4,8 +4,6 @@
 //! quasi-polynomials. Of sampled ones the feedback is u = Σ g_i (K_i x + L_i w), and the other
 //! equations depend on the scenario alone.
 
-use std::f64::consts::TAU;
-
 use crate::dde::LinearLoop;
 use crate::dde::control_loop::sampled;
 use crate::dde::ensemble::Sets;
@@ -177,26 +175,21 @@ impl Candidates {
     }
 
     /// Gain margin, phase margin in degrees and delay margin in s of a loop that is stable; zero
-    /// where they are not found. The delay margin of a sampled loop leaves out that the hold's share
-    /// of a delay changes with it.
+    /// where they are not found. See [`margins_of_stable`] and [`held_margins_of_stable`].
     pub(super) fn stable_margins(
         &self,
         values: &[f64],
         scenario: &Scenario,
+        (most, turns): (f64, bool),
         task: &Task,
     ) -> Result<[f64; 3], Error> {
         let found = match &self.loops {
-            Loops::Continuous([_, n, d]) => parts(n, d, values)
-                .and_then(|(n, d)| margins_of_stable(&n, &d, task))
-                .map(|found| three(&found)),
+            Loops::Continuous([_, n, d]) => {
+                parts(n, d, values).and_then(|(n, d)| margins_of_stable(&n, &d, most, turns, task))
+            }
             Loops::Sampled(kinds) => sampled_loop(kinds, values, self.delay, scenario.kind)
-                .and_then(|plant| held_margins_of_stable(HeldLoop::new(&plant)?, task))
-                .map(|found| {
-                    let turns = found.phase_margins.iter().zip(&found.gain_crossovers);
-                    let delays =
-                        turns.map(|(turn, omega)| turn.to_radians().rem_euclid(TAU) / omega);
-                    let [gain, phase, _] = three(&found);
-                    [gain, phase, delays.fold(f64::INFINITY, f64::min)]
+                .and_then(|plant| {
+                    held_margins_of_stable(HeldLoop::new(&plant)?, most, turns, task)
                 }),
         };
         found_or(found, [0.0; 3])

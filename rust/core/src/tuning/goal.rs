@@ -8,7 +8,7 @@ use crate::{Error, Task};
 
 /// Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
 /// gain in the objective pays for a shortfall.
-pub(super) const PENALTY: f64 = 50.0;
+const PENALTY: f64 = 50.0;
 
 /// Shortfall of an unstable loop, whose crossings are no margins: that of all three together.
 pub(super) const UNSTABLE: f64 = 3.0;
@@ -66,14 +66,27 @@ impl Objective {
         Ok(-found.damping + TIE * found.abscissa * unit)
     }
 
-    /// The cost in the worst scenario.
+    /// The cost in the worst scenario; where it is more than `most`, perhaps that of another one.
     ///
     /// # Errors
     /// As [`Candidates::dominant`].
-    pub(super) fn worst(self, of: &Candidates, gains: &[f64], task: &Task) -> Result<f64, Error> {
+    pub(super) fn worst(
+        self,
+        of: &Candidates,
+        gains: &[f64],
+        most: f64,
+        last: &mut Decisive,
+        task: &Task,
+    ) -> Result<f64, Error> {
         let mut worst = f64::NEG_INFINITY;
-        for scenario in &of.scenarios {
-            worst = worst.max(self.cost(of, gains, scenario, None, task)?);
+        for place in beginning_with(last.cost, of.scenarios.len()) {
+            let cost = self.cost(of, gains, &of.scenarios[place], None, task)?;
+            if cost > worst {
+                (worst, last.cost) = (cost, place);
+            }
+            if worst > most {
+                break;
+            }
         }
         Ok(worst)
     }
@@ -93,25 +106,38 @@ impl Goal {
         self.required.iter().all(|least| *least <= 0.0)
     }
 
-    /// The cost of gains, with what they miss of the margins.
+    /// The cost of gains, with what they miss of the margins; where it is more than `most`, perhaps
+    /// too small.
     ///
     /// # Errors
     /// As [`Candidates::dominant`].
-    pub fn total(&self, of: &Candidates, gains: &[f64], task: &Task) -> Result<f64, Error> {
-        let cost = self.objective.worst(of, gains, task)?;
-        if self.is_free() {
+    pub fn total(
+        &self,
+        of: &Candidates,
+        gains: &[f64],
+        most: f64,
+        last: &mut Decisive,
+        task: &Task,
+    ) -> Result<f64, Error> {
+        let cost = self.objective.worst(of, gains, most, last, task)?;
+        if self.is_free() || cost > most {
             return Ok(cost);
         }
-        let short = if self.objective.is_stable(cost) {
-            self.shortfall(of, gains, f64::INFINITY, task)?
-        } else {
-            UNSTABLE
-        };
-        Ok(cost + PENALTY * self.scale * short)
+        let unit = self.penalty();
+        if !self.objective.is_stable(cost) {
+            return Ok(cost + unit * UNSTABLE);
+        }
+        let short = self.shortfall(of, gains, (most - cost) / unit, last, task)?;
+        Ok(cost + unit * short)
+    }
+
+    /// The cost of a relative shortfall of 1.
+    pub(super) fn penalty(&self) -> f64 {
+        PENALTY * self.scale
     }
 
     /// The sum of the relative shortfalls of the margins of stable loops, each at its least over the
-    /// scenarios. Where it is more than `most` it ends there, and may be too small.
+    /// scenarios; where it is more than `most`, perhaps too small.
     ///
     /// # Errors
     /// Those that end all work.
@@ -120,28 +146,47 @@ impl Goal {
         of: &Candidates,
         gains: &[f64],
         most: f64,
+        last: &mut Decisive,
         task: &Task,
     ) -> Result<f64, Error> {
         if self.is_free() {
             return Ok(0.0);
         }
+        let [gain, phase, late] = self.required;
+        let wanted = (gain, phase.max(late) > 0.0);
         let mut least = [f64::INFINITY; 3];
         let mut missing = 0.0;
-        for scenario in &of.scenarios {
+        for place in beginning_with(last.margins, of.scenarios.len()) {
+            let scenario = &of.scenarios[place];
             let (values, _) = of.values(gains, scenario, None);
-            let found = of.stable_margins(&values, scenario, task)?;
+            let found = of.stable_margins(&values, scenario, wanted, task)?;
             for (least, margin) in least.iter_mut().zip(found) {
                 *least = least.min(margin);
             }
-            let each = least
-                .iter()
-                .zip(self.required)
-                .filter(|(_, least)| *least > 0.0);
-            missing = each.map(|(had, least)| (1.0 - had / least).max(0.0)).sum();
+            let each = least.iter().zip(self.required);
+            let each = each.filter(|(_, required)| *required > 0.0);
+            let sum = each
+                .map(|(had, required)| (1.0 - had / required).max(0.0))
+                .sum();
+            if sum > missing {
+                (missing, last.margins) = (sum, place);
+            }
             if missing > most {
                 break;
             }
         }
         Ok(missing)
     }
+}
+
+/// The scenarios that decided last: they are looked at first.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Decisive {
+    cost: usize,
+    margins: usize,
+}
+
+/// All places, `first` the first of them.
+fn beginning_with(first: usize, count: usize) -> impl Iterator<Item = usize> {
+    std::iter::once(first).chain((0..count).filter(move |place| *place != first))
 }

@@ -11,7 +11,7 @@ mod search;
 mod simplices;
 
 pub use candidates::{Candidates, Dominant, Loops, Scenario};
-pub use goal::{Goal, Objective};
+pub use goal::{Decisive, Goal, Objective};
 pub use search::{Within, best_within, least, worst_delay};
 
 #[cfg(test)]

@@ -4,9 +4,8 @@
 //! best gains lie on them. So nothing is differentiated. None of this proves a global minimum.
 
 use super::candidates::Candidates;
-use super::goal::{Goal, Objective, PENALTY, UNSTABLE};
+use super::goal::{Decisive, Goal, Objective, UNSTABLE};
 use super::{between, simplices};
-use crate::order::sort_up;
 use crate::parallel;
 use crate::{Error, Task};
 
@@ -79,7 +78,7 @@ impl Candidates {
         self.each(points.len() * self.scenarios.len(), task, |place| {
             let scenario = &self.scenarios[place % self.scenarios.len()];
             let (values, _) = self.values(points[place / self.scenarios.len()], scenario, None);
-            self.stable_margins(&values, scenario, task)
+            self.stable_margins(&values, scenario, (f64::INFINITY, true), task)
         })
     }
 
@@ -95,7 +94,7 @@ impl Candidates {
         task: &Task,
     ) -> Result<Vec<f64>, Error> {
         self.each(points.len(), task, |place| {
-            goal.shortfall(self, points[place], most, task)
+            goal.shortfall(self, points[place], most, &mut Decisive::default(), task)
         })
     }
 
@@ -128,22 +127,24 @@ pub fn least(
     points: &[&[f64]],
     task: &Task,
 ) -> Result<(usize, f64), Error> {
-    let late = of.stable_abscissae(points, task)?;
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    sort_up(&mut order, |place| late[*place]);
-    let unit = PENALTY * goal.scale;
-    let mut best = (0, f64::INFINITY);
-    for place in order {
-        let stable = late[place] < 0.0;
-        if stable && late[place] > best.1 {
-            // A shortfall makes none of the others better.
-            continue;
-        }
-        let cost = if stable {
-            let most = (best.1 - late[place]) / unit;
-            late[place] + unit * goal.shortfall(of, points[place], most, task)?
-        } else {
+    let (unit, middle) = (goal.penalty(), points.len() / 2);
+    let (mut best, mut last) = ((0, f64::INFINITY), Decisive::default());
+    // The middle is the best one so far, to which most others lose in one scenario.
+    let others = (0..points.len()).filter(|place| *place != middle);
+    for place in std::iter::once(middle).chain(others) {
+        task.check()?;
+        let (_, least) = best;
+        let Some(point) = points.get(place) else {
+            break;
+        };
+        let abscissa = Objective::Abscissa;
+        let late = abscissa.worst(of, point, f64::min(least, 0.0), &mut last, task)?;
+        let cost = if !(late < 0.0) {
             unit * UNSTABLE
+        } else if late > least {
+            continue;
+        } else {
+            late + unit * goal.shortfall(of, point, (least - late) / unit, &mut last, task)?
         };
         if cost < best.1 || (cost == best.1 && place < best.0) {
             best = (place, cost);
@@ -167,15 +168,16 @@ pub fn best_within(
         reach,
         bounds,
     } = within;
-    let cost = |gains: &[f64]| {
+    let mut last = Decisive::default();
+    let mut cost = |gains: &[f64], most: f64| {
         task.check()?;
-        goal.total(of, gains, task)
+        goal.total(of, gains, most, &mut last, task)
     };
     if let ([start], [reach], [(low, high)]) = (&start[..], &reach[..], &bounds[..]) {
         let ends = ((start - reach).max(*low), (start + reach).min(*high));
         let known = ONE_GAIN_KNOWN * (high - low);
-        let found = between::minimum(|gain| cost(&[gain]), ends, known, ALONG_GAIN)?;
-        let is_better = found.1 <= cost(&[*start])?;
+        let found = between::minimum(|gain| cost(&[gain], f64::INFINITY), ends, known, ALONG_GAIN)?;
+        let is_better = found.1 <= cost(&[*start], f64::INFINITY)?;
         return Ok(vec![if is_better { found.0 } else { *start }]);
     }
     let narrowest = bounds.iter().map(|(low, high)| high - low);
