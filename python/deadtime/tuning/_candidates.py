@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 from deadtime.loops import ControlLoop
@@ -22,34 +23,61 @@ class Goal(NamedTuple):
     scale: float
 
 
-def candidates(
-    loop: ControlLoop, free: tuple[str, ...], scenarios: Sequence[Scenario]
-) -> Candidates:
-    """Loops with any values of the free gains, in these scenarios."""
-    names, numbers = tuple(scenarios[0]), loop.parameters
-    fixed = tuple(name for name in loop.controller.gains if name not in free)
-    gains, given = (*free, *fixed), [numbers[name] for name in fixed]
-    kinds: dict[tuple[float, ...], int] = {}
-    rows = []
-    for one in scenarios:
-        # The equations of a sampled loop do not depend on its delay.
-        rest = tuple(value for name, value in one.items() if name != "delay")
-        kind = kinds.setdefault(rest, len(kinds))
-        time = one.get("lag", numbers.get("lag", 0.0)) + (loop.sample_time or 0.0)
-        rows.append(([*given, *(one[name] for name in names)], kind, time))
-    of: Family | list[list[list[float]]]
-    if loop.is_sampled:
-        rests = [dict(zip((n for n in names if n != "delay"), rest, strict=True)) for rest in kinds]
-        of = [_rows(loop, gains, rest) for rest in rests]
-    else:
-        every = (*gains, *names)
-        of = ParametricQuasiPolynomial._of(every, loop._family_of(every)._terms)._family
-    return Candidates(of, len(gains), len(gains) + names.index("delay"), rows)
+class Gathered:
+    """Loops with any values of their free gains, for the kernel.
 
+    Parameters
+    ----------
+    loop : ControlLoop
+    free : tuple of str
+        Gains that are sought.
+    names : tuple of str
+        Numbers that a scenario has.
+    """
 
-def _rows(loop: ControlLoop, gains: Sequence[str], rest: Scenario) -> list[list[float]]:
-    """The numbers of the loops with one gain of one and the others of zero."""
-    specification = loop.specification
-    numbers = specification.parameters | rest | dict.fromkeys(gains, 0.0)
-    models = [specification.model_at(numbers | {name: 1.0}) for name in gains]
-    return [model.row(numbers["delay"], loop.sample_time).tolist() for model in models]
+    def __init__(self, loop: ControlLoop, free: tuple[str, ...], names: tuple[str, ...]) -> None:
+        self.loop, self.names = loop, names
+        fixed = tuple(name for name in loop.controller.gains if name not in free)
+        self.gains = (*free, *fixed)
+        self._numbers = loop.parameters
+        self._given = [self._numbers[name] for name in fixed]
+        self._rows: dict[tuple[float, ...], list[list[float]]] = {}
+        self._kept: dict[tuple[tuple[float, ...], ...], Candidates] = {}
+
+    def at(self, scenarios: Sequence[Scenario]) -> Candidates:
+        """The loops in these scenarios."""
+        values = [tuple([one[name] for name in self.names]) for one in scenarios]
+        key = tuple(values)
+        if key not in self._kept:
+            self._kept[key] = self._gathered(values)
+        return self._kept[key]
+
+    def _gathered(self, values: list[tuple[float, ...]]) -> Candidates:
+        place, first = self.names.index("delay"), len(self.gains)
+        kinds: dict[tuple[float, ...], int] = {}
+        rows = []
+        for each in values:
+            # The equations of a sampled loop do not depend on its delay.
+            rest = each[:place] + each[place + 1 :]
+            kind = kinds.setdefault(rest, len(kinds))
+            lag = dict(zip(self.names, each, strict=True)).get("lag", self._numbers.get("lag", 0.0))
+            rows.append(([*self._given, *each], kind, lag + (self.loop.sample_time or 0.0)))
+        of = list(map(self._rows_of, kinds)) if self.loop.is_sampled else self._function
+        return Candidates(of, first, first + place, rows)
+
+    @cached_property
+    def _function(self) -> Family:
+        """The characteristic function of a continuous loop."""
+        every = (*self.gains, *self.names)
+        return ParametricQuasiPolynomial._of(every, self.loop._family_of(every)._terms)._family
+
+    def _rows_of(self, rest: tuple[float, ...]) -> list[list[float]]:
+        """The numbers of sampled loops with one gain of one and the others of zero."""
+        if rest not in self._rows:
+            others = [name for name in self.names if name != "delay"]
+            numbers = self._numbers | dict(zip(others, rest, strict=True))
+            numbers |= dict.fromkeys(self.gains, 0.0)
+            model_at, period = self.loop.specification.model_at, self.loop.sample_time
+            models = [model_at(numbers | {name: 1.0}) for name in self.gains]
+            self._rows[rest] = [model.row(numbers["delay"], period).tolist() for model in models]
+        return self._rows[rest]

@@ -15,7 +15,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.validation import Range, finite, interval, non_negative
 from deadtime.estimation import DelayEstimate
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.tuning._candidates import Scenario, candidates
+from deadtime.tuning._candidates import Gathered, Scenario
 from deadtime.tuning._native import Candidates
 from deadtime.tuning._region import ConfidenceRegion, region_of
 from deadtime.tuning._stabilising import candidate_ranges
@@ -66,14 +66,11 @@ class Problem:
 
     def candidates(self, scenarios: Sequence[Scenario]) -> Candidates:
         """The loops with any gains in these scenarios, for the kernel."""
-        key = tuple(tuple(one.items()) for one in scenarios)
-        if key not in self._candidates:
-            self._candidates[key] = candidates(self.loop, self.free, scenarios)
-        return self._candidates[key]
+        return self._gathered.at(scenarios)
 
     @cached_property
-    def _candidates(self) -> dict[tuple[tuple[tuple[str, float], ...], ...], Candidates]:
-        return {}
+    def _gathered(self) -> Gathered:
+        return Gathered(self.loop, self.free, tuple(self.intervals))
 
     def filtered(self, smooth: DerivativeFilter | None) -> Problem:
         """The same problem with another filter of the derivative, or none."""
