@@ -22,6 +22,7 @@ CORE_ARROWS = {
     # Loops with a hold are stepped in `dde`.
     "stability": {"linear_algebra", "elementary", "lambertw", "quasipoly", "roots", "dde"},
     "frequency": {"elementary", "quasipoly", "roots", "dde", "stability"},
+    "tuning": {"quasipoly", "roots", "dde", "stability", "frequency"},
     "dde": {"linear_algebra", "elementary"},
     "loops": {"linear_algebra", "quasipoly", "dde", "stability", "frequency"},
     "estimation": {"linear_algebra"},
@@ -80,6 +81,7 @@ ORDER = {
         "crossings",
         "ranges",
     ],
+    "tuning": ["between", "simplices", "candidates", "goal", "search"],
     "dde": ["scalar", "limits", "rate_limits", "propagator", "control_loop", "system", "spectral"],
     "loops": [
         "entry",

@@ -3,13 +3,13 @@
 import functools
 import itertools
 import math
+import sys
 
 import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.tuning import critical_gain
-from deadtime.tuning._margins import MarginEstimate
-from deadtime.tuning._objectives import _rounded, dominant_damping
+from deadtime.tuning._objectives import _rounded
 from deadtime.tuning._problem import pose
 from deadtime.tuning._survey import Survey
 
@@ -169,26 +169,48 @@ def test_margins_that_nothing_meets_are_refused_with_the_best_there_is():
 
 
 @pytest.mark.parametrize("loop", [LOOP, LOOP.replace(sample_time=0.065), SAMPLED])
-def test_estimates_of_margins_are_close_to_the_exact_ones(loop):
+def test_margins_of_the_search_are_those_of_the_loop(loop):
     problem = posed(loop, SMOOTH)
-    estimate = MarginEstimate(problem)
-    for gains in ([1.0, 0.1], [2.0, 0.2], [2.5, 0.4], [0.3, -0.02]):
-        exact = problem.at(gains).margin()
-        found = estimate.of(np.array([gains]), problem.corners)[0]
-        assert found[0] == pytest.approx(exact.gain_margin, rel=2e-3)
-        assert found[1] == pytest.approx(exact.phase_margin, rel=2e-3)
+    points = np.array([[1.0, 0.1], [2.0, 0.2], [2.5, 0.4], [0.3, -0.02]])
+    of = problem.candidates(problem.corners)
+    for gains, (found,) in zip(points, of.all_margins(points, None), strict=True):
+        loop = problem.at(gains)
+        exact = loop.margin()
+        assert found[:2] == pytest.approx([exact.gain_margin, exact.phase_margin], rel=1e-9)
         # A turn is not quite a delay where the hold's fraction of a sample matters.
-        assert found[2] == pytest.approx(exact.delay_margin, rel=5e-2)
+        assert found[2] == pytest.approx(exact.delay_margin, rel=5e-2 if loop.is_sampled else 1e-9)
+        had = of.margins(gains.tolist(), True)[0]
+        assert had == pytest.approx([*found[:2], exact.delay_margin], rel=1e-9)
+        assert of.dominant(gains.tolist())[0, 1] == pytest.approx(loop.spectral_abscissa())
 
 
 @pytest.mark.parametrize("share", [0.2, 1.0, 1.8])
-def test_a_gain_margin_at_half_the_sampling_rate_is_estimated(share):
+def test_a_gain_margin_at_half_the_sampling_rate_is_found(share):
     # Without a delay the pole 1 - Kp Ts leaves the circle at -1.
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0, sample_time=0.065)
     problem = posed(loop, dtm.P(1.0))
     gains = np.array([[share / 0.065]])
-    found = MarginEstimate(problem).of(gains, problem.corners)[0]
+    found = problem.candidates(problem.corners).all_margins(gains, None)[0, 0]
     assert found[0] == pytest.approx(2.0 / share, rel=1e-9)
+
+
+@pytest.mark.parametrize("loop", [LOOP, LOOP.replace(sample_time=0.065)])
+def test_a_design_makes_few_calls(loop):
+    """It made 130 000: margins in numpy, and a loop anew for each of a thousand gains."""
+    calls = 0
+
+    def count(frame, event, argument):
+        nonlocal calls
+        calls += event == "call"
+
+    options = {"controller": dtm.PV, "delay": (0.3, 0.4), "shape": (15, 15)}
+    dtm.design(loop, **options)  # what is imported first is not counted
+    sys.setprofile(count)
+    try:
+        dtm.design(loop, **options, gain_margin=2.0, phase_margin=45.0)
+    finally:
+        sys.setprofile(None)
+    assert 0 < calls < 10_000
 
 
 def posed(loop, controller):
@@ -281,9 +303,10 @@ def test_equal_damping_is_decided_by_the_abscissa():
 
 
 def test_chains_of_a_neutral_loop_have_no_damping():
-    loop = LOOP.replace(controller=dtm.PV(2.0, 0.3))
-    assert dominant_damping(loop)[0] == 0.0
-    assert dominant_damping(LOOP.replace(controller=dtm.P(1.0)))[0] == 1.0
+    for controller, damping in ((dtm.PV(2.0, 0.3), 0.0), (dtm.P(1.0), 1.0)):
+        problem = posed(LOOP, controller)
+        of = problem.candidates(problem.corners)
+        assert of.dominant(list(controller.gains.values()))[0, 0] == damping
 
 
 def swept_settling(loop, gains):

@@ -7,7 +7,8 @@ makes a list of gains for a delay that moves, with a proof.
 
 # The files. `_problem` holds what is free and what is not known, `_region` the region of an
 # estimate, `_stabilising` where to look for gains, `_objectives` what is made best, `_margins` what
-# must hold. `_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the
+# must hold. `_candidates` hands loops to the kernel, which judges many of them at once and improves
+# gains. `_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the
 # delay at which they are worst and repeats the search until it finds none that is worse, and
 # `_made` puts the result together. `_filter_choice` chooses the filter of the derivative.
 

@@ -26,9 +26,10 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop
 from deadtime.stability import proved_boxes
+from deadtime.tuning._candidates import Scenario
 from deadtime.tuning._margins import MARGINS, UNITS, RequiredMargins, exact_margins
 from deadtime.tuning._objectives import NEVER, Objective
-from deadtime.tuning._problem import Problem, Scenario
+from deadtime.tuning._problem import Problem
 from deadtime.tuning._search import Search
 from deadtime.tuning._survey import surveyed
 
@@ -134,24 +135,25 @@ def _unmet(search: Search, required: RequiredMargins, gains: Array) -> ValueErro
     """The error that names the requirements that are not met, and what is possible."""
     problem, scenarios = search.problem, search.scenarios
     points = search.survey.points[search.survey.stable]
-    each = search.estimate.of(points, scenarios)
-    alone = each.max(axis=0)
-    candidates = [gains, points[int(np.argmin(required.shortfall(each)))]]
-    least = [least_margins(exact_margins(problem, one, scenarios)) for one in candidates]
-    place = int(np.argmin([required.shortfall(one) for one in least]))
+    alone = (
+        problem.candidates(scenarios).all_margins(points, problem.threads).min(axis=1).max(axis=0)
+    )
+    nearest = points[int(np.argmin(search.shortfalls(points)))]
+    best = min([gains, nearest], key=search.short)
+    least = least_margins(exact_margins(problem, best, scenarios))
     wanted = ", ".join(_with_unit(name, value) for name, value in required.named.items())
     most = ", ".join(
         _with_unit(name, value)
         for name, value in zip(MARGINS, alone, strict=True)
         if name in required.named
     )
-    nearest = ", ".join(
-        _with_unit(name, value) for name, value in zip(MARGINS, least[place], strict=True)
+    together = ", ".join(
+        _with_unit(name, value) for name, value in zip(MARGINS, least, strict=True)
     )
-    at = ", ".join(f"{n} = {v:.4g}" for n, v in problem.named(candidates[place]).items())
+    at = ", ".join(f"{n} = {v:.4g}" for n, v in problem.named(best).items())
     return ValueError(
         f"no gains in the ranges have {wanted}: taken alone, the most to be had is {most}; "
-        f"together the nearest is {nearest} at {at}. Ask for less, or widen the ranges"
+        f"together the nearest is {together} at {at}. Ask for less, or widen the ranges"
     )
 
 
@@ -173,7 +175,7 @@ def margin_places(search: Search, gains: Array) -> tuple[Scenario, ...]:
     if problem.region is None:
         return problem.scenarios(_FINE_MARGINS.get(_unknown(problem), 1))
     points = problem.region.points
-    each = np.array([search.estimate.of(gains[None, :], [one])[0] for one in points])
+    each = problem.candidates(points).all_margins(gains[None, :], problem.threads)[0]
     least = np.argsort(each, axis=0, kind="stable")[:_LEAST]
     return tuple(points[place] for place in np.unique(least))
 
@@ -186,8 +188,6 @@ def worst_scenario(
     problem: Problem, objective: Objective, gains: Array, scenarios: Sequence[Scenario]
 ) -> tuple[float, Scenario]:
     """Cost of gains in the worst scenario, which may lie between those given, and that scenario."""
-    from scipy.optimize import minimize_scalar
-
     costs = objective.costs(problem, gains[None, :], scenarios)[0]
     place = int(np.argmax(costs))
     worst, least = scenarios[place], float(costs[place])
@@ -195,14 +195,10 @@ def worst_scenario(
     at = delays.index(worst["delay"])
     low, high = delays[max(at - 1, 0)], delays[min(at + 1, len(delays) - 1)]
     if high > low and not objective.simulated and problem.region is None:
-        found = minimize_scalar(
-            lambda late: -objective.worst(problem, gains, [worst | {"delay": float(late)}]),
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 1e-6 * high},
-        )
-        if -found.fun > least:
-            return float(-found.fun), worst | {"delay": float(found.x)}
+        of = problem.candidates(scenarios)
+        late, cost = of.worst_delay(gains.tolist(), objective.name, place, (low, high))
+        if cost > least:
+            return cost, worst | {"delay": late}
     return least, worst
 
 

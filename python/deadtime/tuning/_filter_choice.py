@@ -29,7 +29,7 @@ from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._exchange import best_gains, fine
 from deadtime.tuning._made import made
-from deadtime.tuning._margins import MarginEstimate, RequiredMargins
+from deadtime.tuning._margins import RequiredMargins
 from deadtime.tuning._objectives import Objective, objective_named
 from deadtime.tuning._problem import ObjectiveName, Problem, controller_template, pose
 from deadtime.tuning._result import FilterChoice
@@ -251,8 +251,7 @@ class _Task:
             # A map over one gain costs next to nothing.
             shape = self.survey.abscissa.shape
             survey = surveyed(problem, shape) if alone else self.survey
-            estimate = MarginEstimate(problem)
-            search = Search(problem, self.objective, survey, estimate, self.required)
+            search = Search(problem, self.objective, survey, self.required)
             found = best_gains(search, None if alone else start)
         except ValueError:
             return _Tried(math.nan, math.nan, start)

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, margin_places, proved
-from deadtime.tuning._margins import UNITS, MarginEstimate, RequiredMargins, exact_margins
-from deadtime.tuning._objectives import Objective, dominant_damping
+from deadtime.tuning._margins import UNITS, RequiredMargins, exact_margins
+from deadtime.tuning._objectives import Objective
 from deadtime.tuning._problem import Problem
 from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
 from deadtime.tuning._search import Search
@@ -37,10 +37,10 @@ def made(
 ) -> Design:
     """Find the gains of a problem."""
     survey = surveyed(problem, shape)
-    search = Search(problem, objective, survey, MarginEstimate(problem), required)
+    search = Search(problem, objective, survey, required)
     found = best_gains(search)
     judged = [*fine(problem), found.worst]
-    loops = [problem.at(found.gains, one) for one in judged]
+    each = problem.candidates(judged)
     value = objective.proved(problem, found.gains, judged)
     middle = problem.at(found.gains)
     places = [*margin_places(search, found.gains), found.worst]
@@ -49,8 +49,8 @@ def made(
         loop=middle,
         gains=middle.controller.gains,
         fixed=tuple(name for name in middle.controller.gains if name not in problem.free),
-        abscissa=max(one.spectral_abscissa() for one in loops),
-        damping=min(dominant_damping(one)[0] for one in loops),
+        abscissa=float(each.costs(found.gains[None, :], "abscissa", problem.threads).max()),
+        damping=float(each.dominant(found.gains.tolist())[:, 0].min()),
         margins=margins,
         delays=problem.delays,
         gain=problem.intervals.get("gain"),

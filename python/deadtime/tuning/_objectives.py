@@ -23,11 +23,12 @@ from typing import get_args
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.loops import ControlLoop, commands_at_rest, sweep
-from deadtime.tuning._problem import ObjectiveName, Problem, Scenario
+from deadtime.loops import commands_at_rest, sweep
+from deadtime.tuning._candidates import Scenario
+from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._settling import BAND, proved_step
 
-#: Cost of a loop that is unstable or does not settle: above every other cost.
+#: Cost of a loop that does not settle: above every other cost.
 NEVER = 1e6
 
 #: Relative distance of the neighbouring gains that are judged with the gains themselves: the
@@ -37,14 +38,6 @@ _ROUNDING = 0.005
 #: Settling band of the search: a little narrower than the 2 % that are reported, as a margin for
 #: what lies between the gains and delays that are tried.
 SEARCH_BAND = 0.0195
-
-#: Poles that decay at most this many times as fast as the slowest one are dominant.
-DOMINANT = 3.0
-#: Poles of a continuous loop among which the dominant ones are sought.
-_POLES = 8
-
-#: Weight of the abscissa, in units of 1/(delay + lag), where the damping is equal.
-_TIE = 1e-3
 
 #: Overshoot in % that counts as none, and the cost of each further percent in seconds of settling
 #: time.
@@ -61,9 +54,9 @@ class Objective(ABC):
     #: Relative difference of costs that counts as none.
     tolerance = 1e-6
 
-    @abstractmethod
     def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
         """Cost of every row of gains in every scenario."""
+        return problem.candidates(scenarios).costs(points, self.name, problem.threads)
 
     @abstractmethod
     def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
@@ -89,17 +82,6 @@ class Objective(ABC):
 class _Abscissa(Objective):
     name: ObjectiveName = "abscissa"
 
-    def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
-        # A loop need not be made for every number.
-        numbers = problem.loop.parameters
-        abscissa_at = problem.loop.specification.abscissa_at
-        return np.array(
-            [
-                [abscissa_at(numbers | problem.named(gains) | one) for one in scenarios]
-                for gains in points
-            ]
-        )
-
     def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         return self.worst(problem, gains, scenarios)
 
@@ -108,20 +90,8 @@ class _Damping(Objective):
     name: ObjectiveName = "damping"
     tolerance = 1e-4
 
-    def costs(self, problem: Problem, points: Array, scenarios: Sequence[Scenario]) -> Array:
-        return np.array(
-            [[self._cost(problem.at(gains, one)) for one in scenarios] for gains in points]
-        )
-
-    def _cost(self, loop: ControlLoop) -> float:
-        ratio, abscissa = dominant_damping(loop)
-        if not abscissa < 0.0:
-            return NEVER + abscissa
-        time = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0) + (loop.sample_time or 0.0)
-        return -ratio + _TIE * abscissa * (time or 1.0)
-
     def value(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
-        return min(dominant_damping(problem.at(gains, one))[0] for one in scenarios)
+        return float(problem.candidates(scenarios).dominant(gains.tolist())[:, 0].min())
 
     def lost(self, value: float, reference: float) -> float:
         return super().lost(-value, -reference)
@@ -187,25 +157,6 @@ def objective_named(name: str) -> Objective:
             f"objective={name!r}: give one of {', '.join(map(repr, get_args(ObjectiveName)))}"
         )
     return _OBJECTIVES[name]
-
-
-def dominant_damping(loop: ControlLoop) -> tuple[float, float]:
-    """Smallest damping ratio of the dominant poles, and the spectral abscissa in 1/s.
-
-    The chains of a neutral loop oscillate without end: where they are dominant the ratio is zero.
-    """
-    poles = np.asarray(
-        loop.specification.native.poles() if loop.is_sampled else loop.rightmost(_POLES).roots
-    )
-    chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
-    abscissa = max(float(poles.real.max(initial=-np.inf)), chain)
-    if not abscissa < 0.0:
-        return float("nan"), abscissa
-    horizon = DOMINANT * abscissa
-    if chain >= horizon:
-        return 0.0, abscissa
-    near = poles[poles.real >= horizon]
-    return float((-near.real / np.abs(near)).min()), abscissa
 
 
 def _rounded(points: Array) -> Array:

@@ -6,6 +6,7 @@ import inspect
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -14,13 +15,12 @@ from deadtime._base.arrays import Array
 from deadtime._base.validation import Range, finite, interval, non_negative
 from deadtime.estimation import DelayEstimate
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.tuning._candidates import Gathered, Scenario
+from deadtime.tuning._native import Candidates
 from deadtime.tuning._region import ConfidenceRegion, region_of
 from deadtime.tuning._stabilising import candidate_ranges
 
 ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
-
-#: Values of the unknown numbers of a loop, by name.
-Scenario: TypeAlias = dict[str, float]
 
 #: Most free gains: those of PID. More would need a search without a map.
 _MOST_FREE = 3
@@ -63,6 +63,14 @@ class Problem:
     def at(self, gains: Sequence[float] | Array, scenario: Scenario | None = None) -> ControlLoop:
         """The loop with these gains, in one scenario or in the middle."""
         return self.loop.replace(**self.named(gains), **(scenario or {}))
+
+    def candidates(self, scenarios: Sequence[Scenario]) -> Candidates:
+        """The loops with any gains in these scenarios, for the kernel."""
+        return self._gathered.at(scenarios)
+
+    @cached_property
+    def _gathered(self) -> Gathered:
+        return Gathered(self.loop, self.free, tuple(self.intervals))
 
     def filtered(self, smooth: DerivativeFilter | None) -> Problem:
         """The same problem with another filter of the derivative, or none."""

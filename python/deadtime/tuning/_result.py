@@ -13,7 +13,8 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime.loops import ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
-from deadtime.tuning._problem import ObjectiveName, Scenario
+from deadtime.tuning._candidates import Scenario
+from deadtime.tuning._problem import ObjectiveName
 from deadtime.tuning._region import ConfidenceRegion
 
 

@@ -29,14 +29,12 @@ from typing import TypeAlias
 import numpy as np
 
 from deadtime._base.arrays import Array, Indices
-from deadtime.tuning._margins import MarginEstimate, RequiredMargins
+from deadtime.tuning._candidates import Goal, Scenario
+from deadtime.tuning._margins import RequiredMargins
+from deadtime.tuning._native import Candidates
 from deadtime.tuning._objectives import NEVER, Objective
-from deadtime.tuning._problem import Problem, Scenario
-from deadtime.tuning._survey import Survey, grid_points, worst_abscissa
-
-#: Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
-#: gain in the objective pays for a shortfall.
-_PENALTY = 50.0
+from deadtime.tuning._problem import Problem
+from deadtime.tuning._survey import Survey, grid_points
 
 #: Upper limits on the cells whose cost is computed where the map does not hold it, from poles or by
 #: simulation (bound time).
@@ -52,16 +50,6 @@ _MOST_STARTS = 6
 #: Ratio of the cost with neighbouring gains to that of the best cell above which further starts are
 #: tried.
 _MUCH = 1.15
-
-#: Most simplices in sequence, ratio of their sizes, and evaluations of each.
-_SIMPLICES = 6
-_SMALLER = 0.35
-_EVALUATIONS = 150
-#: Relative accuracy of the gains, as a fraction of their ranges, and relative improvement that
-#: counts as none. Where roots meet, the abscissa has cusps, so that gains known to 1e-7 leave it
-#: known to 1e-3.
-_GAINS_KNOWN = 3e-7
-_IDLE = 1e-4
 
 #: Points along each side of a grid, for one, two and three free gains, and half the width of the
 #: first grid in cells of the map.
@@ -80,14 +68,11 @@ _ARRIVED = 0.5
 #: their neighbours are sought.
 _NEAR = 0.03
 
-#: Frequency stride of the coarse margin estimate.
-_COARSE = 3
+#: Cells whose margins are computed at once, the best ones first: more of them may be in vain.
+_TOGETHER = 64
 
 #: Shortfall of the margins that counts as none.
 _MET = 1e-6
-
-#: Shortfall assigned to an unstable loop: that of all three margins together.
-_UNSTABLE = 3.0
 
 #: Costs of rows of gains in scenarios.
 Judge: TypeAlias = Callable[[Problem, Array, Sequence[Scenario]], Array]
@@ -102,36 +87,50 @@ class Search:
     problem: Problem
     objective: Objective
     survey: Survey
-    estimate: MarginEstimate
     required: RequiredMargins
     scenarios: Sequence[Scenario] = ()
 
     def globally(self) -> Array:
         """The best gains, from the map."""
         points, stable = self.survey.points, np.flatnonzero(self.survey.stable)
-        costs = np.full(len(points), np.inf)
-        short = np.zeros(len(stable))
-        if self.required.named:
-            short = self._shortfalls(points[stable], _COARSE)
-        met = stable[short <= _MET]
-        if met.size:
-            costs[met] = self._map_costs(met)
-            if self.objective.simulated:
-                return self._firmest(points, costs)
-            starts = self.survey.chosen(points, costs, _STARTS)
-        else:
+        costs = self._cell_costs(points, stable)
+        if self.objective.simulated and np.isfinite(costs).any():
+            return self._firmest(points, costs)
+        starts = self.survey.chosen(points, costs, _STARTS)
+        if not len(starts):
             # Perhaps the requirements are met between the cells.
-            costs[stable] = short
+            costs[stable] = self.shortfalls(points[stable])
             starts = self.survey.chosen(points, costs, 1)
         found = [self._by_grids(start) for start in starts]
         return self._polished(*min(found, key=lambda one: self._total(one[0])))
 
+    def _cell_costs(self, points: Array, stable: Indices) -> Array:
+        """Costs of the cells that meet the margins, infinite of the others.
+
+        Where the map holds the costs, only as many of the best cells as the search begins from.
+        """
+        costs = np.full(len(points), np.inf)
+        abscissa = self.survey.abscissa.ravel()
+        if self.objective.name != "abscissa":
+            met = stable[self.shortfalls(points[stable], _MET) <= _MET]
+            if met.size:
+                costs[met] = self._map_costs(met)
+            return costs
+        order = stable[np.argsort(abscissa[stable], kind="stable")]
+        for first in range(0, len(order), _TOGETHER):
+            cells = order[first : first + _TOGETHER]
+            met = cells[self.shortfalls(points[cells], _MET) <= _MET]
+            costs[met] = abscissa[met]
+            if met.size and len(self.survey.chosen(points, costs, _STARTS)) == _STARTS:
+                break
+        return costs
+
     def _firmest(self, points: Array, costs: Array) -> Array:
         """The best gains with their neighbours, from more starts where those lose much by them."""
         for axes in self.survey.fringes:
-            points = np.vstack([points, grid_points(axes)])
-            found = self._totals(axes, self.objective.coarse)
-            costs = np.append(costs, found)
+            fringe = grid_points(axes)
+            points = np.vstack([points, fringe])
+            costs = np.append(costs, self._simulated(fringe, self.objective.coarse))
         starts = self.survey.chosen(points, costs, _MOST_STARTS)
         best, least = starts[0], np.inf
         for i, start in enumerate(starts):
@@ -153,8 +152,7 @@ class Search:
         low, high = np.array(self.survey.bounds).T
 
         def narrowed(judge: Judge, around: Array, reach: Array, grids: int) -> Pair:
-            costs = partial(self._totals, judge=judge)
-            return _by_grids(costs, around, reach, low, high, grids)
+            return _by_grids(partial(self._least, judge=judge), around, reach, low, high, grids)
 
         if self.objective.simulated:
             # Neighbours count many times as much as the gains themselves, and decide little.
@@ -170,51 +168,54 @@ class Search:
 
     def _polished(self, start: Array, reach: Array) -> Array:
         """The best point within reach, where costs are continuous."""
-        low, high = np.array(self.survey.bounds).T
         if self.objective.simulated:
             return start
-        if len(start) == 1:
-            return _between_neighbours(self._total, start, reach, low, high)
-        return _by_simplices(self._total, start, 0.5 * reach, low, high)
+        bounds = self.survey.bounds
+        return self._loops.best_within(self._goal, start.tolist(), reach.tolist(), bounds)
 
     def short(self, gains: Array) -> float:
-        """By how much gains fall short of the required margins, by the estimate."""
-        return self._short(gains, self.objective.worst(self.problem, gains, self.scenarios))
+        """By how much gains fall short of the required margins; infinite where not stable."""
+        point = gains[None, :]
+        stable = np.isfinite(self._loops.stable_abscissae(point, self.problem.threads)[0])
+        return float(self.shortfalls(point)[0]) if stable else np.inf
 
-    def _short(self, gains: Array, cost: float) -> float:
-        """The same for gains of this cost; an unstable loop has crossings, which are no margins."""
-        stable = cost < (0.0 if self.objective.name == "abscissa" else NEVER)
-        return float(self._shortfalls(gains[None, :])[0]) if stable else _UNSTABLE
-
-    def _shortfalls(self, points: Array, stride: int = 1) -> Array:
-        """The same of every row of gains."""
-        return self.required.shortfall(self.estimate.of(points, self.scenarios, stride))
+    def shortfalls(self, points: Array, most: float = np.inf) -> Array:
+        """The same of rows of gains that are stable; where more than `most`, perhaps too small."""
+        return self._loops.shortfalls(points, self.required, most, self.problem.threads)
 
     def _total(self, gains: Array) -> float:
         """Cost of gains, shortfalls of margins included."""
-        cost = self.objective.worst(self.problem, gains, self.scenarios)
-        if not self.required.named:
-            return cost
-        return cost + _PENALTY * self._scale * self._short(gains, cost)
+        if self.objective.simulated:
+            return float(self._simulated(gains[None, :], self.objective.costs)[0])
+        return self._loops.total(gains.tolist(), self._goal)
 
-    def _totals(self, axes: list[Array], judge: Judge) -> Array:
-        """The same of every point of a grid."""
-        points = grid_points(axes)
-        late = worst_abscissa(self.problem, axes, self.scenarios).ravel()
-        stable = np.isfinite(late)
-        short = np.where(stable, 0.0, _UNSTABLE)
-        if self.required.named and stable.any():
-            short[stable] = self._shortfalls(points[stable], _COARSE)
-        if self.objective.name == "abscissa":
-            costs = np.where(stable, late, 0.0)
-            return np.asarray(costs + _PENALTY * self._scale * short)
-        # Only what may be taken is simulated.
-        costs = NEVER * (1.0 + short)
-        good = short <= _MET
-        if good.any():
-            found = judge(self.problem, points[good], self.scenarios)
-            costs[good] = found.max(axis=1)
+    def _least(self, points: Array, judge: Judge) -> tuple[int, float]:
+        """Place and cost of the best of the points."""
+        if not self.objective.simulated:
+            return self._loops.least(points, self._goal)
+        costs = self._simulated(points, judge)
+        place = int(np.argmin(costs))
+        return place, float(costs[place])
+
+    def _simulated(self, points: Array, judge: Judge) -> Array:
+        """Costs of points, of which only those that may be taken are simulated."""
+        costs = np.full(len(points), np.inf)
+        late = self._loops.stable_abscissae(points, self.problem.threads)
+        stable = np.flatnonzero(np.isfinite(late))
+        good = stable[self.shortfalls(points[stable], _MET) <= _MET]
+        if good.size:
+            costs[good] = judge(self.problem, points[good], self.scenarios).max(axis=1)
+        else:
+            costs[stable] = NEVER * (1.0 + self.shortfalls(points[stable]))
         return costs
+
+    @property
+    def _loops(self) -> Candidates:
+        return self.problem.candidates(self.scenarios)
+
+    @property
+    def _goal(self) -> Goal:
+        return Goal(self.objective.name, self.required, self._scale)
 
     @property
     def _scale(self) -> float:
@@ -224,10 +225,8 @@ class Search:
         return 1.0
 
     def _map_costs(self, cells: Indices) -> Array:
-        """Costs of cells of the map; infinite for those left out where a cost takes long."""
+        """Costs of cells of the map; infinite for those left out, since a cost takes long."""
         abscissa = self.survey.abscissa.ravel()[cells]
-        if self.objective.name == "abscissa":
-            return np.asarray(abscissa)
         most = _CELLS_SIMULATED if self.objective.simulated else _CELLS_BY_POLES
         # A third of them the most stable ones, the others at equal strides.
         order = np.argsort(abscissa, kind="stable")
@@ -239,73 +238,29 @@ class Search:
         return costs
 
 
-def _between_neighbours(
-    cost: Callable[[Array], float], start: Array, reach: Array, low: Array, high: Array
-) -> Array:
-    from scipy.optimize import minimize_scalar
-
-    ends = (float(max(start[0] - reach[0], low[0])), float(min(start[0] + reach[0], high[0])))
-    found = minimize_scalar(
-        lambda gain: cost(np.array([gain])),
-        bounds=ends,
-        method="bounded",
-        options={"xatol": 1e-9 * (high[0] - low[0]), "maxiter": 200},
-    )
-    return np.array([found.x]) if found.fun <= cost(start) else start
-
-
 def _by_grids(
-    costs: Callable[[list[Array]], Array],
+    least_of: Callable[[Array], tuple[int, float]],
     start: Array,
     reach: Array,
     low: Array,
     high: Array,
     grids: int,
-) -> tuple[Array, Array]:
+) -> Pair:
     """The best point, and half the width of the next grid."""
     best, least = start, np.inf
     offsets = np.linspace(-1.0, 1.0, _SIDE[len(start)])
     for _ in range(grids):
-        axes = [
-            np.unique(np.clip(middle + offsets * side, first, last))
-            for middle, side, first, last in zip(best, reach, low, high, strict=True)
-        ]
-        found = costs(axes)
-        place = int(np.argmin(found))
-        moved = grid_points(axes)[place] - best
-        if found[place] < least:
-            best, least = best + moved, float(found[place])
+        points = grid_points(
+            [
+                np.unique(np.clip(middle + offsets * side, first, last))
+                for middle, side, first, last in zip(best, reach, low, high, strict=True)
+            ]
+        )
+        place, cost = least_of(points)
+        moved = points[place] - best
+        if cost < least:
+            best, least = best + moved, cost
         # Along a kink the best point walks: the grid narrows where it has arrived.
         if np.all(np.abs(moved) <= _ARRIVED * reach):
             reach = _NARROWER * reach
     return best, reach
-
-
-def _by_simplices(
-    cost: Callable[[Array], float], start: Array, size: Array, low: Array, high: Array
-) -> Array:
-    from scipy.optimize import minimize
-
-    best, least, turn, idle = start, cost(start), 1.0, 0
-    for _ in range(_SIMPLICES):
-        corners = best + np.vstack([np.zeros(len(best)), turn * np.diag(size)])
-        found = minimize(
-            cost,
-            best,
-            method="Nelder-Mead",
-            bounds=list(zip(low, high, strict=True)),
-            options={
-                "initial_simplex": np.clip(corners, low, high),
-                "xatol": _GAINS_KNOWN * float((high - low).min()),
-                "fatol": np.inf,
-                "maxfev": _EVALUATIONS,
-            },
-        )
-        gained = least - float(found.fun)
-        if gained > 0.0:
-            best, least = np.asarray(found.x, dtype=np.float64), float(found.fun)
-        idle = idle + 1 if gained < _IDLE * abs(least) else 0
-        if idle == 2:
-            break
-        size, turn = _SMALLER * size, -turn
-    return best

@@ -11,7 +11,8 @@ import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime.stability import StabilityMap, stability_map
-from deadtime.tuning._problem import Problem, Scenario
+from deadtime.tuning._candidates import Scenario
+from deadtime.tuning._problem import Problem
 
 #: Points of the map along each free gain, for one, two and three of them: more points find narrower
 #: stable regions and cost time in proportion to their product.
@@ -27,6 +28,9 @@ _BEYOND = 0.5
 #: ones take hundreds of settling times to come to rest.
 _FRINGE = np.array([0.5, 0.25])
 _FRINGE_SIDES = {1: 1, 2: 31, 3: 7}
+
+#: Least distance between two points from which searches begin, in cells of the map.
+_APART = 3.5
 
 #: Maps by the numbers that are the same in all their cells.
 Maps = dict[frozenset[tuple[str, float]], StabilityMap]
@@ -96,12 +100,11 @@ class Survey:
     def chosen(self, points: Array, costs: Array, most: int) -> Array:
         """The points with the least finite costs that are no neighbours of one another."""
         found: list[Array] = []
-        for place in np.argsort(costs, kind="stable"):
-            if not np.isfinite(costs[place]) or len(found) == most:
-                break
-            far = [np.any(np.abs(points[place] - one) > 3.5 * self.spacing) for one in found]
-            if all(far):
-                found.append(points[place])
+        left = costs.copy()
+        while len(found) < most and np.isfinite(left.min()):
+            best = points[int(np.argmin(left))]
+            found.append(best)
+            left[np.all(np.abs(points - best) <= _APART * self.spacing, axis=1)] = np.inf
         return np.array(found)
 
 

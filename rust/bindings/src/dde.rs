@@ -146,6 +146,10 @@ impl PyLinearLoop {
     pub(crate) fn of(inner: LinearLoop, output_lead: f64) -> Self {
         Self { inner, output_lead }
     }
+
+    pub(crate) fn core(&self) -> &LinearLoop {
+        &self.inner
+    }
 }
 
 #[pymethods]

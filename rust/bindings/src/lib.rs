@@ -22,6 +22,7 @@ mod special;
 mod stability;
 mod sweeps;
 mod systems;
+mod tuning;
 mod ufunc;
 mod wire;
 
@@ -76,6 +77,8 @@ mod _deadtime {
     use super::systems::{
         LegendreTables, LinearSystemResponse, PyLinearSystem, PySignal, legendre_tables,
     };
+    #[pymodule_export]
+    use super::tuning::PyCandidates;
     #[pymodule_export]
     use super::ufunc::limit_threads;
     #[pymodule_export]

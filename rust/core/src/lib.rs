@@ -3,7 +3,7 @@
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
 //! Python. Dependencies run one way: error, simd ← linear_algebra, lambertw, elementary ← quasipoly
-//! ← roots ← stability ← frequency ← loops; linear_algebra ← dde ← stability; linear_algebra ←
+//! ← roots ← stability ← frequency ← loops, tuning; linear_algebra ← dde ← stability; linear_algebra ←
 //! estimation.
 
 #[macro_use]
@@ -25,6 +25,7 @@ mod simd;
 pub mod stability;
 pub mod status;
 pub mod task;
+pub mod tuning;
 
 pub use error::Error;
 pub use task::Task;

@@ -3,14 +3,12 @@
 //! Gain crossovers are those of `gain_crossovers`. The factors on L at which a pole is on the circle
 //! are the crossings of a z^(m+1) − k b.
 
-use std::f64::consts::{PI, TAU};
-
 use super::circle::is_stable;
 use super::further_delay::further_delay;
-use super::gain_crossovers::{FAR, crossovers, is_zero};
-use super::margins::{Margins, least};
+use super::gain_crossovers::{Crossover, FAR, crossovers, is_zero};
+use super::margins::{Margins, degrees, least};
 use crate::order::sort_up;
-use crate::stability::HeldLoop;
+use crate::stability::{Crossing, HeldLoop, HeldNumbers};
 use crate::{Error, Task};
 
 /// Margins of a loop with a hold; without `delay_margin` that is NaN. Further delays change the
@@ -28,17 +26,63 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
             found => found.is_ok_and(|abscissa| abscissa < 0.0),
         },
     };
-    let (places, turns): (Vec<f64>, Vec<f64>) = found.iter().map(|at| (at.omega, at.turn)).unzip();
-    let degrees: Vec<f64> = turns
-        .iter()
-        .map(|turn| if *turn > PI { turn - TAU } else { *turn }.to_degrees())
-        .collect();
-    let Some(factors) = numbers.factors((0.0, FAR), task)? else {
+    let late = match (stable, delay_margin) {
+        (true, true) => further_delay(held, task)?,
+        _ => (f64::NAN, f64::NAN),
+    };
+    with_verdict(&numbers, &found, stable, late, task)
+}
+
+/// Gain margin, phase margin in degrees and delay margin in s of a loop that is known to be stable.
+/// A gain margin above `most` may come out larger than it is; the other two are infinite without
+/// `turns`. The delay margin leaves out that the hold's share of a delay changes with it.
+///
+/// # Errors
+/// As [`held_margins`].
+pub fn held_margins_of_stable(
+    held: HeldLoop<'_>,
+    most: f64,
+    turns: bool,
+    task: &Task,
+) -> Result<[f64; 3], Error> {
+    let numbers = held.at(held.delay())?;
+    let mut found = [f64::INFINITY; 3];
+    if most > 1.0 {
+        let factors = factors(&numbers, (1.0, most.min(FAR)), task)?;
+        let gains = factors.iter().map(|at| at.gain).filter(|gain| *gain > 1.0);
+        found[0] = gains.fold(found[0], f64::min);
+    }
+    if turns {
+        for at in crossovers(&numbers, task)? {
+            found[1] = found[1].min(degrees(at.turn).abs());
+            found[2] = found[2].min(at.turn / at.omega);
+        }
+    }
+    Ok(found)
+}
+
+/// The places with factors in `range` at which a pole is on the circle.
+fn factors(numbers: &HeldNumbers, range: (f64, f64), task: &Task) -> Result<Vec<Crossing>, Error> {
+    let Some(factors) = numbers.factors(range, task)? else {
         refuse!(
             "the phase crossovers of this sampled loop are beyond double precision: a pole and a \
              zero of its loop gain may cancel on the unit circle; change a number by a little"
         );
     };
+    Ok(factors)
+}
+
+/// The margins where stability, gain crossovers and delay margin are known.
+fn with_verdict(
+    numbers: &HeldNumbers,
+    found: &[Crossover],
+    stable: bool,
+    late: (f64, f64),
+    task: &Task,
+) -> Result<Margins, Error> {
+    let (places, turns): (Vec<f64>, Vec<f64>) = found.iter().map(|at| (at.omega, at.turn)).unzip();
+    let degrees: Vec<f64> = turns.iter().map(|turn| degrees(*turn)).collect();
+    let factors = factors(numbers, (0.0, FAR), task)?;
     let mut factors: Vec<(f64, f64)> = factors
         .iter()
         .filter(|at| at.gain > 0.0 && !is_zero(at, 1.0))
@@ -54,10 +98,6 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
         -down.0
     };
     let turned = least(&degrees, &places, |turn| Some(turn.abs()));
-    let late = match (stable, delay_margin) {
-        (true, true) => further_delay(held, task)?,
-        _ => (f64::NAN, f64::NAN),
-    };
     let shown = |pair: (f64, f64)| if stable { pair } else { (f64::NAN, f64::NAN) };
     let [up, down, turned] = [up, down, turned].map(shown);
     Ok(Margins {

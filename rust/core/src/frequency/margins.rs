@@ -81,6 +81,51 @@ pub fn margins(n: &QuasiPolynomial, d: &QuasiPolynomial, task: &Task) -> Result<
     with_verdict(n, d, Stability { stable, hidden }, task)
 }
 
+/// Gain margin, phase margin in degrees and delay margin in s of a loop that is known to be stable.
+/// A gain margin above `most` may come out larger than it is; the other two are infinite without
+/// `turns`.
+///
+/// # Errors
+/// As [`margins`].
+pub fn margins_of_stable(
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+    most: f64,
+    turns: bool,
+    task: &Task,
+) -> Result<[f64; 3], Error> {
+    refuse_what_has_none(n, d)?;
+    let lead = Lead::of(d, n, 0.0);
+    let mut found = [lead.lost_above_one(), f64::INFINITY, f64::INFINITY];
+    if most > 1.0 {
+        let phase = phase_crossovers(n, d, f64::INFINITY, 1.0 / most, task)?;
+        let factors = phase.gains.iter().map(|gain| 1.0 / gain);
+        found[0] = factors.filter(|k| *k > 1.0).fold(found[0], f64::min);
+    }
+    if turns {
+        for omega in gain_crossovers(n, d, task)?.0 {
+            let turn = turn_at(n, d, omega);
+            found[1] = found[1].min(degrees(turn).abs());
+            found[2] = found[2].min(turn / omega);
+        }
+        if lead.is_lost_by_delay() {
+            found[2] = 0.0;
+        }
+    }
+    Ok(found)
+}
+
+/// The turn in [0, 2π) that brings n/d at a gain crossover to −1.
+fn turn_at(n: &QuasiPolynomial, d: &QuasiPolynomial, omega: f64) -> f64 {
+    let at = over(n, d, omega);
+    (PI + angle(at.im, at.re)).rem_euclid(TAU)
+}
+
+/// A turn in (−180, 180] degrees.
+pub(super) fn degrees(turn: f64) -> f64 {
+    if turn > PI { turn - TAU } else { turn }.to_degrees()
+}
+
 /// [`margins`], except that roots of d + n that n and d have in common do not count: they are hidden
 /// in the ratio n/(d + n).
 ///
@@ -104,26 +149,20 @@ fn with_verdict(
 ) -> Result<Margins, Error> {
     let Stability { stable, hidden } = verdict;
     let (crossovers, all_gain) = gain_crossovers(n, d, task)?;
-    let mut turns = Vec::with_capacity(crossovers.len());
-    for omega in &crossovers {
-        let at = over(n, d, *omega);
-        turns.push((PI + angle(at.im, at.re)).rem_euclid(TAU));
-    }
+    let turns = crossovers.iter().map(|omega| turn_at(n, d, *omega));
+    let turns: Vec<f64> = turns.collect();
     let delays: Vec<f64> = turns
         .iter()
         .zip(&crossovers)
         .map(|(turn, omega)| turn / omega)
         .collect();
-    let degrees: Vec<f64> = turns
-        .iter()
-        .map(|turn| if *turn > PI { turn - TAU } else { *turn }.to_degrees())
-        .collect();
+    let degrees: Vec<f64> = turns.iter().map(|turn| degrees(*turn)).collect();
     let last = if stable {
         f64::INFINITY
     } else {
         crossovers.last().copied().unwrap_or(0.0)
     };
-    let phase = phase_crossovers(n, d, last, task)?;
+    let phase = phase_crossovers(n, d, last, 0.0, task)?;
     let factors: Vec<f64> = phase.gains.iter().map(|gain| 1.0 / gain).collect();
 
     let lead = Lead::of(d, n, 0.0);
@@ -249,12 +288,13 @@ struct PhaseCrossovers {
     searched: f64,
 }
 
-/// They go at least up to where the gain is below that of one of them that is below one, or, if it
-/// comes first, some turns of the delays beyond `far`.
+/// They go at least up to where the gain is below `level`, below that of one of them that is below
+/// one, or some turns of the delays beyond `far`, whichever comes first.
 fn phase_crossovers(
     n: &QuasiPolynomial,
     d: &QuasiPolynomial,
     far: f64,
+    level: f64,
     task: &Task,
 ) -> Result<PhaseCrossovers, Error> {
     let mut found = PhaseCrossovers {
@@ -282,7 +322,15 @@ fn phase_crossovers(
     }
     let shortest = TAU / span(&n, &d).max(1e-300);
     let (all, nearly_none) = (ends(1.0), ends(SMALLEST_GAIN));
-    let enough = all.max(shortest).min(10.0 * far.max(shortest));
+    let last_level = if level > 0.0 {
+        ends(level)
+    } else {
+        f64::INFINITY
+    };
+    let enough = all
+        .max(shortest)
+        .min(10.0 * far.max(shortest))
+        .min(last_level);
     let (mut low, mut high) = (0.0, last.min(enough));
     loop {
         if high > low && !f.is_zero() {
@@ -295,6 +343,7 @@ fn phase_crossovers(
         }
         // Ends are enlarged by more than this.
         if far < f64::INFINITY
+            || high >= last_level
             || largest > 0.0 && ends(largest) <= high * (1.0 + 5e-10)
             || high >= nearly_none
             || high > TURNS * all.max(shortest)
@@ -302,7 +351,7 @@ fn phase_crossovers(
             found.searched = high;
             return Ok(found);
         }
-        (low, high) = (high, last.min(2.0 * high));
+        (low, high) = (high, last.min(2.0 * high).min(last_level));
     }
 }
 

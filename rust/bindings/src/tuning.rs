@@ -1,0 +1,254 @@
+//! Bindings of `deadtime::tuning`.
+
+use deadtime::Error;
+use deadtime::tuning::{self, Candidates, Decisive, Goal, Loops, Objective, Scenario, Within};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::{converted, rows};
+use crate::dde::PyLinearLoop;
+use crate::runtime::{run, run_here};
+use crate::stability::PyFamily;
+
+type Points<'py> = PyReadonlyArray2<'py, f64>;
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+
+/// What the gains act on: the characteristic function, or of each kind of scenario the loops with one
+/// gain of one and the others of zero.
+#[derive(FromPyObject)]
+pub(crate) enum GivenLoops<'py> {
+    Continuous(Bound<'py, PyFamily>),
+    Sampled(Vec<Vec<Bound<'py, PyLinearLoop>>>),
+}
+
+/// The numbers of a loop besides its free gains, the kind of a sampled loop, and lag and sample time.
+#[derive(FromPyObject)]
+pub(crate) struct GivenScenario(Vec<f64>, usize, f64);
+
+/// What is made best, the least margins, and the size of the objective.
+#[derive(FromPyObject)]
+pub(crate) struct GivenGoal {
+    objective: String,
+    required: [f64; 3],
+    scale: f64,
+}
+
+impl From<GivenGoal> for Goal {
+    fn from(given: GivenGoal) -> Self {
+        Self {
+            objective: objective_of(&given.objective),
+            required: given.required,
+            scale: given.scale,
+        }
+    }
+}
+
+fn objective_of(name: &str) -> Objective {
+    match name {
+        "damping" => Objective::Damping,
+        _ => Objective::Abscissa,
+    }
+}
+
+/// Loops that differ in the gains of their controller, in some scenarios.
+#[pyclass(frozen, module = "deadtime._deadtime", name = "Candidates")]
+pub(crate) struct PyCandidates {
+    inner: Candidates,
+    scenarios: usize,
+}
+
+#[pymethods]
+impl PyCandidates {
+    #[new]
+    fn new(
+        loops: GivenLoops<'_>,
+        gains: usize,
+        delay: usize,
+        scenarios: Vec<GivenScenario>,
+    ) -> PyResult<Self> {
+        let loops = match loops {
+            GivenLoops::Continuous(function) => {
+                converted(Loops::continuous(&function.get().inner, gains))?
+            }
+            GivenLoops::Sampled(kinds) => {
+                let kind = |loops: &Vec<Bound<'_, PyLinearLoop>>| {
+                    let loops = loops.iter();
+                    loops.map(|one| one.get().core().clone()).collect()
+                };
+                Loops::Sampled(kinds.iter().map(kind).collect())
+            }
+        };
+        let scenario = |GivenScenario(numbers, kind, time)| Scenario {
+            numbers,
+            kind,
+            time,
+        };
+        let scenarios: Vec<Scenario> = scenarios.into_iter().map(scenario).collect();
+        let count = scenarios.len();
+        let inner = Candidates::new(loops, delay, scenarios);
+        Ok(Self {
+            inner,
+            scenarios: count,
+        })
+    }
+
+    /// The cost of each row of gains in each scenario.
+    fn costs<'py>(
+        &self,
+        py: Python<'py>,
+        points: Points<'py>,
+        objective: &str,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let objective = objective_of(objective);
+        let found = self.of_points(py, &points, threads, |points, task| {
+            self.inner.costs(objective, points, task)
+        })?;
+        found
+            .into_pyarray(py)
+            .reshape([points.as_array().nrows(), self.scenarios])
+    }
+
+    /// The worst spectral abscissa of each row of gains, infinite where a loop is not stable.
+    fn stable_abscissae<'py>(
+        &self,
+        py: Python<'py>,
+        points: Points<'py>,
+        threads: Option<usize>,
+    ) -> PyResult<Vector<'py>> {
+        let found = self.of_points(py, &points, threads, |points, task| {
+            self.inner.stable_abscissae(points, task)
+        })?;
+        Ok(found.into_pyarray(py))
+    }
+
+    /// Margins of each row of gains in each scenario, where all of them are stable.
+    fn all_margins<'py>(
+        &self,
+        py: Python<'py>,
+        points: Points<'py>,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let found = self.of_points(py, &points, threads, |points, task| {
+            self.inner.all_margins(points, task)
+        })?;
+        let shape = [points.as_array().nrows(), self.scenarios, 3];
+        found.concat().into_pyarray(py).reshape(shape)
+    }
+
+    /// By how much rows of gains of stable loops fall short of margins; where it is more than `most`
+    /// it may be too small.
+    fn shortfalls<'py>(
+        &self,
+        py: Python<'py>,
+        points: Points<'py>,
+        required: [f64; 3],
+        most: f64,
+        threads: Option<usize>,
+    ) -> PyResult<Vector<'py>> {
+        let goal = Goal {
+            objective: Objective::Abscissa,
+            required,
+            scale: 1.0,
+        };
+        let found = self.of_points(py, &points, threads, |points, task| {
+            self.inner.shortfalls(&goal, points, most, task)
+        })?;
+        Ok(found.into_pyarray(py))
+    }
+
+    /// Place and cost of the best row of gains.
+    fn least(&self, py: Python<'_>, points: Points<'_>, goal: GivenGoal) -> PyResult<(usize, f64)> {
+        let (goal, points) = (goal.into(), rows(&points));
+        let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        run_here(py, |task| tuning::least(&self.inner, &goal, &points, task))
+    }
+
+    /// The cost of gains with what they miss of the margins.
+    fn total(&self, py: Python<'_>, gains: Vec<f64>, goal: GivenGoal) -> PyResult<f64> {
+        let goal = Goal::from(goal);
+        let mut last = Decisive::default();
+        run_here(py, |task| {
+            goal.total(&self.inner, &gains, f64::INFINITY, &mut last, task)
+        })
+    }
+
+    /// The best gains within reach of a start, between the bounds in the rows of a matrix.
+    fn best_within<'py>(
+        &self,
+        py: Python<'py>,
+        goal: GivenGoal,
+        start: Vec<f64>,
+        reach: Vec<f64>,
+        bounds: Vec<(f64, f64)>,
+    ) -> PyResult<Vector<'py>> {
+        let (goal, within) = (
+            goal.into(),
+            Within {
+                start,
+                reach,
+                bounds,
+            },
+        );
+        let found = run_here(py, |task| {
+            tuning::best_within(&self.inner, &goal, &within, task)
+        })?;
+        Ok(found.into_pyarray(py))
+    }
+
+    /// The delay at which gains cost most in a scenario, and that cost.
+    fn worst_delay(
+        &self,
+        py: Python<'_>,
+        gains: Vec<f64>,
+        objective: &str,
+        scenario: usize,
+        ends: (f64, f64),
+    ) -> PyResult<(f64, f64)> {
+        let objective = objective_of(objective);
+        run_here(py, |task| {
+            tuning::worst_delay(&self.inner, objective, &gains, scenario, ends, task)
+        })
+    }
+
+    /// Gain, phase and delay margin of gains in each scenario, NaN where a loop is not stable.
+    fn margins<'py>(
+        &self,
+        py: Python<'py>,
+        gains: Vec<f64>,
+        delay_margin: bool,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = run_here(py, |task| self.inner.margins(&gains, delay_margin, task))?;
+        let count = found.len();
+        found.concat().into_pyarray(py).reshape([count, 3])
+    }
+
+    /// Least damping ratio of the dominant poles and spectral abscissa of gains in each scenario.
+    fn dominant<'py>(
+        &self,
+        py: Python<'py>,
+        gains: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = run_here(py, |task| self.inner.all_dominant(&gains, task))?;
+        let count = found.len();
+        let pairs = found.iter().flat_map(|one| [one.damping, one.abscissa]);
+        pairs
+            .collect::<Vec<f64>>()
+            .into_pyarray(py)
+            .reshape([count, 2])
+    }
+}
+
+impl PyCandidates {
+    fn of_points<T: Send>(
+        &self,
+        py: Python<'_>,
+        points: &Points<'_>,
+        threads: Option<usize>,
+        find: impl FnOnce(&[&[f64]], &deadtime::Task) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        let points = rows(points);
+        let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        run(py, threads, None, |task| find(&points, task))
+    }
+}
