@@ -62,7 +62,7 @@ _GRIDS_ROUNDED = 4
 #: Ratio of the widths of two grids, and the part of the half width within which the best point must
 #: lie for the grid to become narrower.
 _NARROWER = 0.5
-_ARRIVED = 0.5
+_ARRIVED = 0.55
 
 #: Relative half width of the first grid around the best gains alone in which the best ones with
 #: their neighbours are sought.
