@@ -62,7 +62,7 @@ _GRIDS_ROUNDED = 4
 #: Ratio of the widths of two grids, and the part of the half width within which the best point must
 #: lie for the grid to become narrower.
 _NARROWER = 0.5
-_ARRIVED = 0.5
+_ARRIVED = 0.55
 
 #: Relative half width of the first grid around the best gains alone in which the best ones with
 #: their neighbours are sought.
@@ -101,8 +101,10 @@ class Search:
             # Perhaps the requirements are met between the cells.
             costs[stable] = self.shortfalls(points[stable])
             starts = self.survey.chosen(points, costs, 1)
-        found = [self._by_grids(start) for start in starts]
-        return self._polished(*min(found, key=lambda one: self._total(one[0])))
+        found = sorted(map(self._by_grids, starts), key=lambda one: self._total(one[0]))
+        # With three gains a search may end on a kink far from the best.
+        most = len(found) if len(self.problem.free) > 2 else 1
+        return min((self._polished(*one) for one in found[:most]), key=self._total)
 
     def _cell_costs(self, points: Array, stable: Indices) -> Array:
         """Costs of the cells that meet the margins, infinite of the others.

@@ -108,7 +108,8 @@ impl Candidates {
             Loops::Sampled(kinds) => sampled_loop(kinds, values, self.delay, scenario.kind)
                 .and_then(|plant| HeldLoop::new(&plant)?.abscissa(task)),
         };
-        found_or(found, f64::INFINITY)
+        let found = found_or(found, f64::INFINITY)?;
+        Ok(if found.is_nan() { f64::INFINITY } else { found })
     }
 
     /// The dominant poles. The chains of a neutral loop oscillate without end: where they are
@@ -136,7 +137,7 @@ impl Candidates {
         let horizon = DOMINANT * abscissa;
         let near = poles.iter().filter(|pole| pole.re >= horizon);
         let ratios = near.map(|pole| -pole.re / modulus(*pole));
-        let damping = if !(abscissa < 0.0) {
+        let damping = if abscissa >= 0.0 || abscissa.is_nan() {
             f64::NAN
         } else if chain >= horizon {
             0.0

@@ -59,7 +59,7 @@ impl Objective {
             return of.abscissa(&values, scenario, task);
         }
         let found = of.dominant(&values, scenario, task)?;
-        if !(found.abscissa < 0.0) {
+        if found.damping.is_nan() {
             return Ok(NEVER + found.abscissa);
         }
         let unit = if time == 0.0 { 1.0 } else { time };

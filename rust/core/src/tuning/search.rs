@@ -12,7 +12,7 @@ use crate::{Error, Task};
 /// Accuracy of the gains as a fraction of their ranges, of one gain and of several. Where roots meet
 /// the abscissa has cusps: gains known to 1e-7 leave it known to 1e-3.
 const ONE_GAIN_KNOWN: f64 = 1e-9;
-const GAINS_KNOWN: f64 = 3e-7;
+const GAINS_KNOWN: f64 = 1e-7;
 
 /// Accuracy of the worst delay, relative to the longest.
 const DELAY_KNOWN: f64 = 1e-6;
@@ -62,7 +62,7 @@ impl Candidates {
             for scenario in &self.scenarios {
                 let found = Objective::Abscissa.cost(self, points[place], scenario, None, task)?;
                 worst = worst.max(found);
-                if !(worst < 0.0) {
+                if worst >= 0.0 {
                     return Ok(f64::INFINITY);
                 }
             }
@@ -139,7 +139,7 @@ pub fn least(
         };
         let abscissa = Objective::Abscissa;
         let late = abscissa.worst(of, point, f64::min(least, 0.0), &mut last, task)?;
-        let cost = if !(late < 0.0) {
+        let cost = if late >= 0.0 {
             unit * UNSTABLE
         } else if late > least {
             continue;
@@ -180,10 +180,8 @@ pub fn best_within(
         let is_better = found.1 <= cost(&[*start], f64::INFINITY)?;
         return Ok(vec![if is_better { found.0 } else { *start }]);
     }
-    let narrowest = bounds.iter().map(|(low, high)| high - low);
-    let known = GAINS_KNOWN * narrowest.fold(f64::INFINITY, f64::min);
     let sides: Vec<f64> = reach.iter().map(|side| 0.5 * side).collect();
-    simplices::minimum(cost, start, &sides, bounds, known)
+    simplices::minimum(cost, start, &sides, bounds, GAINS_KNOWN)
 }
 
 /// The delay between two ends at which gains cost most in a scenario, and that cost.

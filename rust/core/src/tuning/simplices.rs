@@ -18,7 +18,7 @@ const IDLE: f64 = 1e-4;
 type Corner = (Vec<f64>, f64);
 
 /// A place near `start` with the least cost that simplices of the sides `size` find within bounds;
-/// each ends when its corners are as close as `tolerance`. The second argument of `cost` is the most
+/// each ends when its corners are as close as `tolerance`, as a part of the bounds. The second argument of `cost` is the most
 /// that matters: a cost above it may be any other above it.
 ///
 /// # Errors
@@ -94,7 +94,7 @@ impl<'a, F: FnMut(&[f64], f64) -> Result<f64, Error>> Simplex<'a, F> {
         Ok((place, cost))
     }
 
-    /// The best corner when all are as close as `tolerance`, or the evaluations are used.
+    /// The best corner when all are this close, or the evaluations are used.
     fn contracted(mut self, tolerance: f64) -> Result<Corner, Error> {
         let most = EVALUATIONS * (self.bounds.len().max(2) - 1);
         loop {
@@ -106,11 +106,13 @@ impl<'a, F: FnMut(&[f64], f64) -> Result<f64, Error>> Simplex<'a, F> {
         }
     }
 
+    /// The largest distance of the others from the best corner, as a part of the bounds.
     fn width(&self) -> f64 {
         let (first, others) = (&self.corners[0].0, &self.corners[1..]);
         let away = |corner: &Corner| {
-            let sides = corner.0.iter().zip(first).map(|(x, y)| (x - y).abs());
-            sides.fold(0.0, f64::max)
+            let sides = corner.0.iter().zip(first).zip(self.bounds);
+            let parts = sides.map(|((x, y), (low, high))| (x - y).abs() / (high - low));
+            parts.fold(0.0, f64::max)
         };
         others.iter().map(away).fold(0.0, f64::max)
     }
