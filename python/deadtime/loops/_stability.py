@@ -86,12 +86,8 @@ def sampled_range(
 
 def _bounds(plant: Plant, name: str, value: float) -> tuple[float, float]:
     """Between what a number can be."""
-    keeps_sign = _keeps_sign(plant, name) and value != 0.0
+    own = isinstance(plant, ParametricPlant) and name in plant.numbers
+    keeps_sign = (own or name in _KEEPS_SIGN) and value != 0.0
     if keeps_sign and value < 0.0:
         return -math.inf, 0.0
     return (0.0 if name in _NON_NEGATIVE or keeps_sign else -math.inf), math.inf
-
-
-def _keeps_sign(plant: Plant, name: str) -> bool:
-    """Whether a number of a loop with this plant keeps its sign."""
-    return name in _KEEPS_SIGN or (isinstance(plant, ParametricPlant) and name in plant.numbers)

@@ -76,7 +76,7 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::systems::{
-        LegendreTables, LinearSystemResponse, PyLinearSystem, PySignal, legendre_tables,
+        FittedSeries, LinearSystemResponse, PyLinearSystem, PySignal, fitted_series,
     };
     #[pymodule_export]
     use super::ufunc::limit_threads;
