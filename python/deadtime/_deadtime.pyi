@@ -787,11 +787,20 @@ def sampled_filter(
 # --- systems --------------------------------------------------------------------------
 
 @final
-class LegendreTables:
-    nodes: Final[_Reals]
-    transform: Final[_Reals]
+class FittedSeries:
+    edges: Final[_Reals]
+    series: Final[_Reals]
+    breaks: Final[list[int]]
 
-def legendre_tables() -> LegendreTables: ...
+def fitted_series(
+    name: str,
+    sample: Callable[[_Reals], _Reals],
+    *,
+    span: _Pair,
+    breaks: list[float],
+    gap: float,
+    width: int,
+) -> FittedSeries: ...
 
 @final
 class Signal:

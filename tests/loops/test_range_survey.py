@@ -155,6 +155,13 @@ def test_ranges_of_some_loops_are_those_of_eigenvalues():
     assert asked == 11
 
 
+def test_the_end_of_a_gain_has_its_digits_where_the_polynomials_lose_some():
+    """It had three: the interval of the crossing was not made shorter."""
+    loop = stable_loop(135)
+    low, _ = loop.stable_range("Kp")
+    assert rightmost(loop, Kp=low * (1.0 - 1e-6))[0] > 1.0 > rightmost(loop, Kp=low * 1.000001)[0]
+
+
 @pytest.mark.survey
 @pytest.mark.long
 @pytest.mark.parametrize("part", range(6))

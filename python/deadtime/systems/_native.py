@@ -4,7 +4,7 @@ from deadtime._deadtime import (
     LinearSystem as LinearSystem,
     Margins as Margins,
     Signal as Signal,
-    legendre_tables as legendre_tables,
+    fitted_series as fitted_series,
     loop_margins as loop_margins,
     ratio as ratio,
 )

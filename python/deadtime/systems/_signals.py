@@ -15,8 +15,11 @@ from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import real_array
-from deadtime.systems._native import Signal
-from deadtime.systems._signals_fit import RESOLUTION, pieces
+from deadtime.systems._native import Signal, fitted_series
+
+#: Shortest event of a callable that its even samples do not miss, as a fraction of the span: a
+#: smaller one finds more events and calls the function more often.
+RESOLUTION = 1e-3
 
 _FOREVER = float("inf")
 
@@ -126,5 +129,7 @@ def fitted(
         return sampled(name, function, times, width, vectorized)
 
     gap = RESOLUTION * (span[1] - span[0]) if max_step is None else max_step
-    found = pieces(name, sample, span, breaks, gap)
+    found = fitted_series(
+        name, sample, span=span, breaks=[float(b) for b in breaks], gap=gap, width=width
+    )
     return Fitted(found.edges - start, found.series, found.breaks)

@@ -75,7 +75,7 @@ mod _deadtime {
     use super::stability::{MapBoundary, MapCells, PyFamily};
     #[pymodule_export]
     use super::systems::{
-        LegendreTables, LinearSystemResponse, PyLinearSystem, PySignal, legendre_tables,
+        FittedSeries, LinearSystemResponse, PyLinearSystem, PySignal, fitted_series,
     };
     #[pymodule_export]
     use super::tuning::PyCandidates;

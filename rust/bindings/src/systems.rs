@@ -1,10 +1,11 @@
 //! Bindings of `deadtime::dde::system`.
 
 use deadtime::Error;
-use deadtime::dde::system::{self, Term};
+use deadtime::dde::spectral;
+use deadtime::dde::system::Term;
 use deadtime::dde::{LinearSystem, Past, Signal, SystemEquations};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -39,21 +40,55 @@ impl PySignal {
     }
 }
 
-/// Gauss nodes, and the matrix that takes values at them (first axis) to Legendre coefficients.
+/// A fitted function: edges of its pieces, series of the shape (pieces, columns, coefficients), and the
+/// pieces that start with a break.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
-pub(crate) struct LegendreTables {
-    nodes: Py<PyArray1<f64>>,
-    transform: Py<PyArray2<f64>>,
+pub(crate) struct FittedSeries {
+    edges: Py<PyArray1<f64>>,
+    series: Py<PyArray3<f64>>,
+    breaks: Vec<usize>,
 }
 
+/// Fit the function of this name between its breaks; `sample` gives its values, of the shape (width,
+/// m), at m times.
 #[pyfunction]
-pub(crate) fn legendre_tables(py: Python<'_>) -> PyResult<LegendreTables> {
-    let (nodes, transform) = system::legendre_tables();
-    let size = nodes.len();
-    let transform = transform.into_pyarray(py).reshape([size, size])?;
-    Ok(LegendreTables {
-        nodes: nodes.into_pyarray(py).unbind(),
-        transform: transform.unbind(),
+#[pyo3(signature = (name, sample, *, span, breaks, gap, width))]
+pub(crate) fn fitted_series(
+    py: Python<'_>,
+    name: &str,
+    sample: &Bound<'_, PyAny>,
+    span: (f64, f64),
+    breaks: Vec<f64>,
+    gap: f64,
+    width: usize,
+) -> PyResult<FittedSeries> {
+    let mut failure = None;
+    let read = |times: &[f64], out: &mut [f64]| -> PyResult<()> {
+        let found = sample.call1((PyArray1::from_slice(py, times),))?;
+        let values = found.extract::<Floats<'_>>()?;
+        let values = in_order(&values)?;
+        for (i, row) in values.chunks_exact(times.len().max(1)).enumerate() {
+            for (out, value) in out.iter_mut().skip(i).step_by(width).zip(row) {
+                *out = *value;
+            }
+        }
+        Ok(())
+    };
+    let found = spectral::series(name, span, gap, &breaks, width, |times, out| {
+        read(times, out).map_err(|error| {
+            failure = Some(error);
+            Error::Caller
+        })
+    });
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    let found = converted(found)?;
+    let shape = [found.edges.len() - 1, width, found.terms];
+    Ok(FittedSeries {
+        edges: found.edges.into_pyarray(py).unbind(),
+        series: found.series.into_pyarray(py).reshape(shape)?.unbind(),
+        breaks: found.breaks,
     })
 }
 

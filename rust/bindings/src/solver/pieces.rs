@@ -234,17 +234,32 @@ fn fitted(
     };
     let mut failure = None;
     let gap = problem.max_step.min(RESOLUTION * (start - first));
-    let found = approximate((first, start), gap, breaks, rows, tolerance, |time, out| {
-        let (values, slopes) = out.split_at_mut(dim);
-        let read = sample("history", history, time, values).and_then(|()| match slope {
-            Some(slope) => sample("the derivative of the history", slope, time, slopes),
-            None => Ok(()),
-        });
-        read.map_err(|error| {
-            failure = Some(error);
-            Error::Caller
-        })
-    });
+    let found = approximate(
+        (first, start),
+        gap,
+        breaks,
+        rows,
+        tolerance,
+        |times, out| {
+            let read = times
+                .iter()
+                .zip(out.chunks_exact_mut(rows))
+                .try_for_each(|(time, out)| {
+                    let (values, slopes) = out.split_at_mut(dim);
+                    sample("history", history, *time, values)?;
+                    match slope {
+                        Some(slope) => {
+                            sample("the derivative of the history", slope, *time, slopes)
+                        }
+                        None => Ok(()),
+                    }
+                });
+            read.map_err(|error| {
+                failure = Some(error);
+                Error::Caller
+            })
+        },
+    );
     if let Some(error) = failure {
         return Err(error);
     }

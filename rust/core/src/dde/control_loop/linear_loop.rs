@@ -197,6 +197,13 @@ impl<S: Scalar> LinearLoop<S> {
         self.update.as_ref()
     }
 
+    /// The same loop with another feedback u = K x + L w.
+    #[must_use]
+    pub fn with_feedback(mut self, k: Vec<S>, l: S) -> Self {
+        (self.equations.k, self.equations.l) = (k, l);
+        self
+    }
+
     /// Has another loop the same poles, as far as its matrices say, with its delay and samples alike?
     pub fn has_poles_of(&self, other: &Self) -> bool
     where

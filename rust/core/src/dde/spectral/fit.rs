@@ -39,7 +39,7 @@ const MOST: usize = 20_000;
 /// Upper limit on the even samples of one history.
 const MOST_SAMPLES: f64 = 1e6;
 /// Error of a function in units of its time: its arithmetic has rounding errors as well.
-const UNITS: f64 = 8.0 * f64::EPSILON;
+pub(super) const UNITS: f64 = 8.0 * f64::EPSILON;
 /// Largest error of the values from rounding of the time, as a share of their variation on a piece.
 /// Where it is larger, the piece is too short to be distinguished from a jump.
 const BLURRED: f64 = 1e-3;
@@ -55,10 +55,10 @@ pub struct Approximation {
     /// Kinks and jumps.
     pub breaks: Vec<BreakingPoint>,
     /// Bounds on the components.
-    sizes: Vec<f64>,
+    pub(super) sizes: Vec<f64>,
 }
 
-/// Approximate `function`, which writes `dim` values, on [start, end] to `tolerance`, with joints
+/// Approximate `function`, which writes `dim` values for each of some times, on [start, end] to `tolerance`, with joints
 /// at the `breaks` in between. A deviation from a smooth function that lasts longer than `gap` is
 /// found.
 pub fn approximate(
@@ -67,7 +67,7 @@ pub fn approximate(
     breaks: &[f64],
     dim: usize,
     tolerance: impl Fn(usize, f64) -> f64,
-    mut function: impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+    mut function: impl FnMut(&[f64], &mut [f64]) -> Result<(), Error>,
 ) -> Result<Approximation, Error> {
     let mut breaks = breaks.to_vec();
     let samples = Samples::new(&joints((start, end), &breaks), gap, dim, &mut function)?;
@@ -117,7 +117,7 @@ impl Samples {
         joints: &[f64],
         gap: f64,
         dim: usize,
-        function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+        function: &mut impl FnMut(&[f64], &mut [f64]) -> Result<(), Error>,
     ) -> Result<Self, Error> {
         let whole = joints
             .last()
@@ -131,9 +131,7 @@ impl Samples {
             times.extend((0..parts as usize).map(|i| pair[0] + (i as f64 + 0.5) * width));
         }
         let mut values = vec![0.0; dim * times.len()];
-        for (time, values) in times.iter().zip(values.chunks_exact_mut(dim.max(1))) {
-            function(*time, values)?;
-        }
+        function(&times, &mut values)?;
         Ok(Self { times, values })
     }
 
@@ -153,14 +151,14 @@ fn meeting(
     left: &Piece,
     right: &Piece,
     dim: usize,
-    function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+    function: &mut impl FnMut(&[f64], &mut [f64]) -> Result<(), Error>,
 ) -> Result<f64, Error> {
     let mut low = left.end - MARGIN * (left.end - left.start);
     let mut high = right.start + MARGIN * (right.end - right.start);
     let (mut value, mut before, mut after) = (vec![0.0; dim], vec![0.0; dim], vec![0.0; dim]);
     let mut middle = left.end;
     while low < middle && middle < high {
-        function(middle, &mut value)?;
+        function(&[middle], &mut value)?;
         left.value(middle, &mut before);
         right.value(middle, &mut after);
         let distance =
@@ -181,7 +179,7 @@ fn divide(
     samples: &Samples,
     dim: usize,
     tolerance: &impl Fn(usize, f64) -> f64,
-    function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+    function: &mut impl FnMut(&[f64], &mut [f64]) -> Result<(), Error>,
 ) -> Result<Approximation, Error> {
     let mut found = Approximation::default();
     let mut fitter = Fitter::new(dim);
@@ -316,19 +314,17 @@ fn holds_at_samples(piece: &Piece, samples: &Samples, allowed: &[f64]) -> bool {
 fn holds_at_ends(
     piece: &Piece,
     allowed: &[f64],
-    function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+    function: &mut impl FnMut(&[f64], &mut [f64]) -> Result<(), Error>,
 ) -> Result<bool, Error> {
     let rounding = 4.0 * f64::EPSILON * piece.start.abs().max(piece.end.abs());
     let length = piece.end - piece.start;
     let inset = (EDGE * length).max(rounding).min(0.5 * length);
-    let (mut value, mut found) = (vec![0.0; allowed.len()], vec![0.0; allowed.len()]);
-    for time in [piece.start + inset, piece.end - inset] {
-        function(time, &mut value)?;
-        if !agrees(piece, time, &value, &mut found, allowed) {
-            return Ok(false);
-        }
-    }
-    Ok(true)
+    let dim = allowed.len();
+    let (mut values, mut found) = (vec![0.0; 2 * dim], vec![0.0; dim]);
+    let times = [piece.start + inset, piece.end - inset];
+    function(&times, &mut values)?;
+    let mut ends = times.iter().zip(values.chunks_exact(dim.max(1)));
+    Ok(ends.all(|(time, values)| agrees(piece, *time, values, &mut found, allowed)))
 }
 
 /// Does a piece have these values?
@@ -368,16 +364,11 @@ impl Fitter {
         &mut self,
         start: f64,
         end: f64,
-        function: &mut impl FnMut(f64, &mut [f64]) -> Result<(), Error>,
+        function: &mut impl FnMut(&[f64], &mut [f64]) -> Result<(), Error>,
     ) -> Result<Piece, Error> {
-        for (x, values) in self
-            .points
-            .iter()
-            .zip(self.values.chunks_exact_mut(self.dim.max(1)))
-        {
-            let time = 0.5 * (start + end) + 0.5 * (end - start) * x;
-            function(time, values)?;
-        }
+        let time = |x: &f64| 0.5 * (start + end) + 0.5 * (end - start) * x;
+        let times: Vec<f64> = self.points.iter().map(time).collect();
+        function(&times, &mut self.values)?;
         let mut coefficients = vec![0.0; self.dim * POINTS];
         for (component, out) in coefficients.chunks_exact_mut(POINTS).enumerate() {
             for (k, out) in out.iter_mut().enumerate() {

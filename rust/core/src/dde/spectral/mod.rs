@@ -29,6 +29,7 @@ mod products;
 mod run;
 mod scalar;
 mod shifted;
+mod signal;
 mod sizes;
 mod sparsity;
 #[cfg(test)]
@@ -38,4 +39,5 @@ mod unread;
 pub use fit::{Approximation, approximate};
 pub use problem::{Columns, Equation, Event, Jump, Outcome, Problem, Solution};
 pub use run::solve;
+pub use signal::{Series, series};
 pub use sparsity::Sparsity;

@@ -22,8 +22,10 @@ impl<F: FnMut(f64, f64, f64) -> f64> Equation for Plain<F> {
 
 /// y on [−`delay`, 0].
 fn past(delay: f64, gap: f64, tolerance: f64, y: impl Fn(f64) -> f64) -> History {
-    let write = |t: f64, out: &mut [f64]| {
-        out[0] = y(t);
+    let write = |times: &[f64], out: &mut [f64]| {
+        for (t, out) in times.iter().zip(out) {
+            *out = y(*t);
+        }
         Ok(())
     };
     let found = approximate((-delay, 0.0), gap, &[], 1, |_, _| tolerance, write);

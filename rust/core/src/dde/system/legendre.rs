@@ -14,12 +14,12 @@ use crate::elementary::DoubleDouble;
 pub(super) const DEGREE: usize = 24;
 
 /// Number of coefficients, and of Gauss nodes.
-pub(super) const TERMS: usize = DEGREE + 1;
+pub(crate) const TERMS: usize = DEGREE + 1;
 
 static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
 
 /// One series, or values at the nodes.
-pub(super) type Series = [f64; TERMS];
+pub(crate) type Series = [f64; TERMS];
 
 struct Tables {
     nodes: Series,
@@ -114,18 +114,12 @@ fn next_polynomial(x: f64, lower: &Series) -> (f64, f64) {
 }
 
 /// The Gauss nodes, ascending.
-pub(super) fn nodes() -> &'static Series {
+pub(crate) fn nodes() -> &'static Series {
     &TABLES.nodes
 }
 
-/// The transformation of values at the nodes to coefficients: the part of value i in c_k at
-/// `[i][k]`.
-pub(super) fn transform() -> &'static [Series; TERMS] {
-    &TABLES.transform
-}
-
 /// The series that has these values at the nodes.
-pub(super) fn from_values(values: &Series) -> Series {
+pub(crate) fn from_values(values: &Series) -> Series {
     let mut out = [0.0; TERMS];
     for (value, row) in values.iter().zip(&TABLES.transform) {
         for (out, factor) in out.iter_mut().zip(row) {
@@ -191,12 +185,6 @@ pub(super) fn restricted(series: &[f64], offset: f64, ratio: f64) -> Series {
         }
     }
     out
-}
-
-/// The Gauss nodes, and the transformation of values at them to coefficients: the part of value i
-/// in coefficient k at i m + k, where m is the number of both.
-pub fn legendre_tables() -> (Vec<f64>, Vec<f64>) {
-    (nodes().to_vec(), transform().concat())
 }
 
 #[cfg(test)]

@@ -31,6 +31,6 @@ mod track;
 mod tests;
 
 pub use equations::{Past, Signal, SystemEquations, SystemResponse};
-pub use legendre::legendre_tables;
+pub(crate) use legendre::{TERMS, from_values, nodes};
 pub use simulate::LinearSystem;
 pub use terms::Term;

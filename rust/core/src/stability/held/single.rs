@@ -161,9 +161,17 @@ impl<'a> HeldLoop<'a> {
     /// As [`at`](Self::at); [`Error::Interrupted`]; [`Error::TooMuch`] for too many samples of delay.
     pub fn is_stable(&self, task: &Task) -> Result<Option<bool>, Error> {
         match self.at(self.delay())?.is_stable(task)? {
-            None => Ok(Poles::of(self.plant, self.sample_time)?.are_inside()),
+            None => self.are_inside(),
             known => Ok(known),
         }
+    }
+
+    /// The same by discs alone, which lose fewer digits than the count.
+    ///
+    /// # Errors
+    /// As [`poles_in`](Self::poles_in).
+    pub fn are_inside(&self) -> Result<Option<bool>, Error> {
+        Ok(Poles::of(self.plant, self.sample_time)?.are_inside())
     }
 
     /// The values in `range` of a gain, whose factor is the feedback of `slope`, at which a pole of

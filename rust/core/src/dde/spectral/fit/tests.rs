@@ -2,8 +2,10 @@ use super::*;
 
 fn fitted(breaks: &[f64], function: impl Fn(f64) -> f64) -> Approximation {
     let tolerance = |_, size: f64| 1e-10 * size;
-    approximate((-1.0, 0.0), 1e-3, breaks, 1, tolerance, |t, out| {
-        out[0] = function(t);
+    approximate((-1.0, 0.0), 1e-3, breaks, 1, tolerance, |times, out| {
+        for (t, out) in times.iter().zip(out) {
+            *out = function(*t);
+        }
         Ok(())
     })
     .unwrap()
@@ -69,10 +71,12 @@ fn noise_is_refused() {
         1,
         |_, _| 1e-10,
         |_, out| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            out[0] = (state >> 40) as f64;
+            for out in out {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                *out = (state >> 40) as f64;
+            }
             Ok(())
         },
     );
