@@ -98,7 +98,7 @@ impl Poles {
             if excess > change || (excess == 0.0 && change == 0.0) {
                 return Some(false);
             }
-            if !(excess < -change) {
+            if excess >= -change || (excess + change).is_nan() {
                 all = None;
             }
         }
@@ -114,7 +114,7 @@ impl Poles {
         // A disc about z = 0 has no finite one in s.
         let reaches = |disc: &Disc| {
             let size = modulus(Complex64::ONE + disc.center * ts) + disc.radius * ts;
-            !(size * ROOM < (left * ts).exp())
+            size * ROOM >= (left * ts).exp() || size.is_nan()
         };
         let discs = self.discs.iter().filter(|disc| reaches(disc));
         roots::within(&self.listed(discs, region), region, Edge::Refused)
@@ -217,7 +217,11 @@ impl Disc {
     }
 
     fn meets(&self, other: &Self) -> bool {
-        !(modulus(self.center - other.center) > (self.radius + other.radius) * ROOM)
+        let (distance, reach) = (
+            modulus(self.center - other.center),
+            self.radius + other.radius,
+        );
+        distance <= reach * ROOM || (distance + reach).is_nan()
     }
 
     /// A disc around both.
