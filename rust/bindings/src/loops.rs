@@ -106,6 +106,9 @@ impl Entry<'_> {
 /// Numerator and denominator in any entries.
 type Given<T> = (Vec<T>, Vec<T>);
 
+/// Coefficient, powers of the numbers, power of s, and the delay as a constant and slopes.
+type ListedTerm = (f64, Vec<u32>, u32, f64, Vec<f64>);
+
 /// A factor and the powers of free numbers.
 type Monomials = Vec<(f64, Vec<u32>)>;
 
@@ -333,7 +336,7 @@ impl PyLoop {
         &self,
         names: Vec<String>,
         given: Option<Given<Monomials>>,
-    ) -> PyResult<Vec<(f64, Vec<u32>, u32, f64, Vec<f64>)>> {
+    ) -> PyResult<Vec<ListedTerm>> {
         let places = self.places(&names)?;
         let mut values = self.inner.free(&places);
         values.given = given.map(symbols).transpose()?;
@@ -707,7 +710,6 @@ pub(crate) fn feedback_polynomials(
 
 /// Fd, Gd, Cd and Dd of the filter x' = F x + G v, d = C x on samples.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple of arrays for Python")]
 pub(crate) fn sampled_filter<'py>(
     py: Python<'py>,
     f: Floats<'py>,

@@ -83,7 +83,7 @@ impl SampledFilter {
             Rule::Tustin => 0.5,
             Rule::Backward => 1.0,
         };
-        let unit = |i: usize| f64::from(u8::from(i % (n + 1) == 0));
+        let unit = |i: usize| f64::from(u8::from(i / n == i % n));
         let with = |share: f64| -> Vec<f64> {
             let entries = f.iter().enumerate();
             entries

@@ -66,17 +66,22 @@ impl Mul for Symbol {
         let mut product = Self::default();
         for x in &self.0 {
             for y in &other.0 {
-                let length = x.powers.len().max(y.powers.len());
-                let power = |of: &Monomial, i: usize| of.powers.get(i).copied().unwrap_or(0);
                 product.put(Monomial {
                     factor: x.factor * y.factor,
-                    powers: (0..length).map(|i| power(x, i) + power(y, i)).collect(),
+                    powers: joined(&x.powers, &y.powers),
                 });
             }
         }
         product.0.retain(|monomial| monomial.factor != 0.0);
         product
     }
+}
+
+/// The powers of a product.
+fn joined(x: &[u32], y: &[u32]) -> Vec<u32> {
+    let power = |of: &[u32], i: usize| of.get(i).copied().unwrap_or(0);
+    let length = x.len().max(y.len());
+    (0..length).map(|i| power(x, i) + power(y, i)).collect()
 }
 
 impl Entry for Symbol {
