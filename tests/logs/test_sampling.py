@@ -19,6 +19,9 @@ from scipy import stats
 #: Those of two minutes are in the survey alone.
 SHORT = [(kind, logger) for kind in ("rate", "height") for logger in LOGGERS[kind][1]]
 
+#: Rows at any times: their likelihood has no steps that repeat, and takes ten times as long.
+ANY_TIMES = {"uneven rows", "scattered stamps", "clocks drift by 100 ppm"}
+
 #: Cases that are refused, or not adequate, in most logs.
 DOUBTED = {
     ("height", "commands: every second row"),
@@ -64,7 +67,7 @@ def is_mostly_adequate(answers):
 
 @pytest.mark.parametrize(("kind", "logger"), SHORT)
 def test_a_log_is_answered_rightly_or_doubted(kind, logger):
-    truth, told = answered(kind, logger, 500, part=0.5)
+    truth, told = answered(kind, logger, 500, part=0.2 if logger in ANY_TIMES else 0.5)
     if told is not None:
         value, error, _ = told
         assert abs(value - truth) < 4.0 * error
@@ -146,7 +149,7 @@ def test_lines_between_rare_rows_of_a_command_are_known_to_what_their_changes_te
 
 def test_clocks_that_drift_apart_are_named_with_their_rate():
     # Over a short log the stamps alone tell.
-    flight, log = made("rate", "clocks drift by 100 ppm", 1001)
+    flight, log = made("rate", "clocks drift by 100 ppm", 1001, part=0.4)
     message = _told(log, log.loop(flight.kind.loop), "actuator").estimate.message
     assert (
         "the stamps of vehicle_torque_setpoint.xyz[0] and vehicle_angular_velocity.xyz[0] drift "
@@ -215,7 +218,7 @@ def test_stamps_that_are_not_regular_tell_no_rate():
 
 
 def test_a_recording_with_commands_of_another_clock_is_doubted():
-    flight, _ = made("long height", "every row", 1000)
+    flight, _ = made("long height", "every row", 1000, part=0.5)
     found = {}
     for apart in (0.0, 1e-4):
         recording = dtm.Recording(
@@ -230,7 +233,7 @@ def test_a_recording_with_commands_of_another_clock_is_doubted():
         "the commands and the rows are stamped by clocks that drift" in found[1e-4].estimate.message
     )
     # A short one has no parts; its stamps tell.
-    rows = slice(1000)
+    rows = slice(400)
     short = dtm.Recording(
         flight.time[rows] * (1.0 + apart), flight.setpoint[rows], flight.read[rows],
         sent=(flight.time[rows], flight.sent[rows]),
