@@ -77,14 +77,11 @@ def test_an_integrator_is_known_from_the_loop():
     assert choice.best.loop.plant.integrator
 
 
+@pytest.mark.long
 @pytest.mark.survey
 @pytest.mark.parametrize(
     ("vehicle", "known"),
-    [
-        pytest.param({}, FLAT, marks=pytest.mark.long),
-        ({"zero": 0.03}, FLAT),
-        pytest.param({"integrator": True}, INTEGRATING, marks=pytest.mark.long),
-    ],
+    [({}, FLAT), ({"zero": 0.03}, FLAT), ({"integrator": True}, INTEGRATING)],
 )
 def test_the_interval_of_the_sum_holds_the_truth_whatever_the_split(vehicle, known):
     truth = 0.247 - vehicle.get("zero", 0.0)

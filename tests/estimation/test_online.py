@@ -200,6 +200,7 @@ def test_what_is_wrong_is_said():
         estimator.update(0.0, math.inf, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_a_hundred_drifts_in_wind():
     found = drifts(30)

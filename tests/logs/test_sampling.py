@@ -157,6 +157,7 @@ def test_clocks_that_drift_apart_are_named_with_their_rate():
     ) in message
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_a_time_that_grows_with_the_drift_of_clocks_is_named():
     # Over a long log it tells, whatever the stamps look like.
