@@ -80,6 +80,7 @@ def test_the_report_is_valid_and_says_what_its_pictures_show(demo):
     assert '<th scope="col">' in page
 
 
+@pytest.mark.survey
 def test_the_report_in_a_browser(demo):
     check_page(demo[0] / "demo" / "report.html")
 

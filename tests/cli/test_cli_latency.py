@@ -8,7 +8,7 @@ from made_logs import flown_copter
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / "flight.bin"
-    path.write_bytes(flown_copter(seconds=5.0).data)
+    path.write_bytes(flown_copter(seconds=4.0).data)
     return path
 
 

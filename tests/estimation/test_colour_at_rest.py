@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from deadtime.estimation.likelihood import _colour_at_rest as colour
 from deadtime.estimation.likelihood._profile import common_covariance
+from marks import NIGHTLY
 from scipy import signal
 
 SAMPLE, DELAY, GAIN = 0.065, 0.3, 0.9
@@ -51,11 +52,12 @@ def flown(seed, plant=STIFF, moving_only=False):
     return dtm.Recording(TIME, STEPS, output, command)
 
 
-def test_an_estimate_under_such_noise_is_adequate_and_its_intervals_hold_the_truth():
-    fits = [dtm.estimate_delay(flown(seed), LOOP, free=FREE) for seed in range(20)]
+@pytest.mark.parametrize("flights", [7, pytest.param(20, marks=NIGHTLY)])
+def test_an_estimate_under_such_noise_is_adequate_and_its_intervals_hold_the_truth(flights):
+    fits = [dtm.estimate_delay(flown(seed), LOOP, free=FREE) for seed in range(flights)]
     assert not any(fit.whiteness.white for fit in fits)
     adequate = [fit for fit in fits if fit.adequate]
-    assert len(adequate) >= 17
+    assert len(adequate) >= 0.85 * flights
     held = [
         [low <= truth <= high for fit in adequate for low, high in [fit.ci(0.95, name)]]
         for name, truth in (("delay", DELAY), ("gain", GAIN))

@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from marks import NIGHTLY
 from scipy.signal import cont2discrete, lfilter, tf2ss
 
 SAMPLE, PARTS = 0.02, 20
@@ -104,7 +105,11 @@ def test_what_cannot_be_fitted_is_refused_by_name():
 
 @pytest.mark.parametrize(
     ("how", "expected"),
-    [({}, "a pair"), ({"lag": 0.05}, "a pair, 1 lag"), ({"damping": 1.6}, "2 lags")],
+    [
+        ({}, "a pair"),
+        pytest.param({"lag": 0.05}, "a pair, 1 lag", marks=NIGHTLY),
+        ({"damping": 1.6}, "2 lags"),
+    ],
 )
 def test_the_evidence_tells_complex_from_real_poles(how, expected):
     loop = loop_with(dtm.FirstOrder())
@@ -115,7 +120,8 @@ def test_the_evidence_tells_complex_from_real_poles(how, expected):
 
 
 @pytest.mark.parametrize("start", [0.0, 0.5])
-def test_a_command_before_the_first_row_costs_no_accuracy(start):
+@pytest.mark.parametrize("flights", [4, pytest.param(10, marks=NIGHTLY)])
+def test_a_command_before_the_first_row_costs_no_accuracy(start, flights):
     """A first command at a vehicle at rest was taken for a constant one, and the rest for air."""
     truth = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.1), dtm.P(1.0), delay=0.05, sample_time=SAMPLE)
     time = SAMPLE * np.arange(500)
@@ -124,16 +130,16 @@ def test_a_command_before_the_first_row_costs_no_accuracy(start):
     command = square - output
     names = {"delay": 0.05, "time_constant": 0.1, "gain": 1.0}
     fits = []
-    for seed in range(10):
+    for seed in range(flights):
         noise = 0.005 * np.random.default_rng(seed).standard_normal(time.size)
         data = dtm.Recording(time, square, output + noise, command=command)
         fits.append(dtm.estimate_delay(data, truth, free=("delay", "gain", "time_constant")))
     assert np.median([fit.noise.air for fit in fits]) < 1e-3
     assert np.median([fit.stderr["time_constant"] for fit in fits]) < 0.001
     # One in twenty is doubted, and one interval in twenty misses: three of ten do so in 1 %.
-    assert sum(fit.adequate for fit in fits) >= 8
+    assert sum(fit.adequate for fit in fits) >= 0.75 * flights
     for name, value in names.items():
-        assert sum(holds(fit, name, value) for fit in fits) >= 8, name
+        assert sum(holds(fit, name, value) for fit in fits) >= 0.75 * flights, name
 
 
 def test_a_plan_knows_the_numbers_of_any_plant():
@@ -142,16 +148,17 @@ def test_a_plan_knows_the_numbers_of_any_plant():
         dtm.FactoredPlant(pole_frequency=18.0, pole_damping=0.4), dtm.P(0.5), delay=0.05,
         sample_time=SAMPLE,
     )  # fmt: skip
-    experiment = dtm.Experiment.prbs(8.0, 0.2, hold=0.2, sample_time=SAMPLE)
+    experiment = dtm.Experiment.prbs(5.0, 0.2, hold=0.2, sample_time=SAMPLE)
     plan = dtm.identifiability(loop, experiment, noise=0.005)
     assert plan.free == ("delay", "gain", "pole_frequency", "pole_damping")
-    flown = plan.monte_carlo(8)
+    flown = plan.monte_carlo(4)
     for name in (*plan.free, "delay+lag"):
         assert 0.4 < flown.rmse[name] / plan.stderr[name] < 1.9, name
 
 
+@pytest.mark.long
 @pytest.mark.survey
-@pytest.mark.parametrize("air", [0.0, pytest.param(0.03, marks=pytest.mark.long)])
+@pytest.mark.parametrize("air", [0.0, 0.03])
 def test_intervals_hold_the_truth(air):
     held = dict.fromkeys((*TRUTH, "delay+lag"), 0)
     for seed in range(20):

@@ -258,16 +258,16 @@ def test_estimates_scatter_as_the_bound_says_for_any_number_of_processes():
         held_loop(), dtm.Experiment.step(), noise=0.01, free=("delay",), initial_output=0.0
     )
     seen = []
-    here = plan.monte_carlo(120, processes=1, seed=3, progress=seen.append)
-    # 120 runs: the root mean square is known to 6.5 %.
-    assert here.rmse["delay"] == pytest.approx(plan.stderr["delay"], rel=0.2)
+    here = plan.monte_carlo(60, processes=1, seed=3, progress=seen.append)
+    # 60 runs: the root mean square is known to 9 %.
+    assert here.rmse["delay"] == pytest.approx(plan.stderr["delay"], rel=0.25)
     assert here.mean_bound["delay"] == pytest.approx(plan.stderr["delay"], rel=0.05)
     assert here.coverage["delay"] >= 0.88
-    assert abs(here.bias["delay"]) < 4 * plan.stderr["delay"] / np.sqrt(120)
-    assert seen[-1] == 120
+    assert abs(here.bias["delay"]) < 4 * plan.stderr["delay"] / np.sqrt(60)
+    assert seen[-1] == 60
     assert "coverage" in here.summary()
-    # The error of the root mean square of 120 runs is 6.5 % of it.
-    assert stated(here.rmse["delay"], 0.0645 * here.rmse["delay"], "s") in here.summary()
+    # The error of the root mean square of 60 runs is 9.1 % of it.
+    assert stated(here.rmse["delay"], 0.0913 * here.rmse["delay"], "s") in here.summary()
     assert "rmse" in repr(here)
     shared = plan.monte_carlo(16, processes=2, seed=3)
     np.testing.assert_array_equal(here.estimates["delay"][:16], shared.estimates["delay"])

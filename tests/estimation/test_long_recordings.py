@@ -1,5 +1,7 @@
 """Long recordings: the search on a part, the maximum on all rows, intervals from the curvature."""
 
+from functools import cache
+
 import deadtime as dtm
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ TRUTH = dtm.ControlLoop(
 FREE = ("delay", "gain", "lag")
 
 
+@cache
 def recorded(count, quiet=0, seed=3):
     """Steps of the reference every 5 s, after `quiet` rows at rest, with noise in the loop."""
     random = np.random.default_rng(seed)

@@ -155,7 +155,7 @@ def test_a_jump_is_found_and_followed():
 
 
 def test_short_forms_of_the_survey():
-    found = drifts(6, duration=120.0, intensity=0.018)
+    found = drifts(3, duration=120.0, intensity=0.018)
     assert found.rmse < 1.25 * found.bound
     assert 0.91 < found.coverage < 0.99
     inside, after, coverage = quiet(2, 200.0)
@@ -200,6 +200,7 @@ def test_what_is_wrong_is_said():
         estimator.update(0.0, math.inf, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_a_hundred_drifts_in_wind():
     found = drifts(30)

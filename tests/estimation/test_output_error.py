@@ -8,6 +8,7 @@ from deadtime.estimation import OutputError
 from deadtime.estimation.models._held import HeldResponse
 from flights import flight_path
 from hypothesis import given, settings, strategies as st
+from marks import NIGHTLY
 from scipy.signal import lsim
 
 TS = 0.065
@@ -186,11 +187,12 @@ def test_a_window_that_begins_in_motion_uses_the_commands_before_it():
 
 
 @pytest.mark.parametrize(("Kp", "known"), [(1.31, 1.50), (3.0, 2.6)])
-def test_a_continuous_command_is_not_treated_as_held(Kp, known):
+@pytest.mark.parametrize("runs", [12, pytest.param(40, marks=NIGHTLY)])
+def test_a_continuous_command_is_not_treated_as_held(Kp, known, runs):
     # Treated as held it would shift by half a sample, with errors of 1.50 and 2.6 ms; the bounds
     # are 0.88 and 0.16 ms.
     errors = []
-    for seed in range(40):
+    for seed in range(runs):
         flight, loop = step_recordings.record_step(
             Kp=Kp, noise=0.01, seed=seed, ts=None, dt=0.01, limit=None, noise_in_loop=False
         )
@@ -255,7 +257,7 @@ def test_what_cannot_be_estimated_is_refused_with_the_reason(change, match):
 @pytest.mark.parametrize("free", [("delay",), ("delay", "gain"), ("delay", "gain", "lag")])
 def test_noise_alone_is_not_taken_for_a_response(method, free):
     flight, known = record_step(noise=0.001)
-    for seed in range(6):
+    for seed in range(3):
         output = np.random.default_rng(seed).normal(size=len(flight))
         noise = dtm.Recording(flight.time, flight.reference, output, flight.command)
         with pytest.raises(

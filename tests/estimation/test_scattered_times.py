@@ -8,6 +8,7 @@ import pytest
 from deadtime.estimation.data._stamps import on_regular_times
 from deadtime.estimation.likelihood._rows import on_same_step, rounding_of
 from deadtime.estimation.methods._method import Run
+from marks import NIGHTLY
 
 SAMPLE, DELAY, GAIN = 0.065, 0.3, 0.85
 
@@ -36,9 +37,10 @@ def jittered(seed, size=0.01):
     return times - times[0]
 
 
-def test_rows_that_are_stamped_late_are_taken_as_even():
+@pytest.mark.parametrize(("flights", "misses"), [(4, 1), pytest.param(12, 2, marks=NIGHTLY)])
+def test_rows_that_are_stamped_late_are_taken_as_even(flights, misses):
     fits = []
-    for seed in range(12):
+    for seed in range(flights):
         flight = recorded(EVEN, seed=seed)
         stamped = replace(flight, time=EVEN + 0.02 * np.random.default_rng(seed).random(EVEN.size))
         fits.append(dtm.estimate_delay(stamped, LOOP, free=("delay", "gain")))
@@ -46,7 +48,7 @@ def test_rows_that_are_stamped_late_are_taken_as_even():
     assert sum("evenly spaced" in fit.message for fit in fits) == len(fits)
     assert np.sqrt(np.mean([(fit.delay - DELAY) ** 2 for fit in fits])) < 0.003
     held = [low <= DELAY <= high for low, high in (fit.ci(0.95) for fit in fits)]
-    assert sum(held) >= 10
+    assert sum(held) >= flights - misses
 
 
 def test_rows_that_are_sampled_unevenly_keep_their_times():
@@ -81,9 +83,10 @@ def test_even_stamps_and_other_clocks_have_no_regular_times(slow):
     assert on_regular_times(Run(log, LOOP, (None, None), log.check(LOOP))) is None
 
 
-def test_uneven_samples_with_even_stamps_widen_the_interval():
+@pytest.mark.parametrize(("flights", "misses"), [(6, 2), pytest.param(16, 3, marks=NIGHTLY)])
+def test_uneven_samples_with_even_stamps_widen_the_interval(flights, misses):
     held, widths, found = [], [], 0
-    for seed in range(16):
+    for seed in range(flights):
         flight = recorded(jittered(seed, 0.02), seed=seed, noise=0.003)
         fit = dtm.estimate_delay(replace(flight, time=EVEN), LOOP, free=("delay", "gain"))
         found += "scatter_of_rows" in fit.details
@@ -92,8 +95,8 @@ def test_uneven_samples_with_even_stamps_widen_the_interval():
         widths.append(high - low)
     known = dtm.estimate_delay(recorded(EVEN, noise=0.003), LOOP, free=("delay", "gain"))
     low, high = known.ci(0.95)
-    assert found >= 12
-    assert sum(held) >= 13
+    assert found >= 0.75 * flights
+    assert sum(held) >= flights - misses
     assert np.median(widths) > 2.0 * (high - low)
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import shared_number
 from flights import flight_path
+from marks import NIGHTLY
 
 SAMPLE, DELAY = 0.02, 0.06
 LOOP = dtm.ControlLoop(dtm.FactoredPlant([0.1]), dtm.P(1.0), sample_time=SAMPLE)
@@ -64,11 +65,12 @@ def test_values_between_two_minima_are_not_forgotten():
     assert high > 0.055
 
 
-def test_the_interval_holds_the_truth():
+@pytest.mark.parametrize(("sets", "misses"), [(5, 1), pytest.param(12, 3, marks=NIGHTLY)])
+def test_the_interval_holds_the_truth(sets, misses):
     """Of 12 sets, 11 are expected; fewer than 9 have a probability below 1 %."""
-    found = [shared_number(three(100 + seed)) for seed in range(12)]
-    assert sum(one.interval[0] <= DELAY <= one.interval[1] for one in found) >= 9
-    assert sum(one.agree for one in found) >= 10
+    found = [shared_number(three(100 + seed)) for seed in range(sets)]
+    assert sum(one.interval[0] <= DELAY <= one.interval[1] for one in found) >= sets - misses
+    assert sum(one.agree for one in found) >= sets - min(misses, 2)
 
 
 def test_a_number_that_is_not_shared_is_told():

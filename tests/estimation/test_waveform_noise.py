@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import Waveform
 from deadtime.estimation.models._held import path_of
+from marks import NIGHTLY
 from scipy.signal import lsim
 
 TS = 0.065
@@ -110,15 +111,16 @@ def test_a_delay_of_the_measurement_is_estimated_like_one_of_the_command():
     assert fit.loop.delay_path == "measurement"
 
 
-def test_intervals_cover_with_noise_in_the_loop():
+@pytest.mark.parametrize(("runs", "misses"), [(20, 3), pytest.param(60, 8, marks=NIGHTLY)])
+def test_intervals_cover_with_noise_in_the_loop(runs, misses):
     held = 0
-    for seed in range(60):
+    for seed in range(runs):
         recording, known = record_step(0.01, seed, Kp=3.0)
         fit = dtm.estimate_delay(recording, known, method=Waveform(noise="loop"), free=("delay",))
         low, high = fit.ci()
         held += low <= 0.36 <= high
     # 57 of 60 expected, with a deviation of 1.7.
-    assert held >= 52
+    assert held >= runs - misses
 
 
 @pytest.mark.parametrize(

@@ -209,6 +209,7 @@ def made() -> dict[str, Any]:
     return runpy.run_path(str(script))
 
 
+@pytest.mark.long
 @pytest.mark.survey
 def test_a_module_built_again_gives_the_same_bits(web: WebKernels, made: dict[str, Any]) -> None:
     where = ["rustc", "--print", "target-libdir", "--target", "wasm32-unknown-unknown"]

@@ -348,9 +348,9 @@ def test_link_delay_and_vehicle_lag_are_estimated_from_reported_setpoint_and_cli
     # The command changes in steps; the setpoint follows it 0.1234 s later, and the climb follows
     # the setpoint with a lag of 0.15 s.
     random = np.random.default_rng(3)
-    command_time = np.arange(200) * TS
-    command = np.repeat(random.uniform(-0.5, 0.5, 40), 5)
-    time = np.arange(0.0, command_time[-1] - 0.005, 0.005)
+    command_time = np.arange(50) * TS
+    command = np.repeat(random.uniform(-0.5, 0.5, 10), 5)
+    time = np.arange(0.0, command_time[-1] - 0.01, 0.01)
     time += random.uniform(0.0, 0.002, time.size)
     rows = np.searchsorted(command_time, time - 0.1234, side="right") - 1
     setpoint = np.where(rows >= 0, command[np.maximum(rows, 0)], 0.0)
@@ -363,11 +363,11 @@ def test_link_delay_and_vehicle_lag_are_estimated_from_reported_setpoint_and_cli
         speed += 5e-4 * (0.8 * value - speed) / 0.15
     climb = np.interp(time, fine, speeds) + random.normal(0.0, 0.01, time.size)
     split = split_delay([telemetry_of((time, setpoint, climb, climb), command_time, command)])
-    # The setpoint is seen in the first message after its change, by up to 5 ms later.
-    assert 0.1234 <= split.transport.delay <= 0.1284
+    # The setpoint is seen in the first message after its change, by up to 12 ms later.
+    assert 0.1234 <= split.transport.delay <= 0.1354
     assert split.transport.gain == pytest.approx(1.0, abs=0.01)
     assert split.vehicle_delay == pytest.approx(0.15, abs=0.01)
-    assert split.vehicle.gain == pytest.approx(0.8, abs=0.01)
+    assert split.vehicle.gain == pytest.approx(0.8, abs=0.02)
 
 
 def test_the_simulated_vehicle_is_the_kit_plant():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from deadtime.flights._arrivals import Effects, as_they_took_effect, error_of_mean
 from deadtime.flights._plants import fit_by_evidence
+from marks import NIGHTLY
 from uneven_link import LAG, SAMPLE, STEP, flight
 
 #: Of the link in each direction: mean and standard deviation of its delays, s, and what it loses.
@@ -44,11 +45,12 @@ def by_known_plant(folder, seed):
     return from_the_mean(fit.with_error_beside(error_of_mean([flown.effects])), age)
 
 
-def test_the_estimate_is_the_mean_of_the_delays(tmp_path):
-    errors, held = zip(*[by_evidence(tmp_path, seed) for seed in range(3)], strict=True)
-    assert all(held)
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=NIGHTLY) for k in (1, 2))])
+def test_the_estimate_is_the_mean_of_the_delays(tmp_path, seed):
+    error, is_held = by_evidence(tmp_path, seed)
+    assert is_held
     # The first commands of two steps alone have 17 ms.
-    assert np.sqrt(np.mean(np.square(errors))) < 0.008
+    assert abs(error) < 0.012
 
 
 @pytest.mark.long

@@ -380,7 +380,7 @@ def test_without_a_writable_folder_nothing_is_run(where, tmp_path, monkeypatch):
 
 
 def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
-    network = ["--jitter", "0.01", "--loss", "0.05", "--duration", "4"]
+    network = ["--jitter", "0.01", "--loss", "0.05", "--duration", "2", "--sample-time", "0.04"]
     arguments = [*network, "--gain", "8", "--json", "--seed", "3"]
     # In two processes, because within one the order of sets would be the same.
     whole = [sys.executable, "-m", "deadtime", "internet-loop", "--virtual-time", *arguments]
@@ -393,7 +393,7 @@ def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
     assert one.returncode == 0, one.stderr
     assert one.stdout == other.stdout
     found = json.loads(one.stdout)
-    assert found["runs"][0]["plant"]["link"]["lost"] > 5
+    assert found["runs"][0]["plant"]["link"]["lost"] > 2
     assert found["table_1"]["8.0"] == pytest.approx(0.1037, abs=1e-4)
     for end in ("plant", "controller"):
         files = [tmp_path / name / f"01-gain-8-{end}.csv" for name in ("a", "b")]

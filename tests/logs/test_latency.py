@@ -10,6 +10,7 @@ from browser import check_page
 from deadtime._base.digits import between, rounded, shown, stated
 from deadtime.logs.latencies._contradictions import doubted_by_others
 from deadtime.logs.latencies._filters import notch, one_pole, poles_in_row, two_poles
+from deadtime.logs.latencies._latency import _told
 from deadtime.logs.latencies._live import around_the_vehicle
 from deadtime.logs.latencies._relation import relation_of
 from deadtime.logs.latencies._windows import others_of, window_of
@@ -30,7 +31,7 @@ def log_of(folder, **options):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    return dtm.latency(log_of(tmp_path_factory.mktemp("log"), seconds=12.0))
+    return dtm.latency(log_of(tmp_path_factory.mktemp("log"), seconds=8.0))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,7 @@ def other(tmp_path_factory):
 def slow(tmp_path_factory):
     """The time from actuator to response of a vehicle with eight times the delay."""
     log = log_of(tmp_path_factory.mktemp("log"), seconds=SECONDS, delay=8 * DELAY)
-    return dtm.latency(log).loop("roll rate", "actuator")
+    return _told(log, log.loop("roll rate"), "actuator")
 
 
 def test_the_vehicle_is_told_from_its_own_log(found):
@@ -244,8 +245,8 @@ def test_a_recorded_rate_sweep():
         output="roll_rate_rad_s",
         command="roll_torque_setpoint",
     )
-    # Three seconds of the sweep tell it.
-    (one,) = dtm.latency(flight.window(8.0, 11.0)).loops
+    # Two seconds of the sweep tell it.
+    (one,) = dtm.latency(flight.window(8.0, 10.0)).loops
     value, _, _ = one.sum_of()
     assert 0.016 <= value <= 0.0205  # with half of a hold of 4 ms
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from blackbox_logs import END, SIGNED, UNSIGNED, Log, rate_log, rate_rows
 from crazyflie_logs import definitions, record, sealed
+from deadtime.logs.latencies._latency import _told
 from flights import flight_path
 from sampled_loops import RATE, fly
 
@@ -168,7 +169,7 @@ def test_the_estimator_of_a_crazyflie_counts_pitch_as_its_controller(tmp_path):
 
 @pytest.mark.parametrize("axis", ["roll", "yaw"])
 def test_the_time_from_the_motors_of_a_crazyflie_to_its_rate(tmp_path, axis):
-    flight = fly(replace(RATE, period=0.002, seconds=2.5), np.random.default_rng(4))
+    flight = fly(replace(RATE, period=0.002, seconds=2.0), np.random.default_rng(4))
     sent = dict.fromkeys(("roll", "pitch", "yaw"), np.zeros(flight.time.size))
     sent[axis] = 2000.0 * flight.sent / np.max(np.abs(flight.sent))
     if axis == "yaw":
@@ -179,7 +180,7 @@ def test_the_time_from_the_motors_of_a_crazyflie_to_its_rate(tmp_path, axis):
         **motors(40_000.0, **sent),
     }
     log = opened(tmp_path, crazyflie_log(columns))
-    one = dtm.latency(log).loop(f"{axis} rate", "actuator")
+    one = _told(log, log.loop(f"{axis} rate"), "actuator")
     low, high = one.sum_of()[2]
     assert one.estimate.adequate, one.estimate.message
     assert low < flight.delay_plus_lag < high

@@ -4,9 +4,10 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from marks import NIGHTLY
 
 #: Rows of a simulated flight.
-ROWS = 500
+ROWS = 300
 
 TIME = np.linspace(0.0, 1.9, 20)
 SENT = (np.array([-0.5, 0.33, 0.34, 1.2, 5.0]), np.array([0.0, 1.0, 2.0, -1.0, 3.0]))
@@ -105,7 +106,7 @@ def flight(seed, integrates):
 @pytest.mark.parametrize("integrates", [True, False])
 def test_the_times_of_commands_are_those_of_the_estimate(integrates):
     errors, covered = [], 0
-    for seed in range(1 if integrates else 2):
+    for seed in range(1):
         sent, time, output, delay, lag = flight(seed, integrates)
         told = dtm.Recording(time, np.zeros(time.size), output, sent=sent)
         loop = dtm.ControlLoop(dtm.FactoredPlant([0.04], integrator=integrates), dtm.P(1.0))
@@ -177,14 +178,15 @@ def test_commands_that_are_logged_when_they_change_hold_until_the_next():
     assert held >= adequate - 4
 
 
-def test_commands_that_the_log_has_lost_at_a_step_are_unknown():
+@pytest.mark.parametrize(("flights", "misses"), [(5, 1), pytest.param(12, 3, marks=NIGHTLY)])
+def test_commands_that_the_log_has_lost_at_a_step_are_unknown(flights, misses):
     def kept(seed, reference, command):
         rows = np.random.default_rng(100 + seed).uniform(size=command.size) > 0.1
         rows[np.flatnonzero(np.diff(reference)) + 1] = False
         return rows | (np.arange(command.size) == 0)
 
-    error, adequate, held, known = estimated(12, kept)
-    assert known == 12
+    error, adequate, held, known = estimated(flights, kept)
+    assert known == flights
     assert error < 0.005  # 3.5 ms, and 8 where each is the mean of those around it
-    assert adequate >= 9
-    assert held >= adequate - 3
+    assert adequate >= flights - misses
+    assert held >= adequate - misses

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from deadtime._base.digits import between
 from deadtime.tuning._region import region_of
+from marks import NIGHTLY
 from scipy import special
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
@@ -157,7 +158,7 @@ def test_gains_for_the_worst_of_a_wide_region_are_found_far_from_those_for_its_e
     assert 6.0 <= least < 6.0 * 1.01
 
 
-@pytest.mark.parametrize("flights", [2, pytest.param(8, marks=pytest.mark.survey)])
+@pytest.mark.parametrize("flights", [1, pytest.param(8, marks=NIGHTLY)])
 def test_flights_in_gusts(flights):
     """Demanded is a gain margin of 2.5. A second number is what the design promised."""
     condition = next(one for one in CONDITIONS if one.name == "gust 0.05 1 s")
