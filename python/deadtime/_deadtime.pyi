@@ -781,7 +781,7 @@ def feedback_polynomials(
     controller: _ControllerForm, numbers: list[float]
 ) -> tuple[list[float], list[float]]: ...
 def sampled_filter(
-    F: _Reals, G: _Reals, C: _Reals, sample_time: float, rule: str
+    f: _Reals, g: _Reals, c: _Reals, sample_time: float, rule: str
 ) -> tuple[_Reals, _Reals, _Reals, float]: ...
 
 # --- systems --------------------------------------------------------------------------
