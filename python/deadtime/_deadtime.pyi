@@ -1004,6 +1004,7 @@ def blackbox_frames(log: bytes, layout: _BlackboxLayout, limit: int) -> Blackbox
 class CsvColumns:
     values: Final[list[NDArray[np.float64]]]
     backward: Final[tuple[int, float, float] | None]
+    repeated: Final[tuple[int, float, float] | None]
 
 class _CsvLayout(Protocol):
     @property
