@@ -24,7 +24,7 @@ CORE_ARROWS = {
     "frequency": {"elementary", "quasipoly", "roots", "dde", "stability"},
     "dde": {"linear_algebra", "elementary"},
     "loops": {"linear_algebra", "quasipoly", "dde", "stability", "frequency"},
-    "estimation": {"linear_algebra"},
+    "estimation": {"linear_algebra", "elementary", "quasipoly", "frequency"},
 }
 
 # Files and folders of a package in order: each uses only those before it.
@@ -122,6 +122,7 @@ ORDER = {
         "fit",
         "profile",
         "online",
+        "family",
     ],
 }
 
