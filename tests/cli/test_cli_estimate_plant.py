@@ -23,8 +23,8 @@ def files(tmp_path_factory):
     write(folder / "sine.csv", {"t": time, "u": command, "y": output})
     write(folder / "still.csv", {"t": time, "u": np.ones(time.size), "y": output})
     rng = np.random.default_rng(3)
-    deaf = rng.normal(0.0, 0.1, 400)
-    write(folder / "deaf.csv", {"t": np.arange(400), "u": moves(400, 20, 1.0, rng), "y": deaf})
+    deaf = rng.normal(0.0, 0.1, 150)
+    write(folder / "deaf.csv", {"t": np.arange(150), "u": moves(150, 20, 1.0, rng), "y": deaf})
     return folder
 
 
@@ -73,7 +73,7 @@ def test_missing_outputs_do_not_matter(files):
 
 
 def test_a_window_has_the_commands_before_it(files):
-    told = found("estimate", "bump.csv", "--window", 185, 390, cwd=files)
+    told = found("estimate", "bump.csv", "--window", 125, 290, cwd=files)
     assert told["verdict"] != "none"
     assert told["parameters"]["delay"] == pytest.approx(DEAD, abs=3.0)
 
@@ -81,7 +81,6 @@ def test_a_window_has_the_commands_before_it(files):
 def test_one_sine_is_never_reliable_and_what_it_tells_is_said(files):
     result = run("estimate", "sine.csv", cwd=files)
     assert verdict_of(result) != "reliable"
-    assert " of the " in result.stdout
     assert "rad/s: gain" in result.stdout
     following = pasted(result, files)
     if following is not None:
@@ -148,9 +147,9 @@ def test_a_name_with_blanks_can_be_pasted(tmp_path):
 
 
 def test_a_record_that_begins_with_its_step_is_told_to_say_rest(tmp_path):
-    time = np.arange(300.0)
+    time = np.arange(200.0)
     command = np.where(time < 1.0, 0.0, 5.0)
-    output = first_order(time, command) + np.random.default_rng(1).normal(0.0, 0.05, 300)
+    output = first_order(time, command) + np.random.default_rng(1).normal(0.0, 0.05, 200)
     write(tmp_path / "step.csv", {"t": time, "u": command, "y": output})
     result = run("estimate", "step.csv", cwd=tmp_path)
     if verdict_of(result) != "reliable":

@@ -32,16 +32,16 @@ def moves(rows, hold, size, rng, start=0.0):
     return start + size * np.repeat(signs, hold)[:rows]
 
 
-def bump(seed=1, rows=400, noise=NOISE):
+def bump(seed=1, rows=300, noise=NOISE):
     """Time, command and output of a valve that moves up, down and up again."""
     rng = np.random.default_rng(seed)
     time = np.arange(float(rows))
-    command = np.select([time < 60, time < 180, time < 300], [40.0, 45.0, 38.0], 43.0)
+    command = np.select([time < 40, time < 120, time < 210], [40.0, 45.0, 38.0], 43.0)
     output = first_order(time, command, start=GAIN * 40.0)
     return time, command, output + rng.normal(0.0, noise, rows)
 
 
-def sine(rows=400, seed=1):
+def sine(rows=200, seed=1):
     """One sine that ran before the first row, through a delay of 0.3 s and a lag of 0.5 s."""
     time = 0.05 * np.arange(rows)
     wave = np.exp(1j * 3.0 * time) * np.exp(-0.9j) / (1.0 + 1.5j)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import deadtime.estimation._native as native
-from deadtime._base.digits import shown
+from deadtime._base.digits import time_unit
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant, RationalPlant
 
@@ -57,7 +57,7 @@ class PlantCandidate(ReadOnlyArrays):
         if self.name == "delay":
             return "a pure delay"
         kind = "a process that " + ("integrates" if self.integrates else "comes to rest")
-        lags = [shown(lag, 0.05 * lag, "s") for lag in self.lags]
+        lags = [_time(lag) for lag in self.lags]
         if "pole_frequency" in numbers:
             kind += (
                 f" and swings: {numbers['pole_frequency']:.3g} rad/s, damping "
@@ -68,7 +68,7 @@ class PlantCandidate(ReadOnlyArrays):
         elif lags:
             kind += f", time constant{'s' if len(lags) > 1 else ''} {' and '.join(lags)}"
         if numbers.get("zero"):
-            kind += f", zero {shown(numbers['zero'], 0.05 * abs(numbers['zero']), 's')}"
+            kind += f", zero {_time(numbers['zero'])}"
         return kind
 
     def formula(self) -> str:
@@ -85,6 +85,12 @@ class PlantCandidate(ReadOnlyArrays):
             above += f"*({numbers['zero']:.6g}*s+1)"
         below = "*".join(factors)
         return f"{above}/{below if len(factors) == 1 else f'({below})'}" if factors else above
+
+
+def _time(value: float) -> str:
+    """A time in the unit that suits it, with three digits."""
+    unit, size = time_unit(value)
+    return f"{value / size:.3g} {unit}"
 
 
 def candidate_of(found: native.FamilyCandidate, best: float) -> PlantCandidate:
