@@ -67,6 +67,13 @@ impl Class {
         names
     }
 
+    /// Is the other class this one with lags of zero, or none of its zero?
+    pub(super) fn contains(self, other: Self) -> bool {
+        self.integrating == other.integrating
+            && self.order >= other.order
+            && (self.has_zero || !other.has_zero)
+    }
+
     /// How many numbers are searched: all but the gain.
     pub(super) fn searched(self) -> usize {
         1 + self.order + usize::from(self.has_zero)
@@ -105,17 +112,6 @@ impl Numbers {
             "lag_product" => self.product,
             _ => self.zero,
         }
-    }
-
-    /// With another value of a number.
-    pub(super) fn with(mut self, name: &str, value: f64) -> Self {
-        match name {
-            "delay" => self.delay = value,
-            "lag" | "lag_sum" => self.sum = value,
-            "lag_product" => self.product = value,
-            _ => self.zero = value,
-        }
-        self
     }
 
     /// Are the poles a complex pair?

@@ -2,12 +2,13 @@
 
 use super::candidate::Candidate;
 use super::class::Class;
-use super::hull::{Named, Turning, at, hull};
+use super::excitation::excited;
+use super::hull::{Named, at, hull, turning};
 use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Record, Rows, Start};
 use super::tolerances::{EVIDENCE, RANGES};
-use super::verdict::{Verdict, verdict};
+use super::verdict::{Verdict, shifted, verdict};
 use crate::{Error, Task};
 
 /// Rows that a fit needs beyond its numbers.
@@ -83,10 +84,6 @@ impl Family {
     }
 }
 
-fn turning<'a>(all: &'a [Candidate], task: &Task) -> Result<Vec<Turning<'a>>, Error> {
-    all.iter().map(|one| Turning::new(one, task)).collect()
-}
-
 /// Fit the family.
 ///
 /// # Errors
@@ -128,7 +125,49 @@ pub fn fit_family(record: &Record, question: &Question, task: &Task) -> Result<F
     }
     let mut out = best.ok_or_else(|| Error::argument("no kind of command was given"))?;
     out.decided = decided;
-    Ok(out)
+    moved(record, question, start, &out, task).map(|moved| moved.unwrap_or(out))
+}
+
+/// The family with the command a row earlier, where no delay is too much and that is better. In a
+/// closed loop it would be the controller.
+fn moved(
+    record: &Record,
+    question: &Question,
+    start: Start,
+    found: &Family,
+    task: &Task,
+) -> Result<Option<Family>, Error> {
+    let Some(best) = found.candidates.first() else {
+        return Ok(None);
+    };
+    if question.in_loop || best.numbers.delay > 0.0 {
+        return Ok(None);
+    }
+    let mut earlier = record.clone();
+    earlier.command.rotate_left(1);
+    if let [.., before, last] = &mut earlier.command[..] {
+        *last = *before;
+    }
+    let mut out = one_kind(&earlier, question, start, found.straight, task)?;
+    let fall = out.candidates.first().map_or(0.0, |own| best.deviance - own.deviance);
+    out.shift = -1;
+    out.decided = found.decided;
+    out.verdict = shifted(out.verdict, fall);
+    Ok((fall > EVIDENCE.shifted).then_some(out))
+}
+
+/// Classes that contain the best one and whose further number the record does not tell say nothing
+/// new: their errors have no end, their likelihood is that of the best.
+fn leave_out_what_adds_nothing(minima: &mut Vec<Candidate>) {
+    let Some(best) = minima.first().map(|best| (best.class, best.deviance)) else {
+        return;
+    };
+    minima.retain(|one| {
+        one.class == best.0
+            || !one.class.contains(best.0)
+            || one.told == one.values.len()
+            || best.1 - one.deviance > EVIDENCE.adds
+    });
 }
 
 fn one_kind(
@@ -184,7 +223,8 @@ fn answer(
     task: &Task,
 ) -> Result<Family, Error> {
     let candidate = |one: &Minimum<'_>| Candidate::new(one, question.level);
-    let minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
+    let mut minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
+    leave_out_what_adds_nothing(&mut minima);
     let mut candidates: Vec<Candidate> = Vec::new();
     for one in found {
         if candidates.iter().all(|known| known.class != one.model.class) {
@@ -204,7 +244,7 @@ fn answer(
         rows: rows.map_or(0, |rows| rows.used.len()),
         first_row: rows.and_then(|rows| rows.used.first().copied()).unwrap_or(0),
         shift: 0,
-        excited: Vec::new(),
+        excited: rows.map_or(Vec::new(), excited),
         minima,
     })
 }

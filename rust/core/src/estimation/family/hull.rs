@@ -1,9 +1,14 @@
 //! Intervals over all classes that the record does not tell from the best.
 
+use std::f64::consts::{PI, TAU};
+
 use super::candidate::Candidate;
 use super::loop_view::Seen;
-use crate::elementary::exp;
+use crate::elementary::{exp, log};
 use crate::{Error, Task};
+
+/// A value and the ends of its interval.
+pub(super) type Triple = (f64, f64, f64);
 
 /// An interval of a named quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,22 +23,61 @@ pub struct Named {
     pub high: f64,
 }
 
-/// A candidate with the frequency at which its largest stable gain oscillates.
+/// A candidate as the best one sees it: classes of the other kind have other signs and turns.
 pub(super) struct Turning<'a> {
     pub(super) candidate: &'a Candidate,
+    /// The frequency at which its largest stable gain oscillates.
     pub(super) turn: Option<f64>,
+    /// Added to its phase: half turns that make it comparable with the best.
+    offset: f64,
+    /// Those of the integrators of the best.
+    turns: f64,
 }
 
-impl<'a> Turning<'a> {
-    pub(super) fn new(candidate: &'a Candidate, task: &Task) -> Result<Self, Error> {
-        let turn = match candidate.seen().turn(task) {
-            Err(error) if error.ends_all() => return Err(error),
-            Err(_) => None,
-            Ok(turn) => turn,
+/// All candidates, the best first, each compared with it.
+pub(super) fn turning<'a>(all: &'a [Candidate], task: &Task) -> Result<Vec<Turning<'a>>, Error> {
+    let Some(best) = all.first() else {
+        return Ok(Vec::new());
+    };
+    let seen = best.seen();
+    let turn = own_turn(&seen, task)?;
+    let finite = turn.filter(|turn| turn.is_finite());
+    let mut out = Vec::with_capacity(all.len());
+    for candidate in all {
+        let other = candidate.seen();
+        let mut offset = 0.0;
+        let own = match finite {
+            Some(turn) => {
+                let differ = other.sign() * seen.sign() < 0.0;
+                let half = if differ { PI } else { 0.0 };
+                let off = seen.phase(turn) - other.phase(turn) - half;
+                offset = half + (off / TAU).round() * TAU;
+                let target = seen.phase(turn) - offset;
+                Some(other.passing(turn, target))
+            }
+            None if out.is_empty() => turn,
+            None => own_turn(&other, task)?,
         };
-        Ok(Self { candidate, turn })
+        out.push(Turning {
+            candidate,
+            turn: own,
+            offset,
+            turns: seen.turns(),
+        });
     }
+    Ok(out)
+}
 
+fn own_turn(seen: &Seen, task: &Task) -> Result<Option<f64>, Error> {
+    match seen.turn(task) {
+        Err(error) if error.ends_all() => Err(error),
+        // A gain too far from one for its margins: no gain is known to be largest.
+        Err(_) => Ok(None),
+        Ok(turn) => Ok(turn),
+    }
+}
+
+impl Turning<'_> {
     fn finite_turn(&self) -> Option<f64> {
         self.turn.filter(|turn| turn.is_finite())
     }
@@ -43,31 +87,47 @@ impl<'a> Turning<'a> {
     }
 
     /// The size of the largest stable gain; infinite where none is.
-    pub(super) fn largest(&self) -> (f64, f64, f64) {
+    pub(super) fn largest(&self) -> Triple {
         match self.turn {
             None => (f64::INFINITY, f64::INFINITY, f64::INFINITY),
-            Some(turn) => {
-                let (value, low, high) = self.candidate.interval(|seen| seen.log_largest(turn));
-                (exp(value), exp(low), exp(high))
-            }
+            Some(turn) => exponential(self.candidate.interval(|seen| seen.log_largest(turn))),
         }
+    }
+
+    /// The delay and its interval.
+    pub(super) fn delay(&self) -> Triple {
+        self.candidate.interval(|seen| seen.numbers.delay)
+    }
+
+    pub(super) fn phase(&self, seen: &Seen, omega: f64) -> f64 {
+        seen.phase(omega) + self.offset
+    }
+
+    /// −(arg G + 90° for each integrator of the best)/ω.
+    fn equivalent_delay(&self, seen: &Seen, omega: f64) -> f64 {
+        -(self.phase(seen, omega) + self.turns) / omega
     }
 }
 
+fn exponential((value, low, high): Triple) -> Triple {
+    (exp(value), exp(low), exp(high))
+}
+
 /// Gain, phase and equivalent delay at a frequency, each with its ends, over all of these.
-pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [(f64, f64, f64); 3] {
-    let over = |of: &dyn Fn(&Seen) -> f64| union(all.iter().map(|one| one.candidate.interval(of)));
-    let gain = over(&|seen| seen.log_gain(omega));
+pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [Triple; 3] {
+    let over = |of: &dyn Fn(&Turning<'_>, &Seen) -> f64| {
+        union(all.iter().map(|one| one.candidate.interval(|seen| of(one, seen))))
+    };
     [
-        (exp(gain.0), exp(gain.1), exp(gain.2)),
-        over(&|seen| seen.phase(omega)),
-        over(&|seen| seen.equivalent_delay(omega)),
+        exponential(over(&|_, seen| seen.log_gain(omega))),
+        over(&|one, seen| one.phase(seen, omega)),
+        over(&|one, seen| one.equivalent_delay(seen, omega)),
     ]
 }
 
 /// The first value with the least and the largest end.
-fn union(parts: impl Iterator<Item = (f64, f64, f64)>) -> (f64, f64, f64) {
-    let join = |a: (f64, f64, f64), b: (f64, f64, f64)| (a.0, a.1.min(b.1), a.2.max(b.2));
+fn union(parts: impl Iterator<Item = Triple>) -> Triple {
+    let join = |a: Triple, b: Triple| (a.0, a.1.min(b.1), a.2.max(b.2));
     parts.reduce(join).unwrap_or((f64::NAN, f64::NAN, f64::NAN))
 }
 
@@ -76,33 +136,33 @@ pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
     let Some(best) = all.first() else {
         return Vec::new();
     };
+    let kind = best.candidate.class.integrating;
+    let same = || all.iter().filter(|one| one.candidate.class.integrating == kind);
     let mut out = Vec::new();
-    let mut add = |name, (value, low, high): (f64, f64, f64)| {
+    let mut add = |name, (value, low, high): Triple| {
         out.push(Named { name, value, low, high });
     };
-    let plain = |of: &dyn Fn(&Seen) -> f64, one: &Turning<'_>| one.candidate.interval(of);
-    let (value, low, high) = union(all.iter().map(|one| plain(&|seen| seen.numbers.delay, one)));
+    let (value, low, high) = union(all.iter().map(Turning::delay));
     add("delay", (value, low.max(0.0), high));
-    let kind = best.candidate.class.integrating;
-    let same = all.iter().filter(|one| one.candidate.class.integrating == kind);
-    add("gain", union(same.map(|one| plain(&|seen| seen.gain, one))));
-    let lag = |seen: &Seen| seen.numbers.lags().first().copied().unwrap_or(seen.numbers.sum);
+    // An integrator beside a slow zero has the gain of neither.
+    let alike = same().filter(|one| one.candidate.gain * best.candidate.gain > 0.0);
+    add("gain", union(alike.map(|one| one.candidate.interval(|seen| seen.gain))));
     if let Some(largest) = best.candidate.numbers.lags().first() {
-        let same = all.iter().filter(|one| {
-            one.candidate.class.integrating == kind && !one.candidate.numbers.lags().is_empty()
-        });
-        let (_, low, high) = union(same.map(|one| plain(&lag, one)));
+        let lag = |seen: &Seen| seen.numbers.lags().first().copied().unwrap_or(0.5 * seen.numbers.sum);
+        let real = same().filter(|one| !one.candidate.numbers.lags().is_empty());
+        let (_, low, high) = union(real.map(|one| one.candidate.interval(lag)));
         add("lag", (*largest, low.max(0.0), high));
     }
-    let sign = if best.candidate.gain < 0.0 { -1.0 } else { 1.0 };
+    let sign = best.candidate.seen().sign();
     let (value, low, high) = union(all.iter().map(Turning::largest));
     let [low, high] = if sign > 0.0 { [low, high] } else { [-high, -low] };
     add("largest_gain", (sign * value, low, high));
     if let Some(omega) = best.crossover() {
-        let places = all.iter().filter_map(|one| one.finite_turn().map(|turn| (one, turn)));
-        let over = places.map(|(one, turn)| {
+        let over = all.iter().filter_map(|one| {
+            let turn = one.finite_turn()?;
             let near = one.candidate.seen().crossover(turn);
-            plain(&|seen: &Seen| seen.crossover_near(near, turn), one)
+            let log_crossover = |seen: &Seen| log(seen.crossover_near(near, turn));
+            Some(exponential(one.candidate.interval(log_crossover)))
         });
         add("crossover", union(over));
         let [gain, phase, delay] = at(all, omega);

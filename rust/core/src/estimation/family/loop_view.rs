@@ -68,6 +68,11 @@ impl Seen {
         log(self.gain.abs()) + 0.5 * (log(1.0 + square(zero * omega)) - log(poles)) - integrator
     }
 
+    /// The gain is that at ω = 0, and may be negative where that at crossover is not.
+    pub(super) fn sign(&self) -> f64 {
+        1.0_f64.copysign(self.gain)
+    }
+
     /// arg G of a positive gain, without jumps.
     pub(super) fn phase(&self, omega: f64) -> f64 {
         let Numbers { delay, sum, product, zero } = self.numbers;
@@ -75,13 +80,8 @@ impl Seen {
         angle(zero * omega, 1.0) - poles - delay * omega - self.turns()
     }
 
-    fn turns(&self) -> f64 {
+    pub(super) fn turns(&self) -> f64 {
         if self.class.integrating { 0.5 * PI } else { 0.0 }
-    }
-
-    /// −(arg G + 90° for an integrator)/ω.
-    pub(super) fn equivalent_delay(&self, omega: f64) -> f64 {
-        -(self.phase(omega) + self.turns()) / omega
     }
 
     /// The frequency at which the largest stable proportional gain oscillates; none where no gain is
@@ -109,13 +109,18 @@ impl Seen {
     }
 
     /// The same beside a known one, for numbers that have moved.
-    fn turn_near(&self, omega: f64) -> f64 {
+    pub(super) fn turn_near(&self, omega: f64) -> f64 {
         if omega == f64::INFINITY {
             return omega;
         }
-        // The odd multiple of 180 degrees that is meant.
-        let target = ((self.phase(omega) / PI - 1.0) / 2.0).round() * 2.0 * PI + PI;
-        solved(omega, |omega| self.phase(omega) - target)
+        // The multiple of 180 degrees that is meant.
+        let target = (self.phase(omega) / PI).round() * PI;
+        self.passing(omega, target)
+    }
+
+    /// The frequency near this one where the phase passes a value.
+    pub(super) fn passing(&self, omega: f64, phase: f64) -> f64 {
+        solved(omega, |omega| self.phase(omega) - phase)
     }
 
     /// ln of the largest stable gain.

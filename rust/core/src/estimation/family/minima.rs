@@ -111,9 +111,15 @@ fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Err
 
 /// The minima from these starts, the best first.
 fn distinct<'a>(model: &Model<'a>, starts: Vec<Vec<f64>>, task: &Task) -> Result<Vec<Minimum<'a>>, Error> {
-    let mut found: Vec<Minimum<'a>> = Vec::new();
+    let mut points: Vec<Point> = Vec::with_capacity(starts.len());
     for start in starts {
-        found.push(Minimum::new(*model, minimum(model, start, task)?));
+        task.check()?;
+        points.push(model.at(start));
+    }
+    points.sort_by(|a, b| a.squares.total_cmp(&b.squares));
+    let mut found: Vec<Minimum<'a>> = Vec::new();
+    for point in points.into_iter().take(STARTS.followed) {
+        found.push(Minimum::new(*model, minimum(model, point, task)?));
     }
     found.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
     let mut out: Vec<Minimum<'a>> = Vec::new();
@@ -142,9 +148,16 @@ fn under<'a>(
             noise: kind,
             responds: true,
         };
-        let mut starts = Vec::new();
+        let mut starts = if kind == Noise::Arma11 {
+            grid(&model, task)?
+        } else {
+            Vec::new()
+        };
         let own = before.iter().filter(|known| known.model.class == class);
-        for known in own.filter(|known| known.bic < best + EVIDENCE.hopeless) {
+        let hopeful = |known: &&Minimum<'a>| {
+            known.model.noise == Noise::White || known.bic < best + EVIDENCE.hopeless
+        };
+        for known in own.filter(hopeful) {
             let plant = known.model.plant_numbers();
             let mut x = known.point.x[..plant].to_vec();
             x.extend(noise(&model, &known.point, &known.point.x[plant..]));
@@ -177,7 +190,7 @@ pub(super) fn without_plant<'a>(plan: &Plan<'a>, task: &Task) -> Result<f64, Err
         };
         let start = model.at(vec![0.0; model.searched()]);
         let x = noise(&model, &start, &known);
-        let found = Minimum::new(model, minimum(&model, x, task)?);
+        let found = Minimum::new(model, minimum(&model, model.at(x), task)?);
         known.clone_from(&found.point.x);
         least = least.min(found.bic);
     }

@@ -13,6 +13,7 @@
 mod candidate;
 mod class;
 mod dispersion;
+mod excitation;
 mod fit;
 mod hull;
 mod loop_view;

@@ -118,7 +118,7 @@ impl Model<'_> {
         }
         if self.class.has_zero {
             let at = 1 + self.class.order;
-            x[at] = x[at].clamp(-slowest, slowest);
+            x[at] = x[at].clamp(-RANGES.inverse * rows.span, slowest);
         }
     }
 

@@ -232,10 +232,6 @@ impl<'a> Whitener<'a> {
         out
     }
 
-    pub(super) fn coefficients(&self) -> Coefficients {
-        self.coefficients
-    }
-
     /// What the innovations are multiplied by where the filter has settled.
     pub(super) fn factor(&self) -> f64 {
         self.factor

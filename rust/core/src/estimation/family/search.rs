@@ -10,10 +10,8 @@ use crate::{Error, Task};
 const FLOOR: f64 = 1e-12;
 
 /// The minimum from a start.
-pub(super) fn minimum(model: &Model<'_>, start: Vec<f64>, task: &Task) -> Result<Point, Error> {
-    let mut x = start;
-    model.clamp(&mut x);
-    let mut best = model.at(x);
+pub(super) fn minimum(model: &Model<'_>, start: Point, task: &Task) -> Result<Point, Error> {
+    let mut best = start;
     let mut damping = SEARCH.damping;
     let count = model.rows.used.len() as f64;
     for _ in 0..SEARCH.steps {

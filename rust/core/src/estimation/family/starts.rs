@@ -7,11 +7,18 @@ use super::tolerances::{RANGES, STARTS};
 use crate::elementary::{exp, log};
 use crate::{Error, Task};
 
-/// The best points of a grid for a class without a zero under white noise.
+/// Numbers of the noise under which a drift explains little: a correlation near one.
+const DRIFTING: f64 = 10.0;
+
+/// The best points of a grid for a class without a zero, under white noise or a drift.
 pub(super) fn grid(model: &Model<'_>, task: &Task) -> Result<Vec<Vec<f64>>, Error> {
     let class = model.class;
     if class.has_zero {
         return Ok(Vec::new());
+    }
+    let mut noise = vec![0.0; model.noise.searched()];
+    if let Some(correlation) = noise.first_mut() {
+        *correlation = DRIFTING;
     }
     let delays = if class.order == 0 {
         STARTS.delays
@@ -25,7 +32,7 @@ pub(super) fn grid(model: &Model<'_>, task: &Task) -> Result<Vec<Vec<f64>>, Erro
         let share = step as f64 / (delays - 1) as f64;
         let delay = model.rows.largest_delay * share * share;
         for shape in shapes(model) {
-            let x = model.point_of(&Numbers { delay, ..shape }, &[]);
+            let x = model.point_of(&Numbers { delay, ..shape }, &noise);
             let squares = model.at(x.clone()).squares;
             points.push((squares, x));
         }
@@ -33,7 +40,7 @@ pub(super) fn grid(model: &Model<'_>, task: &Task) -> Result<Vec<Vec<f64>>, Erro
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<Vec<f64>> = Vec::new();
     for (_, x) in points {
-        if out.len() < STARTS.followed && out.iter().all(|known| are_apart(model, known, &x)) {
+        if out.len() < STARTS.gridded && out.iter().all(|known| are_apart(model, known, &x)) {
             out.push(x);
         }
     }

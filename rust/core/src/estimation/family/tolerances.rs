@@ -4,6 +4,8 @@
 pub(super) struct Ranges {
     /// Largest delay as a share of the record where none is given: more rows at the start are left out.
     pub(super) delay_share: f64,
+    /// Most inverse response, as a zero in spans: a slower one is a drift under another name.
+    pub(super) inverse: f64,
     /// Most time constants and zeros, in spans of the record: slower ones look like integrators.
     pub(super) slowest: f64,
     /// Shortest lag in rows: faster ones look like delays.
@@ -20,6 +22,7 @@ pub(super) struct Ranges {
 
 pub(super) const RANGES: Ranges = Ranges {
     delay_share: 0.3,
+    inverse: 0.3,
     slowest: 20.0,
     fastest: 0.05,
     fastest_in_loop: 0.5,
@@ -70,7 +73,9 @@ pub(super) struct Starts {
     pub(super) lags: usize,
     /// Dampings of pairs of poles.
     pub(super) dampings: [f64; 2],
-    /// Starts from the grid that are followed.
+    /// Starts from the grid that are kept.
+    pub(super) gridded: usize,
+    /// Starts that are followed, of all.
     pub(super) followed: usize,
     /// Minima of a class that are kept.
     pub(super) kept: usize,
@@ -83,7 +88,8 @@ pub(super) const STARTS: Starts = Starts {
     few_delays: 10,
     lags: 8,
     dampings: [0.3, 0.9],
-    followed: 2,
+    gridded: 2,
+    followed: 4,
     kept: 2,
     apart: 0.5,
 };
@@ -92,14 +98,18 @@ pub(super) const STARTS: Starts = Starts {
 pub(super) struct Evidence {
     /// BIC within which a class may still be the true one: more widens the hull.
     pub(super) reach: f64,
-    /// BIC from the best beyond which a class is given no richer noise: more costs time.
+    /// BIC from the best beyond which a class is not given ARMA(2,2) after ARMA(1,1): more costs time.
     pub(super) hopeless: f64,
     /// Standard errors a combination of numbers must stand from nothing to count.
     pub(super) told: f64,
+    /// Fall of −2 ln L by a further number from which on its class counts though it is not told.
+    pub(super) adds: f64,
     /// Ratio of largest stable gains of two classes that contradict each other.
     pub(super) contradiction: f64,
     /// Their difference in phase at crossover, rad.
     pub(super) turn: f64,
+    /// Fewest numbers with which a loop is known: one sine tells two.
+    pub(super) enough: usize,
     /// Probability below which residuals are not white.
     pub(super) white: f64,
     /// Fall of −2 ln L by a delay below zero that shows a command logged late.
@@ -108,10 +118,12 @@ pub(super) struct Evidence {
 
 pub(super) const EVIDENCE: Evidence = Evidence {
     reach: 10.0,
-    hopeless: 200.0,
+    hopeless: 60.0,
     told: 3.0,
+    adds: 2.0,
     contradiction: 2.0,
     turn: 0.5,
+    enough: 3,
     white: 1e-3,
     shifted: 10.0,
 };

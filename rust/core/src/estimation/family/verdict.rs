@@ -1,8 +1,6 @@
 //! Whether an answer holds, and if not, why.
 
-use super::candidate::Candidate;
 use super::hull::Turning;
-use super::loop_view::Seen;
 use super::tolerances::EVIDENCE;
 
 /// How far an answer holds.
@@ -38,11 +36,16 @@ pub(super) fn verdict(all: &[Turning<'_>], response: f64) -> Verdict {
     if response < EVIDENCE.reach {
         return new(Grade::None, "no response", response);
     }
-    if candidate.told < candidate.values.len() {
-        return new(Grade::None, "too few told", candidate.told as f64);
+    let told = candidate.told;
+    if told < candidate.values.len() && (told < EVIDENCE.enough || is_wide(best)) {
+        return new(Grade::None, "too few told", told as f64);
     }
     if let Some(size) = contradiction(all) {
         return new(Grade::Indication, "classes contradict", size);
+    }
+    if best.crossover().is_some() && is_wide(best) {
+        let (_, low, high) = best.largest();
+        return new(Grade::Indication, "crossover not told", high / low);
     }
     if candidate.at_limit {
         return new(Grade::Indication, "delay at its limit", candidate.numbers.delay);
@@ -53,30 +56,44 @@ pub(super) fn verdict(all: &[Turning<'_>], response: f64) -> Verdict {
     new(Grade::Reliable, "", f64::NAN)
 }
 
-/// How far classes are from each other where the loop crosses over, if that is too far.
-fn contradiction(all: &[Turning<'_>]) -> Option<f64> {
-    let best = all.first()?;
-    let gains: Vec<f64> = all.iter().map(|one| signed_largest(one)).collect();
-    let opposite = gains.iter().any(|gain| gain * gains[0] < 0.0);
-    let sizes = || gains.iter().map(|gain| gain.abs());
-    let (low, high) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
-    if opposite || (low < f64::INFINITY && high > EVIDENCE.contradiction * low) {
-        return Some(high / low);
+/// A verdict on a record whose command was moved by a row, by so much in −2 ln L.
+pub(super) fn shifted(verdict: Verdict, fall: f64) -> Verdict {
+    if verdict.grade != Grade::Reliable {
+        return verdict;
     }
-    let omega = best.crossover()?;
-    let phases = || all.iter().map(|one| one.candidate.seen().phase(omega));
-    let (low, high) = (
-        phases().fold(f64::INFINITY, f64::min),
-        phases().fold(f64::NEG_INFINITY, f64::max),
-    );
-    (high - low > EVIDENCE.turn).then_some(high - low)
+    Verdict {
+        grade: Grade::Indication,
+        reason: "command shifted",
+        size: fall,
+    }
 }
 
-fn signed_largest(one: &Turning<'_>) -> f64 {
-    let gain = one.candidate.gain;
-    let size = one.turn.map_or(f64::INFINITY, |turn| {
-        let seen: Seen = Candidate::seen(one.candidate);
-        crate::elementary::exp(seen.log_largest(turn))
-    });
-    size.copysign(gain)
+/// Is the largest gain of the best class itself unknown?
+fn is_wide(best: &Turning<'_>) -> bool {
+    let (_, low, high) = best.largest();
+    best.crossover().is_none() || !(high < EVIDENCE.contradiction * low)
+}
+
+/// How far classes are from each other where the loop crosses over, if that is too far.
+fn contradiction(all: &[Turning<'_>]) -> Option<f64> {
+    let ends = |values: &dyn Fn() -> Vec<f64>| {
+        let values = values();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        (low, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let (low, high) = ends(&|| all.iter().map(|one| one.largest().0).collect());
+    if low < f64::INFINITY && !(high < EVIDENCE.contradiction * low) {
+        return Some(high / low);
+    }
+    let best = all.first()?;
+    let Some(omega) = best.crossover() else {
+        // Delays alone, or plants that no gain makes unstable.
+        let parts: Vec<_> = all.iter().map(Turning::delay).collect();
+        let low = parts.iter().fold(f64::INFINITY, |low, part| low.min(part.2));
+        let high = parts.iter().fold(f64::NEG_INFINITY, |high, part| high.max(part.1));
+        return (high > low).then_some(high - low);
+    };
+    let phase = |one: &Turning<'_>| one.phase(&one.candidate.seen(), omega);
+    let (low, high) = ends(&|| all.iter().map(phase).collect());
+    (high - low > EVIDENCE.turn).then_some(high - low)
 }
