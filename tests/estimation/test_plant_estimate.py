@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import PLANTS
 from deadtime.estimation.evidence._question import shows_controller
+from flights import flight_path
 from made_processes import DEAD, GAIN, SLOW, bump, sine
 
 
@@ -117,9 +118,40 @@ def test_a_moving_reference_says_that_a_controller_is_in_the_loop():
         assert shows_controller(dtm.Recording(time, reference, output, command)) is expected
 
 
+def test_a_known_controller_gives_the_command_and_its_crossover():
+    vehicle = dtm.ControlLoop(
+        dtm.Integrator(0.9, 0.3), dtm.P(1.2), delay=0.3, sample_time=0.065, limit=1.0
+    )
+    flight = dtm.Experiment.step(8.0, rest=1.04).run(vehicle, noise=0.004, seed=3)
+    bare = dtm.Recording(flight.time, flight.reference, flight.output)
+    fit = dtm.estimate_delay(bare, controller=dtm.P(1.2), limit=1.0, plant="integrator, lag")
+    logged = dtm.estimate_delay(flight, controller=dtm.P(1.2), plant="integrator, lag")
+    assert fit.delay == pytest.approx(logged.delay, abs=0.02)
+    assert fit.delay + fit.best.lags[0] == pytest.approx(0.6, abs=0.06)
+    true = vehicle.continuous().margin().gain_crossovers[-1]
+    assert fit.crossover_in_loop == pytest.approx(true, rel=0.05)
+    assert "with its controller the loop crosses over at" in fit.summary()
+
+
+@pytest.mark.parametrize("name", ["2_4_0_25", "0_5_1_0"])
+def test_the_height_servo_is_found_without_being_named(name):
+    flight = dtm.read_recording(
+        flight_path(f"ardrone2_height_step_{name}.csv"),
+        time="t_s",
+        reference="ref_m",
+        output="height_m",
+    )
+    gain = float(name[:3].replace("_", "."))
+    fit = dtm.estimate_delay(flight, controller=dtm.P(gain), limit=1.0, window=(13, 25.5))
+    assert fit.best.name == "integrator, two lags, zero"
+    assert fit.noise_std < 0.0065
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
+        ({"limit": 1.0}, "limit=1.0 is that of a controller"),
+        ({"controller": dtm.PI(1.0, 0.1)}, "only that of a P controller follows"),
         ({"plant": "two poles"}, "plant='two poles' is not one of 'delay', 'lag'"),
         ({"largest_delay": 0.0}, "largest_delay"),
         ({"method": "gcc"}, "method and free are for a loop"),
@@ -129,8 +161,11 @@ def test_a_moving_reference_says_that_a_controller_is_in_the_loop():
 )
 def test_what_cannot_be_is_refused(options, words):
     time, command, output = bump(rows=150)
-    with pytest.raises(ValueError, match=words):
-        dtm.estimate_delay(dtm.Recording(time, None, output, command), **options)
+    with pytest.raises((ValueError, dtm.RecordingError), match=words):
+        dtm.estimate_delay(
+            dtm.Recording(time, None, output, None if "controller" in options else command),
+            **options,
+        )
 
 
 def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(fit):

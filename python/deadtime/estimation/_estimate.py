@@ -31,6 +31,7 @@ from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import Waveform
+from deadtime.loops import Controller
 from deadtime.recordings import Recording
 
 #: The methods by name.
@@ -77,10 +78,12 @@ def estimate_delay(
     *,
     window: OpenRange | None = None,
     plant: str | None = None,
+    controller: Controller | None = None,
+    limit: float | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    between: Between = "undecided",
+    between: Between = "held",
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate: ...
 
@@ -93,10 +96,12 @@ def estimate_delay(
     free: Sequence[str] = FREE,
     window: Any = None,
     plant: str | None = None,
+    controller: Controller | None = None,
+    limit: float | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    between: Between = "undecided",
+    between: Between = "held",
     progress: Callable[[int], object] | None = None,
 ) -> DelayEstimate | PlantEstimate:
     """Estimate the delay of a plant, or that of a closed loop, from a recording.
@@ -154,6 +159,11 @@ def estimate_delay(
         ``"integrator"``, ``"integrator, lag"``, ``"integrator, two lags"``, or one that ends in
         ``"lag, zero"`` or ``"two lags, zero"``. Whether another explains the recording clearly
         better is said.
+    controller : Controller, optional
+        Without `loop`: the controller that computes the command from the output, if it is known.
+        The command of a P controller need not be logged.
+    limit : float, optional
+        Largest size of the command of `controller`.
     closed_loop : bool, optional
         Without `loop`: whether a controller computes the command from the output. If it is not
         given, a reference that moves says so.
@@ -162,8 +172,8 @@ def estimate_delay(
         recording says so, or the state is unknown.
     largest_delay : float, optional
         Without `loop`: largest delay that is tried, s; by default 0.3 of the recording.
-    between : {"undecided", "held", "straight", "samples"}
-        Without `loop`: how the command moves between two rows, by default as is likelier.
+    between : {"held", "straight", "samples", "undecided"}
+        Without `loop`: how the command moves between two rows; undecided: as is likelier.
     progress : callable, optional
         Without `loop`: called with a number that grows while plants are compared.
 
@@ -239,6 +249,8 @@ def estimate_delay(
     """
     known: dict[str, Any] = {
         "plant": plant,
+        "controller": controller,
+        "limit": limit,
         "closed_loop": closed_loop,
         "at_rest": at_rest,
         "largest_delay": largest_delay,

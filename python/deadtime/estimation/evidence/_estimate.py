@@ -17,7 +17,6 @@ from deadtime.estimation.evidence._words import (
     lines_of,
     summary_of,
 )
-from deadtime.loops import Controller, ControlLoop
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,39 +60,6 @@ class PlantEstimate(FoundPlant, Pictured):
     fitted, residuals : ndarray, shape (n,)
         Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
     """
-
-    def loop(
-        self,
-        controller: Controller,
-        *,
-        sample_time: float | None = None,
-        limit: float | None = None,
-    ) -> ControlLoop:
-        """A controller around the likeliest plant with its dead time.
-
-        Parameters
-        ----------
-        controller : P, PI, PD, PV or PID
-            The controller.
-        sample_time : float, optional
-            Time between its commands, s; continuous without.
-        limit : float, optional
-            Largest size of its command.
-
-        Returns
-        -------
-        ControlLoop
-
-        Raises
-        ------
-        ValueError
-            If the verdict is ``"none"``.
-        """
-        if self.plant is None or self.verdict == "none":
-            raise ValueError(f"no plant: {self.reason}")
-        return ControlLoop(
-            self.plant, controller, delay=self.delay, sample_time=sample_time, limit=limit
-        )
 
     def headline(self) -> str:
         """The verdict and what it is about, in a line."""

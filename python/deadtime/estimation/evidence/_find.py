@@ -14,6 +14,7 @@ from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._question import Between, Question, question_of
 from deadtime.estimation.evidence._words import CLEAR, reason_of
+from deadtime.loops import Controller
 from deadtime.recordings import Recording
 
 
@@ -24,12 +25,16 @@ def estimate_by_evidence(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    between: Between = "undecided",
+    between: Between = "held",
     plant: str | None = None,
+    controller: Controller | None = None,
+    limit: float | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate:
     """The plant that a recording shows; what is not given is taken from the recording."""
-    question = question_of(recording, window, closed_loop, at_rest, largest_delay, between, plant)
+    question = question_of(
+        recording, window, closed_loop, at_rest, largest_delay, between, plant, controller, limit
+    )
     found = question.answer(progress=progress)
     better = None if plant is None else _clearly_better(question, found)
     return estimate_of(question, found, better)

@@ -15,7 +15,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import one_dimensional
 from deadtime.estimation.evidence._candidate import PlantCandidate
 from deadtime.estimation.evidence._question import Question
-from deadtime.loops import Plant
+from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording
 
 #: What an answer is worth.
@@ -210,6 +210,50 @@ class FoundPlant(ReadOnlyArrays):
         values = {name: np.array(found[name][0]) for name in ("gain", "phase", "delay")}
         ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}
         return LoopView(given, **values, **ends)
+
+    def loop(
+        self,
+        controller: Controller,
+        *,
+        sample_time: float | None = None,
+        limit: float | None = None,
+    ) -> ControlLoop:
+        """A controller around the likeliest plant with its dead time.
+
+        Parameters
+        ----------
+        controller : P, PI, PD, PV or PID
+            The controller.
+        sample_time : float, optional
+            Time between its commands, s; continuous without.
+        limit : float, optional
+            Largest size of its command.
+
+        Returns
+        -------
+        ControlLoop
+
+        Raises
+        ------
+        ValueError
+            If the verdict is ``"none"``.
+        """
+        if self.plant is None or self.verdict == "none":
+            raise ValueError(f"no plant: {self.reason}")
+        return ControlLoop(
+            self.plant, controller, delay=self.delay, sample_time=sample_time, limit=limit
+        )
+
+    @property
+    def crossover_in_loop(self) -> float:
+        """Highest frequency, rad/s, at which the loop with the given controller crosses over.
+
+        NaN if no controller was given, or if it crosses over nowhere.
+        """
+        controller = self._question.controller
+        if controller is None or self.verdict == "none":
+            return math.nan
+        return float(max(self.loop(controller).margin().gain_crossovers, default=math.nan))
 
     def _answer(self) -> native.FamilyFit:
         """The answer of the kernel, asked again after the estimate was pickled."""

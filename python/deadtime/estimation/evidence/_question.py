@@ -13,7 +13,8 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange, open_interval, positive
-from deadtime.recordings import Recording
+from deadtime.loops import Controller, ControlLoop, Integrator, P
+from deadtime.recordings import Columns, Recording
 
 #: How the command moves between two rows.
 Between: TypeAlias = Literal["held", "straight", "samples", "undecided"]
@@ -52,6 +53,8 @@ class Question(ReadOnlyArrays):
         How the command moves between two rows.
     plant : str or None
         The kind of plant, one of `PLANTS`; None: all.
+    controller : Controller or None
+        The controller in the loop, where it is known.
     """
 
     recording: Recording
@@ -59,8 +62,9 @@ class Question(ReadOnlyArrays):
     closed_loop: bool = False
     at_rest: bool | None = None
     largest_delay: float | None = None
-    between: Between = "undecided"
+    between: Between = "held"
     plant: str | None = None
+    controller: Controller | None = None
 
     def answer(
         self,
@@ -108,10 +112,16 @@ def question_of(
     largest_delay: float | None,
     between: Between,
     plant: str | None,
+    controller: Controller | None = None,
+    limit: float | None = None,
 ) -> Question:
     """Check what the caller has given."""
     if not isinstance(recording, Recording):
         raise TypeError(f"recording must be a Recording, got {type(recording).__name__}")
+    if controller is not None:
+        recording = _with_command(recording, controller, limit)
+    elif limit is not None:
+        raise ValueError(f"limit={limit!r} is that of a controller: give the controller too")
     if recording.command is None:
         raise RecordingError(
             "the recording has no command, and without a loop nothing else says what moved the "
@@ -130,8 +140,24 @@ def question_of(
     rows = recording.rows(low, high)
     part = recording.window(None, float(recording.time[rows.stop - 1]))
     if closed_loop is None:
-        closed_loop = shows_controller(part)
-    return Question(part, rows.start, closed_loop, at_rest, largest_delay, between, plant)
+        closed_loop = controller is not None or shows_controller(part)
+    return Question(
+        part, rows.start, closed_loop, at_rest, largest_delay, between, plant, controller
+    )
+
+
+def _with_command(recording: Recording, controller: Controller, limit: float | None) -> Recording:
+    """The recording with the command that its controller computes, where none was logged."""
+    loop = ControlLoop(Integrator(), controller, limit=limit)
+    if recording.command is not None:
+        return recording
+    if not (isinstance(controller, P) and recording.has_reference):
+        raise RecordingError(
+            "the recording has no command; only that of a P controller follows from reference and "
+            "output: name the column of the command"
+        )
+    columns = Columns(recording.time, recording.reference, recording.output, None)
+    return replace(recording, command=columns.commands(loop))
 
 
 def shows_controller(recording: Recording) -> bool:

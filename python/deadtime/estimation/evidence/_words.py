@@ -76,6 +76,7 @@ def reason_of(code: str, size: float, told: int, asked: int, delay: float) -> st
         "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
         "2 ln L), and was moved",
         "delay at its limit": f"the dead time ends at the largest one tried, {delay:.4g} s",
+        "crossover not told": "the largest stable gain is not known to a factor of 2",
         "no response": "the output does not respond to the command",
     }
     return sentences.get(code, code)
@@ -120,6 +121,10 @@ def _numbers(fit: FoundPlant) -> list[str]:
             lines.append(f"{words:<24} {_value(fit, name, unit):<14} 95 %: {ends}")
         else:
             lines.append(f"{words:<24} about {_rough(value, unit)}")
+    if math.isfinite(fit.crossover_in_loop):
+        lines.append(
+            f"with its controller the loop crosses over at {fit.crossover_in_loop:.3g} rad/s"
+        )
     if not math.isfinite(fit.largest_gain):
         lines.append("no proportional gain makes the loop unstable")
     return lines
