@@ -41,6 +41,25 @@ def bump(seed=1, rows=300, noise=NOISE):
     return time, command, output + rng.normal(0.0, noise, rows)
 
 
+def loop_with_load(seed=1, rows=500, load=8.0, after=330):
+    """Time, reference, output and command of a PI loop whose load steps at a row."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(float(rows))
+    reference = np.select([time < 20, time < 170], [55.0, 63.0], 57.0)
+    keep, late = np.exp(-1.0 / SLOW), int(DEAD)
+    output, command = np.empty(rows), np.empty(rows)
+    level, integral = 55.0, 55.0 / GAIN
+    for row in range(rows):
+        output[row] = level + rng.normal(0.0, NOISE)
+        error = reference[row] - output[row]
+        integral += 0.02 * error
+        command[row] = error + integral
+        acting = command[row - late] if row >= late else 55.0 / GAIN
+        acting += load if row >= after else 0.0
+        level = keep * level + (1.0 - keep) * GAIN * acting
+    return time, reference, output, command
+
+
 def sine(rows=200, seed=1):
     """One sine that ran before the first row, through a delay of 0.3 s and a lag of 0.5 s."""
     time = 0.05 * np.arange(rows)

@@ -32,12 +32,14 @@ class Asked:
 
     def again(self, more: Mapping[str, Any] | None = None, plot: str | None = None) -> str:
         """The command that asks this, with more options."""
-        ends = ":".join("" if end is None else f"{end:g}" for end in self.window or ())
+        options = {**self.known, **(more or {})}
+        window = options.pop("window", self.window)
+        ends = ":".join("" if end is None else f"{end:.10g}" for end in window or ())
         words: list[object] = ["deadtime", "estimate", f"{self.file}@{ends}" if ends else self.file]
         for name, column in self.columns.items():
             if column is not None and column != "auto":
                 words += [f"--{name}", column]
-        for name, value in {**self.known, **(more or {})}.items():
+        for name, value in options.items():
             words += _option(name, value)
         if plot is not None:
             words += ["--plot", plot]

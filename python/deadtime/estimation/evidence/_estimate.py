@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from deadtime._base.drawing import Axes, Figure, new_figure
@@ -59,6 +60,25 @@ class PlantEstimate(FoundPlant, Pictured):
         The rows that were used, and those before them.
     fitted, residuals : ndarray, shape (n,)
         Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
+
+    See Also
+    --------
+    deadtime.estimate_delay : Makes it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> time = np.arange(200.0)
+    >>> heater = np.where(time < 20, 40.0, 45.0)
+    >>> warmth = 9.0 * (1.0 - np.exp(-np.maximum(time - 32.0, 0.0) / 20.0))
+    >>> warmth += np.random.default_rng(1).normal(0.0, 0.05, time.size)
+    >>> fit = dtm.estimate_delay(dtm.Recording(time, None, warmth, heater))
+    >>> fit.best.in_words()
+    'a process that comes to rest, time constant 20 s'
+    >>> low, high = fit.ci(0.95, "largest_gain")
+    >>> fit.loop(dtm.P(0.5 * low)).is_stable()
+    True
     """
 
     def headline(self) -> str:
@@ -67,7 +87,7 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def advice(self) -> Advice:
         """What to do next, computed from the recording."""
-        return advice_on(self)
+        return self._advice
 
     def lines(self) -> list[str]:
         """The summary without what to do next, a line each."""
@@ -75,7 +95,7 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def summary(self) -> str:
         """The answer as a few lines of text, the verdict first."""
-        return summary_of(self)
+        return summary_of(self, self._advice)
 
     def to_dict(self) -> dict[str, Any]:
         """All results but the arrays, as plain values for JSON."""
@@ -132,6 +152,10 @@ class PlantEstimate(FoundPlant, Pictured):
         figure, axes = new_figure(7.0, 4.6, rows=2)
         self.plot(axes)
         return figure
+
+    @cached_property
+    def _advice(self) -> Advice:
+        return advice_on(self)
 
     def __repr__(self) -> str:
         return f"<PlantEstimate {self.headline()}>"

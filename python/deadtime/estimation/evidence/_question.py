@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -55,6 +55,8 @@ class Question(ReadOnlyArrays):
         The kind of plant, one of `PLANTS`; None: all.
     controller : Controller or None
         The controller in the loop, where it is known.
+    window : (low, high) or None
+        The window as it was given, s.
     """
 
     recording: Recording
@@ -65,6 +67,7 @@ class Question(ReadOnlyArrays):
     between: Between = "held"
     plant: str | None = None
     controller: Controller | None = None
+    window: OpenRange | None = None
 
     def answer(
         self,
@@ -92,10 +95,24 @@ class Question(ReadOnlyArrays):
         """The same for another kind of plant."""
         return replace(self, plant=plant)
 
-    @property
-    def rows(self) -> slice:
-        """The rows of the window."""
-        return slice(self.earlier, None)
+    def options(self) -> dict[str, Any]:
+        """What was given besides the recording, as arguments of `estimate_delay`."""
+        names = ("window", "controller", "at_rest", "largest_delay", "plant")
+        found = {name: getattr(self, name) for name in names}
+        if self.between != "held":
+            found["between"] = self.between
+        if self.controller is None and self.closed_loop != shows_controller(self.recording):
+            found["closed_loop"] = self.closed_loop
+        return {name: value for name, value in found.items() if value is not None}
+
+    def part(self, low: float, high: float) -> Question:
+        """The same for the rows between two shares of the window; rows before them are kept."""
+        rows = len(self.recording) - self.earlier
+        first, last = (self.earlier + round(share * (rows - 1)) for share in (low, high))
+        time = self.recording.time
+        window = (float(time[first]), float(time[last]))
+        recording = self.recording.window(None, window[1])
+        return replace(self, recording=recording, earlier=first, window=window)
 
     @property
     def command(self) -> Array:
@@ -142,7 +159,7 @@ def question_of(
     if closed_loop is None:
         closed_loop = controller is not None or shows_controller(part)
     return Question(
-        part, rows.start, closed_loop, at_rest, largest_delay, between, plant, controller
+        part, rows.start, closed_loop, at_rest, largest_delay, between, plant, controller, window
     )
 
 

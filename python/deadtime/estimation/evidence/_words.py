@@ -9,11 +9,19 @@ from typing import Any
 
 from deadtime._base.digits import between, shown
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.validation import OpenRange
 from deadtime.estimation.evidence._numbers import FoundPlant
+from deadtime.estimation.evidence._question import Question
+from deadtime.loops import Controller
+from deadtime.recordings import MINIMUM_SAMPLES
 
 #: Lead in BIC from which a plant explains a recording clearly better: 10 is "very strong" of Kass
 #: and Raftery (1995). Smaller: the second is ruled out by chance; larger: hulls are wider.
 CLEAR = 10.0
+
+#: Parts of a window that are tried where a disturbance spoils the whole, as shares of it. More or
+#: finer parts: more of a good stretch is used, and the advice takes longer.
+PARTS = ((0.0, 0.75), (0.25, 1.0), (0.0, 0.5), (0.5, 1.0))
 
 #: Names of numbers with the words and unit for each.
 NUMBERS = (
@@ -39,7 +47,9 @@ class Advice(ReadOnlyArrays):
     words : str
         A sentence.
     options : dict of str to object
-        What to give `estimate_delay` in addition, if it is to be asked again.
+        What to give `estimate_delay` besides what was given, if it is to be asked again.
+    given : dict of str to object
+        What was given.
     controller : str
         Kind of controller to design, ``"P"`` or ``"PI"``; empty where none can be.
     draw : bool
@@ -48,19 +58,26 @@ class Advice(ReadOnlyArrays):
 
     words: str
     options: dict[str, Any] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)
     controller: str = ""
     draw: bool = False
 
     @property
     def statement(self) -> str:
         """The line of Python that does it; empty where another recording is needed."""
-        given = "".join(f", {name}={value!r}" for name, value in self.options.items())
-        if given:
-            return f"dtm.estimate_delay(recording{given})"
+        if self.options:
+            named = {**self.given, **self.options}
+            asked = "".join(f", {name}={_python(value)}" for name, value in named.items())
+            return f"dtm.estimate_delay(recording{asked})"
         if self.controller:
             kind, gains = f"dtm.{self.controller}", ", ".join(["1.0"] * len(self.controller))
             return f"dtm.design(fit.loop({kind}({gains})), controller={kind}, delay=fit.ci())"
         return "fit.plot()" if self.draw else ""
+
+
+def _python(value: Any) -> str:
+    """A value as Python writes it where the package is `dtm`."""
+    return f"dtm.{value!r}" if isinstance(value, Controller) else repr(value)
 
 
 def reason_of(code: str, size: float, told: int, asked: int, delay: float) -> str:
@@ -101,10 +118,9 @@ def lines_of(fit: FoundPlant) -> list[str]:
     return [*lines, *_seen(fit), *_beside(fit)]
 
 
-def summary_of(fit: FoundPlant) -> str:
+def summary_of(fit: FoundPlant, advice: Advice) -> str:
     """All lines, and what to do next."""
     first, *rest = lines_of(fit)
-    advice = advice_on(fit)
     lines = [first, *(f"  {line}" for line in rest), f"next: {advice.words}"]
     return "\n".join([*lines, f"  {advice.statement}"] if advice.statement else lines)
 
@@ -131,8 +147,12 @@ def _numbers(fit: FoundPlant) -> list[str]:
 
 
 def _seen(fit: FoundPlant) -> list[str]:
-    """Gain and equivalent delay at the frequencies of the command, where more is not told."""
-    if fit.verdict == "reliable" or not fit.excited.size or fit.told < 2:
+    """Gain and equivalent delay at the frequencies of the command, where that is all it tells."""
+    if (
+        fit._code not in ("too few told", "classes contradict")
+        or not fit.excited.size
+        or fit.told < 2
+    ):
         return []
     view = fit.at(fit.excited)
     return [
@@ -179,25 +199,40 @@ def advice_on(fit: FoundPlant) -> Advice:
             "the command moves only before the rows that count; if the process was at rest at the "
             "first row, say so",
             {"at_rest": True},
+            fit._question.options(),
         )
-    return _advice_by_reason(fit)
+    return _advice_by_reason(fit, fit._question.options())
 
 
-def _advice_by_reason(fit: FoundPlant) -> Advice:
+def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
     if fit._code == "delay at its limit":
-        return Advice(
-            "allow a larger dead time", {"largest_delay": float(f"{2.0 * fit.delay:.3g}")}
-        )
-    if fit._code in ("too few told", "classes contradict"):
+        larger = float(f"{2.0 * fit.delay:.3g}")
+        return Advice("allow a larger dead time", {"largest_delay": larger}, given)
+    if fit._code in ("too few told", "classes contradict", "crossover not told"):
         known = [one for one in fit.candidates if len(one.parameters) <= fit.told]
         words = "record a run in which the command steps up and down at uneven times"
-        if known and fit._question.plant is None:
+        if known and "plant" not in given:
             words += f"; or name the plant, if you know that it is {known[0].in_words()}"
-            return Advice(words, {"plant": known[0].name})
+            return Advice(words, {"plant": known[0].name}, given)
         return Advice(words)
     if fit._code == "no response":
         return Advice("look whether these are the right columns", draw=True)
+    window = _reliable_part(fit._question)
+    if window is not None:
+        ends = " to ".join(f"{end:g}" for end in window)
+        words = f"from {ends} s the recording is explained: use that part"
+        return Advice(words, {"window": window}, given)
     return Advice("look where the residuals are large, and leave that out by a window", draw=True)
+
+
+def _reliable_part(question: Question) -> OpenRange | None:
+    """The first of `PARTS` of the window that is explained reliably."""
+    for low, high in PARTS:
+        part = question.part(low, high)
+        enough = len(part.recording) - part.earlier >= MINIMUM_SAMPLES
+        if enough and part.answer().verdict == "reliable":
+            return part.window
+    return None
 
 
 def _moves_in(fit: FoundPlant) -> bool:
