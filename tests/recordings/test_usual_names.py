@@ -50,6 +50,8 @@ def test_usual_names_are_found(header, found, tmp_path):
 def test_what_is_named_is_taken_and_not_found_again(tmp_path):
     run = read(tmp_path, table("t,y,u,T1,Q1"), output="T1", command="Q1")
     assert (digit(run.output), digit(run.command)) == (3, 4)
+    run = read(tmp_path, table("time,reference,output"), command="reference")
+    assert (digit(run.reference), digit(run.command)) == (1, 1)
     run = read(tmp_path, table("t,y,pv,u"), output="u", command="y")
     assert (digit(run.output), digit(run.command)) == (3, 1)
 

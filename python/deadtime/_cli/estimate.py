@@ -1,4 +1,4 @@
-"""``deadtime estimate``: the delay in a recording, or in several of one vehicle together."""
+"""``deadtime estimate``: the plant of a recording, or the delay of a loop in one or several."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Estimate the delay of a loop from a recording of it, or from several together."""
+    """Find the plant of a recording, or the delay of a known loop, with a verdict."""
     files, windows = files_and_windows(files, window)
     columns: dict[str, Any] = {
         "time": time,

@@ -57,7 +57,8 @@ def chosen_columns(
         if signal in found:
             continue
         free = [name for name in names if name not in found.values()]
-        usual = _usual(signal, free)
+        # A vehicle that is told its reference has one column for both.
+        usual = _usual(signal, free) or (_usual(signal, names) if signal == "reference" else None)
         if usual is not None:
             found[signal] = usual
         elif signal not in optional:
