@@ -16,7 +16,7 @@ from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.estimation import PLANTS, PlantEstimate, estimate_delay
 from deadtime.recordings import read_recording
 
-#: Exit code where the recording does not tell what was asked.
+#: Exit code where the recording does not determine what was asked.
 NOT_TOLD = 3
 
 

@@ -27,8 +27,8 @@ class PlantCandidate(ReadOnlyArrays):
         ``pole_frequency`` and ``pole_damping`` that it has. Times in s, frequency in rad/s.
     behind : float
         By how much it is behind the best in the Bayesian information criterion (BIC): 10 is clear.
-    told : int
-        How many of its numbers the record can tell.
+    determined : int
+        How many of its numbers the recording determines.
     noise_std : float
         Standard deviation of what it leaves unexplained, in the unit of the output.
     """
@@ -38,7 +38,7 @@ class PlantCandidate(ReadOnlyArrays):
     plant: Plant
     parameters: dict[str, float]
     behind: float
-    told: int
+    determined: int
     noise_std: float
 
     @property

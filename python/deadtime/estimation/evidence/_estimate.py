@@ -28,7 +28,7 @@ class PlantEstimate(FoundPlant, Pictured):
     ----------
     verdict : {"reliable", "indication", "none"}
         Whether the intervals are claimed to hold; whether the numbers are an indication, whose
-        intervals are not; or whether the recording does not tell.
+        intervals are not; or whether the recording determines too little.
     reason : str
         Why the verdict is not ``"reliable"``, in a sentence; empty where it is.
     delay : float
@@ -45,10 +45,10 @@ class PlantEstimate(FoundPlant, Pictured):
     candidates : tuple of PlantCandidate
         All kinds of plant that were tried, the likeliest first.
     intervals : dict of str to (float, float)
-        The 95 % intervals by name, over all kinds of plant that the recording does not tell from
-        the likeliest one.
-    told, asked : int
-        How many numbers the recording can tell, and how many the likeliest plant has.
+        The 95 % intervals by name, over all kinds of plant that the recording does not rule
+        out.
+    determined, asked : int
+        How many numbers the recording determines, and how many the likeliest plant has.
     shift : int
         Rows by which the command was moved, because it was logged so much late (above zero) or
         early.
@@ -99,24 +99,24 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def to_dict(self) -> dict[str, Any]:
         """All results but the arrays, as plain values for JSON."""
-        names = ["name", "delay", "parameters", "behind", "told", "noise_std"]
+        names = ["name", "delay", "parameters", "behind", "determined", "noise_std"]
         tried = [
             {one: getattr(candidate, one) for one in names} | {"words": candidate.in_words()}
             for candidate in self.candidates
         ]
-        told = self.verdict != "none"
+        found_one = self.verdict != "none"
         found: dict[str, Any] = {
             "verdict": self.verdict,
             "reason": self.reason,
             "headline": self.headline(),
-            "plant": self.best.in_words() if told else None,
-            "parameters": dict(self.parameters) if told else None,
+            "plant": self.best.in_words() if found_one else None,
+            "parameters": dict(self.parameters) if found_one else None,
             "interval_95": dict(self.intervals) if self.verdict == "reliable" else None,
-            "crossover": self.crossover if told else None,
-            "largest_gain": self.largest_gain if told else None,
-            "delay_at_crossover": self.delay_at_crossover if told else None,
+            "crossover": self.crossover if found_one else None,
+            "largest_gain": self.largest_gain if found_one else None,
+            "delay_at_crossover": self.delay_at_crossover if found_one else None,
             "candidates": tried,
-            "told": self.told,
+            "determined": self.determined,
             "asked": self.asked,
             "shift": self.shift,
             "at_rest": self.at_rest,

@@ -70,7 +70,7 @@ def estimate_of(
         largest_gain=found.largest_gain,
         candidates=candidates,
         intervals={name: (float(low), float(high)) for name, (low, high) in found.hull.items()},
-        told=found.told,
+        determined=found.told,
         asked=found.asked,
         shift=found.shift,
         at_rest=found.at_rest,

@@ -18,7 +18,7 @@ from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording
 
-#: What an answer is worth.
+#: What an answer claims.
 Verdict: TypeAlias = Literal["reliable", "indication", "none"]
 
 
@@ -35,7 +35,7 @@ class LoopView(ReadOnlyArrays):
         / omega in s.
     gain_ci, phase_ci, delay_ci : ndarray, shape (2, n)
         Lower and upper ends of the 95 % intervals, over all kinds of plant that the recording does
-        not tell from the best one.
+        not rule out.
     """
 
     omega: Array
@@ -55,7 +55,7 @@ class FoundPlant(ReadOnlyArrays):
     ----------
     verdict : {"reliable", "indication", "none"}
         Whether the intervals are claimed to hold; whether the numbers are an indication, whose
-        intervals are not; or whether the recording does not tell.
+        intervals are not; or whether the recording determines too little.
     reason : str
         Why the verdict is not ``"reliable"``, in a sentence; empty where it is.
     delay : float
@@ -72,10 +72,10 @@ class FoundPlant(ReadOnlyArrays):
     candidates : tuple of PlantCandidate
         All kinds of plant that were tried, the likeliest first.
     intervals : dict of str to (float, float)
-        The 95 % intervals by name, over all kinds of plant that the recording does not tell from
-        the likeliest one.
-    told, asked : int
-        How many numbers the recording can tell, and how many the likeliest plant has.
+        The 95 % intervals by name, over all kinds of plant that the recording does not rule
+        out.
+    determined, asked : int
+        How many numbers the recording determines, and how many the likeliest plant has.
     shift : int
         Rows by which the command was moved, because it was logged so much late (above zero) or
         early.
@@ -98,7 +98,7 @@ class FoundPlant(ReadOnlyArrays):
     largest_gain: float
     candidates: tuple[PlantCandidate, ...]
     intervals: dict[str, tuple[float, float]]
-    told: int
+    determined: int
     asked: int
     shift: int
     at_rest: bool

@@ -80,12 +80,12 @@ def _python(value: Any) -> str:
     return f"dtm.{value!r}" if isinstance(value, Controller) else repr(value)
 
 
-def reason_of(code: str, size: float, told: int, asked: int, delay: float) -> str:
+def reason_of(code: str, size: float, determined: int, asked: int, delay: float) -> str:
     """Why an estimate is not reliable, in a sentence."""
     sentences: Mapping[str, str] = {
         "": "",
-        "too few told": f"the command moves too little: the recording tells {told} of the {asked} "
-        "numbers of the plant",
+        "too few told": "the command moves too little: the recording determines "
+        f"{determined} of the {asked} numbers of the plant",
         "classes contradict": "plants of different kinds explain the recording alike and differ "
         "where a loop crosses over",
         "residuals not white": "what the plant leaves unexplained is no noise of a sensor: there "
@@ -147,11 +147,11 @@ def _numbers(fit: FoundPlant) -> list[str]:
 
 
 def _seen(fit: FoundPlant) -> list[str]:
-    """Gain and equivalent delay at the frequencies of the command, where that is all it tells."""
+    """Gain and equivalent delay at the frequencies of the command, where no more is determined."""
     if (
         fit._code not in ("too few told", "classes contradict")
         or not fit.excited.size
-        or fit.told < 2
+        or fit.determined < 2
     ):
         return []
     view = fit.at(fit.excited)
@@ -209,7 +209,7 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
         larger = float(f"{2.0 * fit.delay:.3g}")
         return Advice("allow a larger dead time", {"largest_delay": larger}, given)
     if fit._code in ("too few told", "classes contradict", "crossover not told"):
-        known = [one for one in fit.candidates if len(one.parameters) <= fit.told]
+        known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
         words = "record a run in which the command steps up and down at uneven times"
         if known and "plant" not in given:
             words += f"; or name the plant, if you know that it is {known[0].in_words()}"
