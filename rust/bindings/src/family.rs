@@ -122,7 +122,11 @@ impl FamilyFit {
 
     #[getter]
     fn kind(&self) -> &'static str {
-        if self.core.straight { "straight" } else { "held" }
+        if self.core.straight {
+            "straight"
+        } else {
+            "held"
+        }
     }
 
     #[getter]
@@ -152,7 +156,10 @@ impl FamilyFit {
 
     #[getter]
     fn asked(&self) -> usize {
-        self.core.candidates.first().map_or(0, |best| best.values.len())
+        self.core
+            .candidates
+            .first()
+            .map_or(0, |best| best.values.len())
     }
 
     #[getter]
@@ -201,7 +208,10 @@ impl FamilyFit {
 
     /// Gain, phase and equivalent delay at frequencies; each a list of values, lower and upper ends.
     fn at<'py>(&self, py: Python<'py>, omega: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
-        if let Some(wrong) = omega.iter().find(|omega| !(omega.is_finite() && **omega > 0.0)) {
+        if let Some(wrong) = omega
+            .iter()
+            .find(|omega| !(omega.is_finite() && **omega > 0.0))
+        {
             return Err(PyValueError::new_err(format!(
                 "frequency {wrong} rad/s: give frequencies above 0"
             )));

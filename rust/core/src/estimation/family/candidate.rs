@@ -79,10 +79,13 @@ impl Candidate {
         let variance = point.squares / free;
         let sensitivities = model.sensitivities(point);
         let (factor, freedom) = dispersion(&sensitivities, &point.whitened, variance);
-        let scales: Vec<f64> = (0..seen.count()).map(|at| seen.scale(at, rows.row)).collect();
+        let scales: Vec<f64> = (0..seen.count())
+            .map(|at| seen.scale(at, rows.row))
+            .collect();
         let information = products(&sensitivities, &scales, variance);
         let inner = covariance(&information, &scales, factor);
-        let scatter = |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
+        let scatter =
+            |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
         let mut out = Self {
             class: model.class,
             numbers: seen.numbers,
@@ -119,7 +122,11 @@ impl Candidate {
         let seen = self.seen();
         let names = self.class.numbers();
         let number = |name: &str| {
-            if name == "gain" { self.gain } else { self.numbers.named(name) }
+            if name == "gain" {
+                self.gain
+            } else {
+                self.numbers.named(name)
+            }
         };
         self.values = names.iter().map(|name| number(name)).collect();
         // The order inside is ln gain, delay, …; d value/d ln value is the value.
@@ -136,7 +143,11 @@ impl Candidate {
         let n = seen.count();
         self.covariance = places
             .iter()
-            .flat_map(|(i, left)| places.iter().map(move |(j, right)| (i * n + j, left * right)))
+            .flat_map(|(i, left)| {
+                places
+                    .iter()
+                    .map(move |(j, right)| (i * n + j, left * right))
+            })
             .map(|(at, factor)| factor * self.inner[at])
             .collect();
     }
@@ -144,7 +155,9 @@ impl Candidate {
     /// Standard errors of the values.
     pub fn errors(&self) -> Vec<f64> {
         let n = self.values.len();
-        (0..n).map(|at| self.covariance[at * (n + 1)].max(0.0).sqrt()).collect()
+        (0..n)
+            .map(|at| self.covariance[at * (n + 1)].max(0.0).sqrt())
+            .collect()
     }
 
     /// Frequency and damping of a pair of complex poles, NaN where there is none.
@@ -203,7 +216,13 @@ fn covariance(information: &[f64], scales: &[f64], factor: f64) -> Vec<f64> {
         }
     }
     let mut out = inverse_of_positive(&matrix, n, 0.0).unwrap_or_else(|| {
-        let unknown = |at: usize| if at % (n + 1) == 0 { UNKNOWN * UNKNOWN } else { 0.0 };
+        let unknown = |at: usize| {
+            if at % (n + 1) == 0 {
+                UNKNOWN * UNKNOWN
+            } else {
+                0.0
+            }
+        };
         (0..n * n).map(unknown).collect()
     });
     for i in 0..n {

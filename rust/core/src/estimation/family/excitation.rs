@@ -31,7 +31,9 @@ pub(super) fn excited(rows: &Rows) -> Vec<f64> {
     };
     let unit = TAU / rows.span;
     let most = MULTIPLES.min((0.5 * rows.span / rows.row) as usize);
-    let powers: Vec<f64> = (0..=most).map(|k| power(unit * (k.max(1)) as f64)).collect();
+    let powers: Vec<f64> = (0..=most)
+        .map(|k| power(unit * (k.max(1)) as f64))
+        .collect();
     let is_peak = |k: &usize| {
         powers[*k] >= powers[k - 1] && powers.get(k + 1).is_none_or(|after| powers[*k] > *after)
     };
@@ -43,7 +45,9 @@ pub(super) fn excited(rows: &Rows) -> Vec<f64> {
     let refined = |k: usize| {
         let places = (0..=PARTS).map(|part| k as f64 - 0.5 + part as f64 / PARTS as f64);
         let powers = places.map(|place| (power(unit * place), unit * place));
-        powers.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(unit, |(_, omega)| omega)
+        powers
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(unit, |(_, omega)| omega)
     };
     let mut out: Vec<f64> = peaks.into_iter().map(refined).collect();
     out.sort_by(f64::total_cmp);

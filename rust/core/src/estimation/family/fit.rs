@@ -14,8 +14,12 @@ use crate::{Error, Task};
 /// Rows that a fit needs beyond its numbers.
 const FEWEST_ROWS: usize = 20;
 
-/// What the largest delay is above those of the first pass, as a factor and in rows.
-const ROOM: (f64, f64) = (2.0, 5.0);
+/// What the largest delay is above those of the first pass, as a factor and in rows: more leaves out more
+/// rows at the start, less may end at a delay that the noise of the first pass made too short.
+const ROOM: (f64, f64) = (1.25, 3.0);
+
+/// Delay, in rows, below which the command may have been logged late: more tries that more often.
+const EARLY: f64 = 0.1;
 
 /// How a command moves between its rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,11 +119,19 @@ pub fn fit_family(record: &Record, question: &Question, task: &Task) -> Result<F
     let mut decided = true;
     for straight in kinds {
         let found = one_kind(record, question, start, *straight, task)?;
-        let least = |family: &Family| family.candidates.first().map_or(f64::INFINITY, |one| one.deviance);
+        let least = |family: &Family| {
+            family
+                .candidates
+                .first()
+                .map_or(f64::INFINITY, |one| one.deviance)
+        };
         if let Some(before) = &best {
             decided = (least(before) - least(&found)).abs() > EVIDENCE.reach;
         }
-        if best.as_ref().is_none_or(|before| least(&found) < least(before)) {
+        if best
+            .as_ref()
+            .is_none_or(|before| least(&found) < least(before))
+        {
             best = Some(found);
         }
     }
@@ -140,7 +152,7 @@ fn moved(
     let Some(best) = found.candidates.first() else {
         return Ok(None);
     };
-    if question.in_loop || best.numbers.delay > 0.0 {
+    if question.in_loop || best.numbers.delay > EARLY * record.row() {
         return Ok(None);
     }
     let mut earlier = record.clone();
@@ -149,7 +161,10 @@ fn moved(
         *last = *before;
     }
     let mut out = one_kind(&earlier, question, start, found.straight, task)?;
-    let fall = out.candidates.first().map_or(0.0, |own| best.deviance - own.deviance);
+    let fall = out
+        .candidates
+        .first()
+        .map_or(0.0, |own| best.deviance - own.deviance);
     out.shift = -1;
     out.decided = found.decided;
     out.verdict = shifted(out.verdict, fall);
@@ -157,11 +172,13 @@ fn moved(
 }
 
 /// Classes that contain the best one and whose further number the record does not tell say nothing
-/// new: their errors have no end, their likelihood is that of the best.
+/// new: their errors have no end, their likelihood is that of the best. Two numbers may be those of one
+/// sine, and then they do.
 fn leave_out_what_adds_nothing(minima: &mut Vec<Candidate>) {
-    let Some(best) = minima.first().map(|best| (best.class, best.deviance)) else {
+    let Some(best) = minima.first().filter(|best| best.told >= EVIDENCE.enough) else {
         return;
     };
+    let best = (best.class, best.deviance);
     minima.retain(|one| {
         one.class == best.0
             || !one.class.contains(best.0)
@@ -177,7 +194,9 @@ fn one_kind(
     straight: bool,
     task: &Task,
 ) -> Result<Family, Error> {
-    let largest = question.largest_delay.unwrap_or(RANGES.delay_share * record.span());
+    let largest = question
+        .largest_delay
+        .unwrap_or(RANGES.delay_share * record.span());
     let rows = |largest| Rows::new(record, start, largest, straight, question.in_loop);
     let classes: Vec<Class> = match question.class {
         Some(class) => vec![class],
@@ -185,7 +204,9 @@ fn one_kind(
             .filter(|class| !question.in_loop || class.integrating || class.order > 0)
             .collect(),
     };
-    let noises: Vec<Noise> = question.noise.map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
+    let noises: Vec<Noise> = question
+        .noise
+        .map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
     let mut used = rows(largest);
     refuse_if!(
         used.used.len() < FEWEST_ROWS,
@@ -194,16 +215,26 @@ fn one_kind(
         used.used.len()
     );
     if start == Start::Unknown && question.largest_delay.is_none() {
-        let white = Plan { rows: &used, classes: &classes, noises: &[Noise::White] };
+        let white = Plan {
+            rows: &used,
+            classes: &classes,
+            noises: &[Noise::White],
+        };
         let first = minima(&white, task)?;
         let reach = within_reach(&first);
-        let longest = reach.iter().fold(0.0, |most: f64, one| most.max(one.point.x[0]));
+        let longest = reach
+            .iter()
+            .fold(0.0, |most: f64, one| most.max(one.point.x[0]));
         let room = ROOM.0 * longest + ROOM.1 * used.row;
         if room < largest {
             used = rows(room);
         }
     }
-    let plan = Plan { rows: &used, classes: &classes, noises: &noises };
+    let plan = Plan {
+        rows: &used,
+        classes: &classes,
+        noises: &noises,
+    };
     let found = minima(&plan, task)?;
     let silent = without_plant(&plan, task)?;
     answer(&found, silent, question, task)
@@ -227,7 +258,10 @@ fn answer(
     leave_out_what_adds_nothing(&mut minima);
     let mut candidates: Vec<Candidate> = Vec::new();
     for one in found {
-        if candidates.iter().all(|known| known.class != one.model.class) {
+        if candidates
+            .iter()
+            .all(|known| known.class != one.model.class)
+        {
             candidates.push(candidate(one));
         }
     }
@@ -242,7 +276,9 @@ fn answer(
         decided: true,
         at_rest: rows.is_some_and(|rows| rows.start != Start::Unknown),
         rows: rows.map_or(0, |rows| rows.used.len()),
-        first_row: rows.and_then(|rows| rows.used.first().copied()).unwrap_or(0),
+        first_row: rows
+            .and_then(|rows| rows.used.first().copied())
+            .unwrap_or(0),
         shift: 0,
         excited: rows.map_or(Vec::new(), excited),
         minima,

@@ -83,7 +83,8 @@ impl Turning<'_> {
     }
 
     pub(super) fn crossover(&self) -> Option<f64> {
-        self.finite_turn().map(|turn| self.candidate.seen().crossover(turn))
+        self.finite_turn()
+            .map(|turn| self.candidate.seen().crossover(turn))
     }
 
     /// The size of the largest stable gain; infinite where none is.
@@ -116,7 +117,10 @@ fn exponential((value, low, high): Triple) -> Triple {
 /// Gain, phase and equivalent delay at a frequency, each with its ends, over all of these.
 pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [Triple; 3] {
     let over = |of: &dyn Fn(&Turning<'_>, &Seen) -> f64| {
-        union(all.iter().map(|one| one.candidate.interval(|seen| of(one, seen))))
+        union(
+            all.iter()
+                .map(|one| one.candidate.interval(|seen| of(one, seen))),
+        )
     };
     [
         exponential(over(&|_, seen| seen.log_gain(omega))),
@@ -137,25 +141,46 @@ pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
         return Vec::new();
     };
     let kind = best.candidate.class.integrating;
-    let same = || all.iter().filter(|one| one.candidate.class.integrating == kind);
+    let same = || {
+        all.iter()
+            .filter(|one| one.candidate.class.integrating == kind)
+    };
     let mut out = Vec::new();
     let mut add = |name, (value, low, high): Triple| {
-        out.push(Named { name, value, low, high });
+        out.push(Named {
+            name,
+            value,
+            low,
+            high,
+        });
     };
     let (value, low, high) = union(all.iter().map(Turning::delay));
     add("delay", (value, low.max(0.0), high));
     // An integrator beside a slow zero has the gain of neither.
     let alike = same().filter(|one| one.candidate.gain * best.candidate.gain > 0.0);
-    add("gain", union(alike.map(|one| one.candidate.interval(|seen| seen.gain))));
+    add(
+        "gain",
+        union(alike.map(|one| one.candidate.interval(|seen| seen.gain))),
+    );
     if let Some(largest) = best.candidate.numbers.lags().first() {
-        let lag = |seen: &Seen| seen.numbers.lags().first().copied().unwrap_or(0.5 * seen.numbers.sum);
+        let lag = |seen: &Seen| {
+            seen.numbers
+                .lags()
+                .first()
+                .copied()
+                .unwrap_or(0.5 * seen.numbers.sum)
+        };
         let real = same().filter(|one| !one.candidate.numbers.lags().is_empty());
         let (_, low, high) = union(real.map(|one| one.candidate.interval(lag)));
         add("lag", (*largest, low.max(0.0), high));
     }
     let sign = best.candidate.seen().sign();
     let (value, low, high) = union(all.iter().map(Turning::largest));
-    let [low, high] = if sign > 0.0 { [low, high] } else { [-high, -low] };
+    let [low, high] = if sign > 0.0 {
+        [low, high]
+    } else {
+        [-high, -low]
+    };
     add("largest_gain", (sign * value, low, high));
     if let Some(omega) = best.crossover() {
         let over = all.iter().filter_map(|one| {

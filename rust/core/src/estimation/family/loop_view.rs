@@ -61,10 +61,16 @@ impl Seen {
 
     /// ln |G|.
     pub(super) fn log_gain(&self, omega: f64) -> f64 {
-        let Numbers { sum, product, zero, .. } = self.numbers;
+        let Numbers {
+            sum, product, zero, ..
+        } = self.numbers;
         let square = |x: f64| x * x;
         let poles = square(1.0 - product * omega * omega) + square(sum * omega);
-        let integrator = if self.class.integrating { log(omega) } else { 0.0 };
+        let integrator = if self.class.integrating {
+            log(omega)
+        } else {
+            0.0
+        };
         log(self.gain.abs()) + 0.5 * (log(1.0 + square(zero * omega)) - log(poles)) - integrator
     }
 
@@ -75,19 +81,33 @@ impl Seen {
 
     /// arg G of a positive gain, without jumps.
     pub(super) fn phase(&self, omega: f64) -> f64 {
-        let Numbers { delay, sum, product, zero } = self.numbers;
+        let Numbers {
+            delay,
+            sum,
+            product,
+            zero,
+        } = self.numbers;
         let poles = angle(sum * omega, 1.0 - product * omega * omega);
         angle(zero * omega, 1.0) - poles - delay * omega - self.turns()
     }
 
     pub(super) fn turns(&self) -> f64 {
-        if self.class.integrating { 0.5 * PI } else { 0.0 }
+        if self.class.integrating {
+            0.5 * PI
+        } else {
+            0.0
+        }
     }
 
     /// The frequency at which the largest stable proportional gain oscillates; none where no gain is
     /// largest, infinite for a delay alone.
     pub(super) fn turn(&self, task: &Task) -> Result<Option<f64>, Error> {
-        let Numbers { delay, sum, product, zero } = self.numbers;
+        let Numbers {
+            delay,
+            sum,
+            product,
+            zero,
+        } = self.numbers;
         if self.class.order == 0 && !self.class.integrating {
             return Ok(Some(f64::INFINITY));
         }
@@ -145,7 +165,11 @@ impl Seen {
     pub(super) fn crossover_near(&self, omega: f64, turn: f64) -> f64 {
         let level = self.log_gain(self.turn_near(turn)) + log(2.0);
         let found = solved(omega, |omega| self.log_gain(omega) - level);
-        if found.is_finite() && found > 0.0 { found } else { omega }
+        if found.is_finite() && found > 0.0 {
+            found
+        } else {
+            omega
+        }
     }
 
     /// A quantity, and its gradient over the numbers.

@@ -3,7 +3,7 @@
 use super::class::Class;
 use super::model::{Model, Point};
 use super::noise::Noise;
-use super::rows::Rows;
+use super::rows::{Rows, Start};
 use super::search::minimum;
 use super::starts::{are_apart, grid, nested, noise};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
@@ -54,7 +54,9 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
         out.clone_from(&before);
     }
     for kind in [Noise::Arma11, Noise::Arma22] {
-        if !plan.noises.contains(&kind) && plan.noises.iter().all(|noise| noise.order() < kind.order()) {
+        if !plan.noises.contains(&kind)
+            && plan.noises.iter().all(|noise| noise.order() < kind.order())
+        {
             continue;
         }
         let found = under(plan, kind, &before, task)?;
@@ -68,10 +70,19 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
             break;
         }
     }
+    for found in &mut out {
+        if let Some(without) = without_level(found, task)?
+            && without.bic < found.bic
+        {
+            *found = without;
+        }
+    }
     out.sort_by(|a, b| a.bic.total_cmp(&b.bic));
     let mut kept: Vec<Minimum<'a>> = Vec::new();
     for found in out {
-        let own = kept.iter().filter(|known| known.model.class == found.model.class);
+        let own = kept
+            .iter()
+            .filter(|known| known.model.class == found.model.class);
         let is_new = own.clone().all(|known| {
             known.model.noise == found.model.noise
                 && are_apart(&found.model, &known.point.x, &found.point.x)
@@ -83,8 +94,27 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
     Ok(kept)
 }
 
+/// The minimum without a level, where that may be: the output is zero where the command is.
+fn without_level<'a>(found: &Minimum<'a>, task: &Task) -> Result<Option<Minimum<'a>>, Error> {
+    let model = Model {
+        level: false,
+        ..found.model
+    };
+    if model.rows.start == Start::Rest {
+        return Ok(None);
+    }
+    let start = model.at(found.point.x.clone());
+    // Where a level is plain to see, it is not searched further.
+    if model.deviance(&start) > found.deviance + EVIDENCE.hopeless {
+        return Ok(None);
+    }
+    minimum(&model, start, task).map(|point| Some(Minimum::new(model, point)))
+}
+
 fn least(found: &[Minimum<'_>]) -> f64 {
-    found.iter().fold(f64::INFINITY, |least, one| least.min(one.bic))
+    found
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.bic))
 }
 
 fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Error> {
@@ -96,6 +126,7 @@ fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Err
             class,
             noise: Noise::White,
             responds: true,
+            level: true,
         };
         let mut starts = grid(&model, task)?;
         for known in &all {
@@ -110,7 +141,11 @@ fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Err
 }
 
 /// The minima from these starts, the best first.
-fn distinct<'a>(model: &Model<'a>, starts: Vec<Vec<f64>>, task: &Task) -> Result<Vec<Minimum<'a>>, Error> {
+fn distinct<'a>(
+    model: &Model<'a>,
+    starts: Vec<Vec<f64>>,
+    task: &Task,
+) -> Result<Vec<Minimum<'a>>, Error> {
     let mut points: Vec<Point> = Vec::with_capacity(starts.len());
     for start in starts {
         task.check()?;
@@ -124,7 +159,9 @@ fn distinct<'a>(model: &Model<'a>, starts: Vec<Vec<f64>>, task: &Task) -> Result
     found.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
     let mut out: Vec<Minimum<'a>> = Vec::new();
     for one in found {
-        let is_new = out.iter().all(|known| are_apart(model, &known.point.x, &one.point.x));
+        let is_new = out
+            .iter()
+            .all(|known| are_apart(model, &known.point.x, &one.point.x));
         if is_new && out.len() < STARTS.kept {
             out.push(one);
         }
@@ -147,6 +184,7 @@ fn under<'a>(
             class,
             noise: kind,
             responds: true,
+            level: true,
         };
         let mut starts = if kind == Noise::Arma11 {
             grid(&model, task)?
@@ -168,7 +206,8 @@ fn under<'a>(
             let numbers = known.model.numbers(&known.point.x);
             let noise = &known.point.x[known.model.plant_numbers()..];
             let own = nested(&model, known.model.class, &numbers);
-            own.first().map(|numbers| (known.deviance, model.point_of(numbers, noise)))
+            own.first()
+                .map(|numbers| (known.deviance, model.point_of(numbers, noise)))
         });
         let contained = contained.min_by(|a, b| a.0.total_cmp(&b.0));
         starts.extend(contained.map(|(_, x)| x));
@@ -184,9 +223,14 @@ pub(super) fn without_plant<'a>(plan: &Plan<'a>, task: &Task) -> Result<f64, Err
     for kind in plan.noises {
         let model = Model {
             rows: plan.rows,
-            class: Class { integrating: true, order: 0, has_zero: false },
+            class: Class {
+                integrating: true,
+                order: 0,
+                has_zero: false,
+            },
             noise: *kind,
             responds: false,
+            level: true,
         };
         let start = model.at(vec![0.0; model.searched()]);
         let x = noise(&model, &start, &known);

@@ -21,6 +21,9 @@ pub(super) struct Model<'a> {
     pub(super) noise: Noise,
     /// Is there a plant at all? Without one, the command does nothing.
     pub(super) responds: bool,
+    /// Is the output (of an integrator the slope) that goes with a command of zero free? It is zero
+    /// otherwise.
+    pub(super) level: bool,
 }
 
 /// The likelihood at one point.
@@ -47,16 +50,20 @@ impl Model<'_> {
     }
 
     pub(super) fn plant_numbers(&self) -> usize {
-        if self.responds { self.class.searched() } else { 0 }
+        if self.responds {
+            self.class.searched()
+        } else {
+            0
+        }
     }
 
     /// How many numbers there are, with the variance of the noise.
     pub(super) fn parameters(&self) -> usize {
         let free = match self.rows.start {
-            Start::Rest => 0,
-            _ => self.class.order + usize::from(self.class.integrating),
+            Start::Rest => 1,
+            _ => self.class.order + usize::from(self.class.integrating) + usize::from(self.level),
         };
-        self.searched() + usize::from(self.responds) + 1 + free + 1
+        self.searched() + usize::from(self.responds) + free + 1
     }
 
     pub(super) fn numbers(&self, x: &[f64]) -> Numbers {
@@ -125,9 +132,12 @@ impl Model<'_> {
     /// The linear columns beside the response, and the responses of the lags among them.
     fn beside(&self, free: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let rows = self.rows;
-        let mut columns = vec![vec![1.0; rows.used.len()]];
+        let mut columns = Vec::with_capacity(4);
+        if self.level || self.class.integrating {
+            columns.push(vec![1.0; rows.used.len()]);
+        }
         if rows.start != Start::Rest {
-            if self.class.integrating {
+            if self.class.integrating && self.level {
                 let middle = 0.5 * rows.span;
                 let from = rows.time[0] + middle;
                 let slope = rows.used.iter().map(|at| (rows.time[*at] - from) / middle);
@@ -136,6 +146,32 @@ impl Model<'_> {
             columns.extend(free.iter().cloned());
         }
         columns
+    }
+
+    /// The response of unit gain, with that to the command of the first row where no level is free.
+    fn response(&self, numbers: &Numbers) -> Response {
+        let rows = self.rows;
+        let mut out = response(rows, self.class, numbers);
+        if !self.level {
+            for (value, at) in out.value.iter_mut().zip(&rows.used) {
+                *value += if self.class.integrating {
+                    rows.base * (rows.time[*at] - rows.time[0])
+                } else {
+                    rows.base
+                };
+            }
+        }
+        out
+    }
+
+    /// The output, less its mean where a level is free.
+    fn output(&self) -> Vec<f64> {
+        let mean = if self.level || self.class.integrating {
+            0.0
+        } else {
+            self.rows.mean
+        };
+        self.rows.output.iter().map(|y| y + mean).collect()
     }
 
     fn free(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
@@ -162,7 +198,7 @@ impl Model<'_> {
         let rows = self.rows;
         let numbers = self.numbers(&x);
         let (response, free) = if self.responds {
-            (response(rows, self.class, &numbers), self.free(&numbers))
+            (self.response(&numbers), self.free(&numbers))
         } else {
             (Response::default(), Vec::new())
         };
@@ -173,10 +209,11 @@ impl Model<'_> {
         }
         let whitened: Vec<Vec<f64>> = raw.iter().map(|column| whitener.whiten(column)).collect();
         let projection = Projection::new(whitened);
-        let mut left = whitener.whiten(&rows.output);
+        let output = self.output();
+        let mut left = whitener.whiten(&output);
         let parts = projection.taken(&mut left);
         let linear = projection.coefficients(&parts);
-        let mut residual = rows.output.clone();
+        let mut residual = output;
         for (column, factor) in raw.iter().zip(&linear) {
             add_multiple(&mut residual, -factor, column);
         }
@@ -240,14 +277,16 @@ impl Model<'_> {
             let mut x = point.x.clone();
             x[at] += SEARCH.step;
             let numbers = self.numbers(&x);
-            let after = response(self.rows, self.class, &numbers);
+            let after = self.response(&numbers);
             let mut change = vec![0.0; after.value.len()];
             add_multiple(&mut change, gain / SEARCH.step, &after.value);
             add_multiple(&mut change, -gain / SEARCH.step, &point.response.value);
             if !point.free.is_empty() {
                 let places = point.linear.len() - 1 - point.free.len()..;
                 let later = self.free(&numbers);
-                for ((factor, after), before) in point.linear[places].iter().zip(&later).zip(&point.free) {
+                for ((factor, after), before) in
+                    point.linear[places].iter().zip(&later).zip(&point.free)
+                {
                     add_multiple(&mut change, factor / SEARCH.step, after);
                     add_multiple(&mut change, -factor / SEARCH.step, before);
                 }
@@ -265,9 +304,19 @@ impl Model<'_> {
     pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
         let whitener = self.whitener(&point.x);
         let beside = self.beside(&point.free);
-        let nuisance = Projection::new(beside.iter().map(|column| whitener.whiten(column)).collect());
+        let nuisance = Projection::new(
+            beside
+                .iter()
+                .map(|column| whitener.whiten(column))
+                .collect(),
+        );
         let gain = self.gain(point);
-        let by_gain = point.response.value.iter().map(|entry| gain * entry).collect();
+        let by_gain = point
+            .response
+            .value
+            .iter()
+            .map(|entry| gain * entry)
+            .collect();
         std::iter::once(by_gain)
             .chain(self.raw_slopes(point))
             .map(|raw: Vec<f64>| {

@@ -221,13 +221,21 @@ impl<'a> Whitener<'a> {
                     state = [0.0; 3];
                 } else {
                     for _ in 0..*gap {
-                        state = [first * state[0] + state[1], second * state[0] + state[2], 0.0];
+                        state = [
+                            first * state[0] + state[1],
+                            second * state[0] + state[2],
+                            0.0,
+                        ];
                     }
                 }
             }
             let error = value - state[0];
             out.push(error * gain.scale * self.factor);
-            state = [*value, state[1] + gain.second * error, state[2] + gain.third * error];
+            state = [
+                *value,
+                state[1] + gain.second * error,
+                state[2] + gain.third * error,
+            ];
         }
         out
     }

@@ -63,7 +63,11 @@ impl Projection {
         let mut x = parts.to_vec();
         for j in (0..x.len()).rev() {
             let column = &self.factor[j];
-            let value = if column[j] > 0.0 { x[j] / column[j] } else { 0.0 };
+            let value = if column[j] > 0.0 {
+                x[j] / column[j]
+            } else {
+                0.0
+            };
             x[j] = value;
             for (x, entry) in x[..j].iter_mut().zip(column) {
                 *x -= entry * value;

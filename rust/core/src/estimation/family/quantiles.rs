@@ -38,7 +38,11 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_tables() {
-        for (level, freedom, expected) in [(0.95, 8.4, 2.287), (0.95, 12.6, 2.167), (0.95, 1e9, 1.95996)] {
+        for (level, freedom, expected) in [
+            (0.95, 8.4, 2.287),
+            (0.95, 12.6, 2.167),
+            (0.95, 1e9, 1.95996),
+        ] {
             assert!((student(level, freedom) / expected - 1.0).abs() < 2e-3);
         }
         for (value, freedom, expected) in [(18.307, 10.0, 0.05), (37.566, 20.0, 0.01)] {

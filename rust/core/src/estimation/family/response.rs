@@ -73,7 +73,10 @@ fn pair(sum: f64, product: f64, step: f64) -> [f64; 4] {
     let (even, odd) = if (square * step * step).abs() < MEETING {
         let decay = exp(-middle * step);
         let part = square * step * step;
-        (decay * (1.0 + part / 2.0), decay * step * (1.0 + part / 6.0))
+        (
+            decay * (1.0 + part / 2.0),
+            decay * step * (1.0 + part / 6.0),
+        )
     } else if square > 0.0 {
         let root = square.sqrt();
         let slow = exp(-step / (product * (middle + root)));
@@ -188,7 +191,9 @@ pub(super) fn response(rows: &Rows, class: Class, numbers: &Numbers) -> Response
             now = arrival;
             state.command = command[next];
             state.rate = match time.get(next + 1) {
-                Some(after) if straight => (command[next + 1] - command[next]) / (after - time[next]),
+                Some(after) if straight => {
+                    (command[next + 1] - command[next]) / (after - time[next])
+                }
                 _ => 0.0,
             };
             next += 1;

@@ -82,7 +82,9 @@ impl Record {
         let before = known(0..moves.unwrap_or(0));
         let all = known(0..self.time.len());
         let low = all.iter().fold(f64::INFINITY, |low, (_, y)| low.min(*y));
-        let high = all.iter().fold(f64::NEG_INFINITY, |high, (_, y)| high.max(*y));
+        let high = all
+            .iter()
+            .fold(f64::NEG_INFINITY, |high, (_, y)| high.max(*y));
         if before.len() < REST.rows {
             return false;
         }
@@ -98,8 +100,14 @@ fn slope(points: &[(f64, f64)]) -> (f64, f64) {
     let count = points.len() as f64;
     let mean_t = points.iter().map(|(t, _)| t).sum::<f64>() / count;
     let mean_y = points.iter().map(|(_, y)| y).sum::<f64>() / count;
-    let square: f64 = points.iter().map(|(t, _)| (t - mean_t) * (t - mean_t)).sum();
-    let product: f64 = points.iter().map(|(t, y)| (t - mean_t) * (y - mean_y)).sum();
+    let square: f64 = points
+        .iter()
+        .map(|(t, _)| (t - mean_t) * (t - mean_t))
+        .sum();
+    let product: f64 = points
+        .iter()
+        .map(|(t, y)| (t - mean_t) * (y - mean_y))
+        .sum();
     let slope = product / square;
     let left: f64 = points
         .iter()
@@ -126,6 +134,8 @@ pub(super) struct Rows {
     pub(super) time: Vec<f64>,
     /// The command less that of the first row.
     pub(super) command: Vec<f64>,
+    /// That of the first row.
+    pub(super) base: f64,
     pub(super) straight: bool,
     /// Median distance of rows and length of the record, s.
     pub(super) row: f64,
@@ -173,6 +183,7 @@ impl Rows {
         Self {
             time: record.time.clone(),
             command: record.command.iter().map(|u| u - first).collect(),
+            base: first,
             straight,
             row,
             span,

@@ -40,7 +40,12 @@ pub(super) fn minimum(model: &Model<'_>, start: Point, task: &Task) -> Result<Po
 }
 
 /// The next point; `None` where nothing moves.
-fn stepped(model: &Model<'_>, from: &Point, columns: &[Vec<f64>], damping: f64) -> Option<Vec<f64>> {
+fn stepped(
+    model: &Model<'_>,
+    from: &Point,
+    columns: &[Vec<f64>],
+    damping: f64,
+) -> Option<Vec<f64>> {
     let mut free: Vec<usize> = (0..columns.len()).collect();
     // A number that its range stops is left out, and the others step again.
     loop {
@@ -63,7 +68,12 @@ fn stepped(model: &Model<'_>, from: &Point, columns: &[Vec<f64>], damping: f64) 
     }
 }
 
-fn damped(columns: &[Vec<f64>], residual: &[f64], free: &[usize], damping: f64) -> Option<Vec<f64>> {
+fn damped(
+    columns: &[Vec<f64>],
+    residual: &[f64],
+    free: &[usize],
+    damping: f64,
+) -> Option<Vec<f64>> {
     let n = free.len();
     let mut matrix = vec![0.0; n * n];
     for (i, left) in free.iter().enumerate() {

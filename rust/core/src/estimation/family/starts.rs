@@ -51,7 +51,9 @@ pub(super) fn grid(model: &Model<'_>, task: &Task) -> Result<Vec<Vec<f64>>, Erro
 pub(super) fn are_apart(model: &Model<'_>, one: &[f64], other: &[f64]) -> bool {
     let far = (one[0] - other[0]).abs() > STARTS.apart * model.rows.row;
     let shapes = one[1..].iter().zip(&other[1..]).take(model.class.order);
-    far || shapes.into_iter().any(|(one, other)| (one - other).abs() > 1.0)
+    far || shapes
+        .into_iter()
+        .any(|(one, other)| (one - other).abs() > 1.0)
 }
 
 fn shapes(model: &Model<'_>) -> Vec<Numbers> {
@@ -94,7 +96,9 @@ pub(super) fn nested(model: &Model<'_>, smaller: Class, numbers: &Numbers) -> Ve
     if kind.integrating && !class.integrating {
         // An integrator is the slowest lag.
         let slow = 0.25 * RANGES.slowest * model.rows.span;
-        current.iter_mut().for_each(|numbers| *numbers = with_lag(numbers, slow));
+        current
+            .iter_mut()
+            .for_each(|numbers| *numbers = with_lag(numbers, slow));
         kind.integrating = false;
         kind.order += 1;
     }
@@ -102,12 +106,18 @@ pub(super) fn nested(model: &Model<'_>, smaller: Class, numbers: &Numbers) -> Ve
         return Vec::new();
     }
     while kind.order < class.order {
-        current = current.iter().flat_map(|numbers| lagged(model, numbers)).collect();
+        current = current
+            .iter()
+            .flat_map(|numbers| lagged(model, numbers))
+            .collect();
         kind.order += 1;
     }
     if class.has_zero && !kind.has_zero {
         let zeros = |numbers: &Numbers| {
-            [0.0, 0.5].map(|share| Numbers { zero: share * numbers.sum, ..*numbers })
+            [0.0, 0.5].map(|share| Numbers {
+                zero: share * numbers.sum,
+                ..*numbers
+            })
         };
         current = current.iter().flat_map(zeros).collect();
     } else if kind.has_zero && !class.has_zero {

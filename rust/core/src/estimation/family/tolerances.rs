@@ -106,6 +106,8 @@ pub(super) struct Evidence {
     pub(super) adds: f64,
     /// Ratio of largest stable gains of two classes that contradict each other.
     pub(super) contradiction: f64,
+    /// Ratio of the ends of the largest gain from which on it is not told.
+    pub(super) wide: f64,
     /// Their difference in phase at crossover, rad.
     pub(super) turn: f64,
     /// Fewest numbers with which a loop is known: one sine tells two.
@@ -121,7 +123,8 @@ pub(super) const EVIDENCE: Evidence = Evidence {
     hopeless: 60.0,
     told: 3.0,
     adds: 2.0,
-    contradiction: 2.0,
+    contradiction: 1.5,
+    wide: 4.0,
     turn: 0.5,
     enough: 3,
     white: 1e-3,
@@ -152,11 +155,14 @@ pub(super) struct Blocks {
     /// Share of independent scores in p (m − 1): less is a wider quantile.
     pub(super) freedom: f64,
     /// Leverage of a block at which its score is no longer corrected fully.
-    pub(super) leverage: f64,
+    pub(super) most_leverage: f64,
+    /// Leverage of each block up to which the jackknife holds.
+    pub(super) jackknife: f64,
 }
 
 pub(super) const BLOCKS: Blocks = Blocks {
     count: 8,
     freedom: 0.6,
-    leverage: 0.98,
+    most_leverage: 0.98,
+    jackknife: 0.5,
 };

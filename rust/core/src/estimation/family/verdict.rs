@@ -1,7 +1,10 @@
 //! Whether an answer holds, and if not, why.
 
+use std::f64::consts::PI;
+
 use super::hull::Turning;
 use super::tolerances::EVIDENCE;
+use crate::elementary::{exp, log};
 
 /// How far an answer holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +31,11 @@ pub struct Verdict {
 /// The verdict of candidates within reach, the best first; `response` is by how much BIC the command
 /// explains the output.
 pub(super) fn verdict(all: &[Turning<'_>], response: f64) -> Verdict {
-    let new = |grade, reason, size| Verdict { grade, reason, size };
+    let new = |grade, reason, size| Verdict {
+        grade,
+        reason,
+        size,
+    };
     let Some(best) = all.first() else {
         return new(Grade::None, "no response", f64::NAN);
     };
@@ -48,7 +55,11 @@ pub(super) fn verdict(all: &[Turning<'_>], response: f64) -> Verdict {
         return new(Grade::Indication, "crossover not told", high / low);
     }
     if candidate.at_limit {
-        return new(Grade::Indication, "delay at its limit", candidate.numbers.delay);
+        return new(
+            Grade::Indication,
+            "delay at its limit",
+            candidate.numbers.delay,
+        );
     }
     if candidate.white < EVIDENCE.white {
         return new(Grade::Indication, "residuals not white", candidate.white);
@@ -71,7 +82,7 @@ pub(super) fn shifted(verdict: Verdict, fall: f64) -> Verdict {
 /// Is the largest gain of the best class itself unknown?
 fn is_wide(best: &Turning<'_>) -> bool {
     let (_, low, high) = best.largest();
-    best.crossover().is_none() || !(high < EVIDENCE.contradiction * low)
+    best.crossover().is_none() || !(high < EVIDENCE.wide * low)
 }
 
 /// How far classes are from each other where the loop crosses over, if that is too far.
@@ -79,20 +90,30 @@ fn contradiction(all: &[Turning<'_>]) -> Option<f64> {
     let ends = |values: &dyn Fn() -> Vec<f64>| {
         let values = values();
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-        (low, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+        (
+            low,
+            values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        )
     };
     let (low, high) = ends(&|| all.iter().map(|one| one.largest().0).collect());
     if low < f64::INFINITY && !(high < EVIDENCE.contradiction * low) {
         return Some(high / low);
     }
     let best = all.first()?;
-    let Some(omega) = best.crossover() else {
-        // Delays alone, or plants that no gain makes unstable.
-        let parts: Vec<_> = all.iter().map(Turning::delay).collect();
-        let low = parts.iter().fold(f64::INFINITY, |low, part| low.min(part.2));
-        let high = parts.iter().fold(f64::NEG_INFINITY, |high, part| high.max(part.1));
-        return (high > low).then_some(high - low);
-    };
+    let delays = || all.iter().map(Turning::delay);
+    let least_end = delays().fold(f64::INFINITY, |least, part| least.min(part.2));
+    let most_start = delays().fold(f64::NEG_INFINITY, |most, part| most.max(part.1));
+    let crossover = best.crossover();
+    if crossover.is_none() && most_start > least_end {
+        return Some(most_start - least_end);
+    }
+    // A delay alone has no crossover: where it turns by 180 degrees.
+    let omega = crossover.unwrap_or(PI / best.candidate.numbers.delay);
+    let gain = |one: &Turning<'_>| one.candidate.seen().log_gain(omega);
+    let (low, high) = ends(&|| all.iter().map(gain).collect());
+    if high - low > log(EVIDENCE.contradiction) {
+        return Some(exp(high - low));
+    }
     let phase = |one: &Turning<'_>| one.phase(&one.candidate.seen(), omega);
     let (low, high) = ends(&|| all.iter().map(phase).collect());
     (high - low > EVIDENCE.turn).then_some(high - low)
