@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -12,6 +12,7 @@ import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._numbers import Verdict
 from deadtime.estimation.evidence._question import Between, Question, question_of
 from deadtime.estimation.evidence._words import CLEAR, reason_of
 from deadtime.loops import Controller
@@ -61,7 +62,7 @@ def estimate_of(
         "parameters": {} if best is None else dict(best.parameters),
     }
     return PlantEstimate(
-        verdict=found.verdict,
+        verdict=cast(Verdict, found.verdict),
         reason=reason_of(
             found.reason, found.reason_size, found.told, found.asked, numbers["delay"]
         ),

@@ -78,7 +78,7 @@ class Question(ReadOnlyArrays):
         """Ask the kernel; every interval of the answer has this level."""
         return native.fit_family(
             self.recording.time,
-            self.recording.command,
+            self.command,
             self.recording.output,
             kind=self.between,
             controller=self.closed_loop,
