@@ -19,6 +19,10 @@ from deadtime.recordings import MINIMUM_SAMPLES
 #: and Raftery (1995). Smaller: the second is ruled out by chance; larger: hulls are wider.
 CLEAR = 10.0
 
+#: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
+#: frequencies that the command hardly moves are listed too.
+KNOWN = 2.0
+
 #: Parts of a window that are tried where a disturbance spoils the whole, as shares of it. More or
 #: finer parts: more of a good stretch is used, and the advice takes longer.
 PARTS = ((0.0, 0.75), (0.25, 1.0), (0.0, 0.5), (0.5, 1.0))
@@ -92,7 +96,8 @@ def reason_of(code: str, size: float, determined: int, asked: int, delay: float)
         "is a disturbance, or the plant is of another kind",
         "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
         "2 ln L), and was moved",
-        "delay at its limit": f"the dead time ends at the largest one tried, {delay:.4g} s",
+        "delay at its limit": "a number of the plant is at the limit of what is tried (dead time "
+        f"{delay:.4g} s)",
         "crossover not told": "the largest stable gain is not known to a factor of 2",
         "no response": "the output does not respond to the command",
     }
@@ -160,6 +165,7 @@ def _seen(fit: FoundPlant) -> list[str]:
         for omega, gain, delay in zip(
             fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
         )
+        if gain[1] < KNOWN * gain[0]
     ]
 
 
@@ -205,9 +211,6 @@ def advice_on(fit: FoundPlant) -> Advice:
 
 
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
-    if fit._code == "delay at its limit":
-        larger = float(f"{2.0 * fit.delay:.3g}")
-        return Advice("allow a larger dead time", {"largest_delay": larger}, given)
     if fit._code in ("too few told", "classes contradict", "crossover not told"):
         known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
         words = "record a run in which the command steps up and down at uneven times"
@@ -222,6 +225,9 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
         ends = " to ".join(f"{end:g}" for end in window)
         words = f"from {ends} s the recording is explained: use that part"
         return Advice(words, {"window": window}, given)
+    if fit._code == "delay at its limit":
+        larger = float(f"{2.0 * fit.delay:.3g}")
+        return Advice("allow a larger dead time", {"largest_delay": larger}, given)
     return Advice("look where the residuals are large, and leave that out by a window", draw=True)
 
 
