@@ -2,13 +2,13 @@
 
 use super::candidate::Candidate;
 use super::class::Class;
-use super::excitation::excited;
+use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, at, hull, turning};
 use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Record, Rows, Start};
 use super::tolerances::{EVIDENCE, RANGES};
-use super::verdict::{Verdict, shifted, verdict};
+use super::verdict::{Findings, Verdict, shifted, verdict};
 use crate::{Error, Task};
 
 /// Rows that a fit needs beyond its numbers.
@@ -18,8 +18,11 @@ const FEWEST_ROWS: usize = 20;
 /// rows at the start, less may end at a delay that the noise of the first pass made too short.
 const ROOM: (f64, f64) = (1.25, 3.0);
 
+/// Numbers that one sine tells.
+const TOLD_BY_SINE: usize = 2;
+
 /// Delay, in rows, below which the command may have been logged late: more tries that more often.
-const EARLY: f64 = 0.1;
+const EARLY: f64 = 0.5;
 
 /// How a command moves between its rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -247,13 +250,36 @@ fn within_reach<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
     found.iter().filter(reach).collect()
 }
 
+/// The best, and the minima that are as likely, whatever number of numbers they need.
+fn as_likely<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
+    let best = found.first().map_or(f64::INFINITY, |best| best.deviance);
+    let is_likely = |place: &(usize, &'b Minimum<'a>)| {
+        place.0 == 0 || place.1.deviance <= best + EVIDENCE.likely
+    };
+    found
+        .iter()
+        .enumerate()
+        .filter(is_likely)
+        .map(|(_, one)| one)
+        .collect()
+}
+
 fn answer(
     found: &[Minimum<'_>],
     silent: f64,
     question: &Question,
     task: &Task,
 ) -> Result<Family, Error> {
-    let candidate = |one: &Minimum<'_>| Candidate::new(one, question.level);
+    let rows = found.first().map(|best| best.model.rows);
+    let excited = rows.map_or(Vec::new(), excited);
+    let is_sine = rows.is_some_and(|rows| is_one_sine(rows, &excited));
+    let candidate = |one: &Minimum<'_>| {
+        let mut out = Candidate::new(one, question.level);
+        if is_sine {
+            out.told = out.told.min(TOLD_BY_SINE);
+        }
+        out
+    };
     let mut minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
     leave_out_what_adds_nothing(&mut minima);
     let mut candidates: Vec<Candidate> = Vec::new();
@@ -265,12 +291,14 @@ fn answer(
             candidates.push(candidate(one));
         }
     }
-    let turning = turning(&minima, task)?;
-    let rows = found.first().map(|best| best.model.rows);
-    let best = found.first().map_or(f64::INFINITY, |best| best.bic);
+    let likely: Vec<Candidate> = as_likely(found).into_iter().map(candidate).collect();
+    let evidence = Findings {
+        response: silent - found.first().map_or(f64::INFINITY, |best| best.bic),
+        is_sine: is_sine && question.class.is_none(),
+    };
     Ok(Family {
-        verdict: verdict(&turning, silent - best),
-        hull: hull(&turning),
+        verdict: verdict(&turning(&likely, task)?, &evidence),
+        hull: hull(&turning(&minima, task)?),
         candidates,
         straight: rows.is_some_and(|rows| rows.straight),
         decided: true,
@@ -280,7 +308,7 @@ fn answer(
             .and_then(|rows| rows.used.first().copied())
             .unwrap_or(0),
         shift: 0,
-        excited: rows.map_or(Vec::new(), excited),
+        excited,
         minima,
     })
 }

@@ -98,6 +98,8 @@ pub(super) const STARTS: Starts = Starts {
 pub(super) struct Evidence {
     /// BIC within which a class may still be the true one: more widens the hull.
     pub(super) reach: f64,
+    /// −2 ln L above the best within which a class has to agree with it: more finds more contradictions.
+    pub(super) likely: f64,
     /// BIC from the best beyond which a class is not given ARMA(2,2) after ARMA(1,1): more costs time.
     pub(super) hopeless: f64,
     /// Standard errors a combination of numbers must stand from nothing to count.
@@ -120,6 +122,7 @@ pub(super) struct Evidence {
 
 pub(super) const EVIDENCE: Evidence = Evidence {
     reach: 10.0,
+    likely: 6.0,
     hopeless: 60.0,
     told: 3.0,
     adds: 2.0,

@@ -28,9 +28,16 @@ pub struct Verdict {
     pub size: f64,
 }
 
-/// The verdict of candidates within reach, the best first; `response` is by how much BIC the command
-/// explains the output.
-pub(super) fn verdict(all: &[Turning<'_>], response: f64) -> Verdict {
+/// What is known beside the candidates.
+pub(super) struct Findings {
+    /// BIC by which the command explains the output.
+    pub(super) response: f64,
+    /// Is the command one sine, and no class named?
+    pub(super) is_sine: bool,
+}
+
+/// The verdict of candidates that are as likely as the best, which comes first.
+pub(super) fn verdict(all: &[Turning<'_>], findings: &Findings) -> Verdict {
     let new = |grade, reason, size| Verdict {
         grade,
         reason,
@@ -40,10 +47,13 @@ pub(super) fn verdict(all: &[Turning<'_>], response: f64) -> Verdict {
         return new(Grade::None, "no response", f64::NAN);
     };
     let candidate = best.candidate;
-    if response < EVIDENCE.reach {
-        return new(Grade::None, "no response", response);
+    if findings.response < EVIDENCE.reach {
+        return new(Grade::None, "no response", findings.response);
     }
     let told = candidate.told;
+    if findings.is_sine {
+        return new(Grade::None, "too few told", told as f64);
+    }
     if told < candidate.values.len() && (told < EVIDENCE.enough || is_wide(best)) {
         return new(Grade::None, "too few told", told as f64);
     }
