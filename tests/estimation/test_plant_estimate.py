@@ -84,6 +84,17 @@ def test_nothing_depends_on_units(fit):
     assert scaled.largest_gain == pytest.approx(1e-5 * fit.largest_gain, rel=1e-6)
 
 
+def test_the_sign_of_the_output_changes_nothing(fit):
+    time, command, output = bump()
+    turned = dtm.estimate_delay(dtm.Recording(time, None, -output, command))
+    assert turned.delay == pytest.approx(fit.delay, rel=1e-6)
+    for name in ("gain", "largest_gain"):
+        assert turned.value(name) == pytest.approx(-fit.value(name), rel=1e-6)
+        assert turned.ci(0.95, name)[::-1] == pytest.approx(
+            [-end for end in fit.ci(0.95, name)], rel=1e-6
+        )
+
+
 def test_the_words_of_each_kind_of_plant(fit):
     assert len(fit.candidates) > 4
     assert all(one.name in PLANTS for one in fit.candidates)

@@ -32,7 +32,7 @@ class LoopView(ReadOnlyArrays):
         Frequencies, rad/s.
     gain, phase, delay : ndarray, shape (n,)
         Size of G, its angle in rad, and the equivalent delay -(arg G + 90° for each integrator)
-        / omega in s.
+        / omega in s. Where the gain of the plant is negative, angle and delay are those of -G.
     gain_ci, phase_ci, delay_ci : ndarray, shape (2, n)
         Lower and upper ends of the 95 % intervals, over all kinds of plant that the recording does
         not rule out.

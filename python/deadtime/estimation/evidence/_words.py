@@ -161,7 +161,8 @@ def _seen(fit: FoundPlant) -> list[str]:
         return []
     view = fit.at(fit.excited)
     return [
-        f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 %)"
+        f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 %), "
+        f"or that and half periods of {_rough(math.pi / omega, 's')}"
         for omega, gain, delay in zip(
             fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
         )
