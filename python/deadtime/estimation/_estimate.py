@@ -259,6 +259,8 @@ def estimate_delay(
         if method != "auto" or free is not FREE:
             raise ValueError("method and free are for a loop: give the loop, or leave them out")
         if not isinstance(recording, Recording):
+            if not recording:
+                raise ValueError("no recording was given: give one")
             raise TypeError(
                 "without a loop one Recording is taken, not a list: give the loop to fit several"
             )
