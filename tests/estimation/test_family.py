@@ -112,6 +112,33 @@ def test_a_command_that_is_logged_late_is_moved():
     assert (found.shift, found.verdict, found.reason) == (-1, "indication", "command shifted")
 
 
+def test_a_command_of_unknown_kind_has_the_intervals_of_both():
+    record = made.height_steps(2)
+    kinds = {kind: fit(record, kind=kind) for kind in ("held", "straight", "undecided")}
+    both = kinds["undecided"]
+    if not both.kind_decided:
+        parts = [kinds[kind].hull["delay"] for kind in ("held", "straight")]
+        assert both.hull["delay"][0] == min(part[0] for part in parts)
+        assert both.hull["delay"][1] == max(part[1] for part in parts)
+    assert both.candidates[0].deviance == min(
+        kinds[kind].candidates[0].deviance for kind in ("held", "straight")
+    )
+
+
+def test_an_output_without_noise_keeps_an_interval():
+    time = np.arange(300) * 0.05
+    command = np.repeat([0.0, 1.0, -1.0], 100)
+    level, output = 0.0, np.zeros(300)
+    for row in range(300):
+        output[row] = level
+        level += (command[max(row - 6, 0)] - level) * (1.0 - np.exp(-0.05 / 2.0))
+    found = _native.fit_family(time, command, output)
+    for name, value in [("delay", 0.3), ("gain", 1.0), ("lag", 2.0)]:
+        low, high = found.hull[name]
+        assert low <= value <= high
+        assert high > low
+
+
 def test_noise_alone_is_no_response():
     random = np.random.default_rng(2)
     command = np.repeat(random.choice([-1.0, 1.0], 40), 5)

@@ -217,7 +217,7 @@ fn covariance(information: &[f64], scales: &[f64], factor: f64) -> Vec<f64> {
     }
     let mut out = inverse_of_positive(&matrix, n, 0.0).unwrap_or_else(|| {
         let unknown = |at: usize| {
-            if at % (n + 1) == 0 {
+            if at.is_multiple_of(n + 1) {
                 UNKNOWN * UNKNOWN
             } else {
                 0.0

@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::class::Class;
 use super::excitation::{excited, is_one_sine};
-use super::hull::{Named, at, hull, turning};
+use super::hull::{Named, Triple, at, hull, turning};
 use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Record, Rows, Start};
@@ -85,7 +85,7 @@ impl Family {
     ///
     /// # Errors
     /// [`Error::Interrupted`] and [`Error::Memory`].
-    pub fn at(&self, omega: &[f64], task: &Task) -> Result<Vec<[(f64, f64, f64); 3]>, Error> {
+    pub fn at(&self, omega: &[f64], task: &Task) -> Result<Vec<[Triple; 3]>, Error> {
         let turning = turning(&self.minima, task)?;
         Ok(omega.iter().map(|omega| at(&turning, *omega)).collect())
     }
@@ -118,29 +118,35 @@ pub fn fit_family(record: &Record, question: &Question, task: &Task) -> Result<F
         Between::Straight => &[true],
         Between::Undecided => &[false, true],
     };
-    let mut best: Option<Family> = None;
-    let mut decided = true;
+    let mut found = Vec::with_capacity(kinds.len());
     for straight in kinds {
-        let found = one_kind(record, question, start, *straight, task)?;
-        let least = |family: &Family| {
-            family
-                .candidates
-                .first()
-                .map_or(f64::INFINITY, |one| one.deviance)
-        };
-        if let Some(before) = &best {
-            decided = (least(before) - least(&found)).abs() > EVIDENCE.reach;
-        }
-        if best
-            .as_ref()
-            .is_none_or(|before| least(&found) < least(before))
-        {
-            best = Some(found);
+        found.push(one_kind(record, question, start, *straight, task)?);
+    }
+    let out = joined(found, task)?;
+    moved(record, question, start, &out, task).map(|moved| moved.unwrap_or(out))
+}
+
+/// The more likely kind of command; where neither is, its intervals are those of both.
+fn joined(mut found: Vec<Family>, task: &Task) -> Result<Family, Error> {
+    let least = |family: &Family| {
+        family
+            .candidates
+            .first()
+            .map_or(f64::INFINITY, |one| one.deviance)
+    };
+    found.sort_by(|a, b| least(a).total_cmp(&least(b)));
+    let mut kinds = found.into_iter();
+    let mut out = kinds
+        .next()
+        .ok_or_else(|| Error::argument("no kind of command was given"))?;
+    for other in kinds {
+        out.decided = least(&other) - least(&out) > EVIDENCE.likely;
+        if !out.decided {
+            out.minima.extend(other.minima);
+            out.hull = hull(&turning(&out.minima, task)?);
         }
     }
-    let mut out = best.ok_or_else(|| Error::argument("no kind of command was given"))?;
-    out.decided = decided;
-    moved(record, question, start, &out, task).map(|moved| moved.unwrap_or(out))
+    Ok(out)
 }
 
 /// The family with the command a row earlier, where no delay is too much and that is better. In a

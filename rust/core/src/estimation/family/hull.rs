@@ -8,7 +8,7 @@ use crate::elementary::{exp, log};
 use crate::{Error, Task};
 
 /// A value and the ends of its interval.
-pub(super) type Triple = (f64, f64, f64);
+pub type Triple = (f64, f64, f64);
 
 /// An interval of a named quantity.
 #[derive(Debug, Clone, PartialEq)]

@@ -32,7 +32,7 @@ mod verdict;
 pub use candidate::Candidate;
 pub use class::{Class, Numbers};
 pub use fit::{Between, Family, Question, fit_family};
-pub use hull::Named;
+pub use hull::{Named, Triple};
 pub use noise::{Coefficients, Noise};
 pub use rows::Record;
 pub use verdict::{Grade, Verdict};

@@ -1,7 +1,10 @@
-//! Orthonormal columns by modified Gram–Schmidt, done twice; columns that depend on others are left out.
+//! Orthonormal columns by modified Gram–Schmidt, done twice where much is taken; columns that depend on others are left out.
 
 use super::tolerances::SEARCH;
 use crate::linear_algebra::vectors::{add_multiple, dot};
+
+/// Share of a column that is left below which the rest is made orthogonal again: less loses digits.
+const AGAIN: f64 = 1e-3;
 
 /// X = Q R of columns.
 #[derive(Debug, Default, Clone)]
@@ -24,10 +27,13 @@ impl Projection {
     fn add(&mut self, mut column: Vec<f64>) {
         let size = dot(&column, &column).sqrt();
         let mut parts = self.taken(&mut column);
-        for (part, more) in parts.iter_mut().zip(self.taken(&mut column)) {
-            *part += more;
+        let mut left = dot(&column, &column).sqrt();
+        if left < AGAIN * size {
+            for (part, more) in parts.iter_mut().zip(self.taken(&mut column)) {
+                *part += more;
+            }
+            left = dot(&column, &column).sqrt();
         }
-        let left = dot(&column, &column).sqrt();
         if left > SEARCH.dependent * size {
             column.iter_mut().for_each(|entry| *entry /= left);
             parts.push(left);

@@ -51,7 +51,8 @@ impl Transitions {
             return self.known[0].1;
         }
         self.known.swap(0, 1);
-        if !((self.known[0].0 - step).abs() < self.tolerance) {
+        let is_known = (self.known[0].0 - step).abs() < self.tolerance;
+        if !is_known {
             self.known[0] = (step, self.computed(step));
         }
         self.known[0].1

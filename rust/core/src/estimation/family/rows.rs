@@ -30,7 +30,8 @@ impl Record {
             self.command.len(),
             self.output.len()
         );
-        if let Some(at) = (1..count).find(|at| !(self.time[*at] > self.time[at - 1])) {
+        let increases = |at: usize| self.time[at] > self.time[at - 1];
+        if let Some(at) = (1..count).find(|at| !increases(*at)) {
             refuse!(
                 "time {} s in row {at} after {} s: times must increase",
                 self.time[at],

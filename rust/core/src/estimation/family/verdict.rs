@@ -92,7 +92,8 @@ pub(super) fn shifted(verdict: Verdict, fall: f64) -> Verdict {
 /// Is the largest gain of the best class itself unknown?
 fn is_wide(best: &Turning<'_>) -> bool {
     let (_, low, high) = best.largest();
-    best.crossover().is_none() || !(high < EVIDENCE.wide * low)
+    let is_narrow = high < EVIDENCE.wide * low;
+    best.crossover().is_none() || !is_narrow
 }
 
 /// How far classes are from each other where the loop crosses over, if that is too far.
@@ -106,7 +107,8 @@ fn contradiction(all: &[Turning<'_>]) -> Option<f64> {
         )
     };
     let (low, high) = ends(&|| all.iter().map(|one| one.largest().0).collect());
-    if low < f64::INFINITY && !(high < EVIDENCE.contradiction * low) {
+    let agree = high < EVIDENCE.contradiction * low;
+    if low < f64::INFINITY && !agree {
         return Some(high / low);
     }
     let best = all.first()?;
