@@ -83,7 +83,7 @@ def estimate_delay(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    between: Between = "held",
+    between: Between = "undecided",
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate: ...
 
@@ -101,7 +101,7 @@ def estimate_delay(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    between: Between = "held",
+    between: Between = "undecided",
     progress: Callable[[int], object] | None = None,
 ) -> DelayEstimate | PlantEstimate:
     """Estimate the delay of a plant, or that of a closed loop, from a recording.
@@ -172,8 +172,9 @@ def estimate_delay(
         recording says so, or the state is unknown.
     largest_delay : float, optional
         Without `loop`: largest delay that is tried, s; by default 0.3 of the recording.
-    between : {"held", "straight", "samples", "undecided"}
-        Without `loop`: how the command moves between two rows; undecided: as is likelier.
+    between : {"undecided", "held", "straight", "samples"}
+        Without `loop`: how the command moves between two rows. By default the recording
+        decides; where it does not, intervals hold for a held and a straight command.
     progress : callable, optional
         Without `loop`: called with a number that grows while plants are compared.
 

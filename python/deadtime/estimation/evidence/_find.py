@@ -26,7 +26,7 @@ def estimate_by_evidence(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    between: Between = "held",
+    between: Between = "undecided",
     plant: str | None = None,
     controller: Controller | None = None,
     limit: float | None = None,

@@ -64,7 +64,7 @@ class Question(ReadOnlyArrays):
     closed_loop: bool = False
     at_rest: bool | None = None
     largest_delay: float | None = None
-    between: Between = "held"
+    between: Between = "undecided"
     plant: str | None = None
     controller: Controller | None = None
     window: OpenRange | None = None
@@ -99,7 +99,7 @@ class Question(ReadOnlyArrays):
         """What was given besides the recording, as arguments of `estimate_delay`."""
         names = ("window", "controller", "at_rest", "largest_delay", "plant")
         found = {name: getattr(self, name) for name in names}
-        if self.between != "held":
+        if self.between != "undecided":
             found["between"] = self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):
             found["closed_loop"] = self.closed_loop
