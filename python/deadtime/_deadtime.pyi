@@ -622,6 +622,76 @@ class FlightLikelihood:
         lower: float = ...,
     ) -> tuple[float, PlantNumbers]: ...
 
+@final
+class FamilyCandidate:
+    plant: Final[str]
+    integrating: Final[bool]
+    order: Final[int]
+    has_zero: Final[bool]
+    names: Final[list[str]]
+    values: Final[_Reals]
+    errors: Final[_Reals]
+    covariance: Final[_Reals]
+    quantile: Final[float]
+    dispersion: Final[float]
+    complex_poles: Final[bool]
+    lags: Final[list[float]]
+    pole_frequency: Final[float]
+    pole_damping: Final[float]
+    noise: Final[str]
+    ar: Final[list[float]]
+    ma: Final[list[float]]
+    noise_std: Final[float]
+    innovation_std: Final[float]
+    deviance: Final[float]
+    bic: Final[float]
+    parameters: Final[int]
+    told: Final[int]
+    whiteness: Final[float]
+    residuals: Final[_Reals]
+    fitted: Final[_Reals]
+    at_limit: Final[bool]
+
+@final
+class FamilyFit:
+    candidates: Final[list[FamilyCandidate]]
+    verdict: Final[str]
+    reason: Final[str]
+    reason_size: Final[float]
+    shift: Final[int]
+    kind: Final[str]
+    kind_decided: Final[bool]
+    rows: Final[int]
+    first_row: Final[int]
+    at_rest: Final[bool]
+    told: Final[int]
+    asked: Final[int]
+    excited: Final[_Reals]
+    omega: Final[_Reals]
+    hull: Final[dict[str, _Pair]]
+    crossover: Final[float]
+    largest_gain: Final[float]
+    gain_at_crossover: Final[float]
+    phase_at_crossover: Final[float]
+    delay_at_crossover: Final[float]
+    def at(self, omega: Sequence[float]) -> dict[str, tuple[_Reals, _Reals, _Reals]]: ...
+
+def fit_family(
+    time: _Reals,
+    command: _Reals,
+    output: _Reals,
+    *,
+    kind: str = "held",
+    controller: bool = False,
+    at_rest: bool | None = None,
+    largest_delay: float | None = None,
+    earlier: int = 0,
+    plant: str | None = None,
+    noise: str | None = None,
+    level: float = 0.95,
+    omega: Sequence[float] | None = None,
+    progress: _Progress = None,
+) -> FamilyFit: ...
 def whitened_columns(
     num: Sequence[float],
     den: Sequence[float],
@@ -1051,6 +1121,7 @@ def blackbox_frames(log: bytes, layout: _BlackboxLayout, limit: int) -> Blackbox
 class CsvColumns:
     values: Final[list[NDArray[np.float64]]]
     backward: Final[tuple[int, float, float] | None]
+    repeated: Final[tuple[int, float, float] | None]
 
 class _CsvLayout(Protocol):
     @property

@@ -60,6 +60,7 @@ CONTINUOUS = ("estimate", "step.csv", "--kp", 2.4)
         ("explore", ("explore", "--out", "page.html")),
         ("watch", ("watch", "moved.csv", "--noise", 0.005)),
         ("report", ("report", *LOOP, "--out", "pages/report.html")),
+        ("plant-estimate", ("estimate", "moved.csv")),
         ("estimate", (*CONTINUOUS, "--method", "auto")),
         ("comparison", (*STEP, "--method", "all")),
         ("plant-choice", (*CONTINUOUS, "--plant", "auto/s")),

@@ -10,10 +10,16 @@ import pytest
 from command_line import one_clear_line, run_elsewhere
 from deadtime import Experiment
 from deadtime.tuning import adaptive_gains
+from made_processes import bump
 from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
 TIME = np.linspace(0.0, 5.0, 60)
+
+
+def found_plant():
+    time, command, output = bump(rows=150)
+    return dtm.estimate_delay(dtm.Recording(time, None, output, command), plant="lag")
 
 
 def estimated():
@@ -67,6 +73,7 @@ DRAWN = {
     "FilterChoice.plot": lambda: filtered().plot(),
     "GainSchedule.plot": lambda: adapted().plot(),
     "Identifiability.plot": lambda: planned().plot(),
+    "PlantEstimate.plot": lambda: found_plant().plot(),
     "Latency.plot": lambda: told().plot(),
     "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),
     "Response.plot": lambda: LOOP.step_response().plot(),

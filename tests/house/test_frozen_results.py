@@ -11,6 +11,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from made_logs import copter
+from made_processes import bump
 from step_recordings import record_step
 
 LOOP = dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.8, 0.1), delay=0.36, sample_time=0.065)
@@ -35,6 +36,11 @@ def designed():
 
 def estimated():
     return dtm.estimate_delay(*record_step(rest=1.0, noise=0.01), free=("delay",))
+
+
+def found_plant():
+    time, command, output = bump(rows=150)
+    return dtm.estimate_delay(dtm.Recording(time, None, output, command), plant="lag")
 
 
 def tracked():
@@ -111,6 +117,10 @@ MADE = {
     "Parameter": lambda: Kp,
     "ParametricQuasiPolynomial": lambda: FAMILY,
     "PlannedBound": lambda: planned().bound,
+    "Advice": lambda: found_plant().advice(),
+    "LoopView": lambda: found_plant().at([0.01, 0.1]),
+    "PlantCandidate": lambda: found_plant().best,
+    "PlantEstimate": found_plant,
     "PlantChoice": lambda: dtm.estimation.PlantChoice(
         {"1 lag": estimated()}, {"1 lag": 0.0}, {}, "1 lag"
     ),

@@ -170,31 +170,56 @@ def masked(values, *rows):
 
 @pytest.mark.parametrize("rows", [(3,), (0, 1), (20, 21, 22), (39,)])
 @pytest.mark.parametrize("column", [0, 1, 2])
-def test_masked_rows_of_a_recording_are_left_out(column, rows):
+def test_masked_values_of_a_recording_are_missing(column, rows):
     columns = [ROWS, STEP, OUTPUT]
     columns[column] = masked(columns[column], *rows)
     flight = dtm.Recording(*columns)
     kept = np.delete(np.arange(40), rows)
+    if column == 2:  # the row stays, with what is known of it
+        assert np.array_equal(flight.time, ROWS)
+        assert np.flatnonzero(np.isnan(flight.output)).tolist() == list(rows)
+        assert flight.window(None, None) is flight
+        flight = flight.complete()
+    elif column == 1:  # it holds where it is missing
+        kept = np.arange(40)
     assert np.array_equal(flight.time, ROWS[kept])
     assert np.array_equal(flight.output, OUTPUT[kept])
     assert np.array_equal(flight.reference, STEP[kept])
+    assert flight.complete() is flight
 
 
 @pytest.mark.parametrize("rows", [(10,), (9, 10), (10, 11)])
-@pytest.mark.parametrize("column", [1, 2])
-def test_a_masked_row_that_hides_a_step_is_refused(column, rows):
+@pytest.mark.parametrize("column", [0, 1, 2])
+def test_a_missing_row_that_hides_a_step_is_refused(column, rows):
     # The step would appear a row later, and the delay a row shorter.
     columns = [ROWS, STEP, OUTPUT]
     columns[column] = masked(columns[column], *rows)
     with pytest.raises(dtm.RecordingError, match="the reference changes there"):
-        dtm.Recording(*columns)
+        dtm.Recording(*columns).complete()
 
 
-def test_a_masked_row_that_hides_a_command_is_refused():
-    with pytest.raises(dtm.RecordingError, match="row 5 is masked, and the command changes"):
-        dtm.Recording(ROWS, STEP, masked(OUTPUT, 5), command=ROWS)
-    held = dtm.Recording(ROWS, STEP, masked(OUTPUT, 5), command=STEP)
+def test_a_missing_row_that_hides_a_command_is_refused():
+    moving = dtm.Recording(ROWS, STEP, masked(OUTPUT, 5), command=ROWS)
+    assert len(moving) == 40
+    with pytest.raises(dtm.RecordingError, match="row 5 is missing, and the command changes"):
+        moving.complete()
+    with pytest.raises(dtm.RecordingError, match="row 5 is missing, and the command changes"):
+        dtm.Recording(ROWS, STEP, OUTPUT, command=masked(ROWS, 5))
+    held = dtm.Recording(ROWS, STEP, masked(OUTPUT, 5), command=STEP).complete()
     assert len(held) == len(held.command) == 39
+
+
+def test_not_a_number_is_a_missing_output_and_survives_windows_and_files(tmp_path):
+    output = np.where(np.arange(40) == 7, np.nan, OUTPUT)
+    flight = dtm.Recording(ROWS, None, output, command=STEP)
+    assert not flight.has_reference
+    assert flight.steps() == []
+    assert "1 without output" in repr(flight)
+    flight.save(tmp_path / "run.csv")
+    assert dtm.Recording.load(tmp_path / "run.csv") == flight
+    assert np.isnan(flight.window(0.3, 2.0).output[4])
+    with pytest.raises(dtm.RecordingError, match="has no reference, which this method needs"):
+        dtm.estimate_delay(flight, SAMPLED)
 
 
 def test_masked_columns_of_other_lengths_are_refused():

@@ -76,7 +76,6 @@ def test_the_separator_is_the_one_that_finds_the_names(tmp_path):
     [
         (("\n0.5,", "\n0.5,,"), "line 7: 5 cells under 4 column names"),
         (("\n0.5,0.0,", "\n0.5,"), "line 7: 3 cells, so the column 'speed' has none"),
-        (("\n0.5,0.0,", "\n0.5,,"), "line 7: '' in column 'ref_m' is not a number"),
         (("\n0.5,0.0,", "\n0.5,0x1p3,"), "line 7: '0x1p3' in column 'ref_m' is not a number"),
         (("\n0.5,0.0,", "\n0.5,1_0,"), "line 7: '1_0' in column 'ref_m' is not a number"),
         (("\n0.5,0.0,", "\n0.5,1e999,"), "line 7: 'ref_m' is inf"),
@@ -195,11 +194,15 @@ def by_python(table, delimiter):
             "_" in cell or not cell.strip("\xa0").isascii() for row in found for cell in row
         )
         assert not any("".join(row[3:]).strip() for row in found)
-        columns = np.array([[float(cell) for cell in row[:3]] for row in found])
+        columns = np.array(
+            [[float(row[0]), *(float(cell.strip() or "nan") for cell in row[1:3])] for row in found]
+        )
         assert columns.shape[1] == 3
-        assert np.isfinite(columns).all()
-        dtm.Recording(*columns.T)
-        assert len({*columns[:, 1]}) > 1
+        assert not np.isinf(columns).any()
+        assert not np.isnan(columns[:, 0]).any()
+        read = dtm.Recording(*columns.T)
+        assert read.steps()
+        columns[:, 1] = read.reference
     except (AssertionError, csv.Error, IndexError, ValueError):
         return None
     return columns.T
@@ -224,6 +227,19 @@ def test_what_is_read_is_what_python_reads(rows, delimiter, end):
         found = dtm.read_recording(file, delimiter=delimiter)
     for column, name in zip(known, ("time", "reference", "output"), strict=True):
         assert getattr(found, name).tobytes() == column.tobytes()
+
+
+def test_an_empty_cell_is_a_missing_output(tmp_path):
+    flight = read(tmp_path, as_csv().replace("\n0.5,0.0,", "\n0.5,,"))
+    assert flight == read(tmp_path, as_csv())
+    lines = as_csv().splitlines()
+    place = lines[0].split(",").index("height_m")
+    cells = lines[31].split(",")
+    cells[place] = " "
+    lines[31] = ",".join(cells)
+    flight = read(tmp_path, "\n".join(lines))
+    assert np.flatnonzero(np.isnan(flight.output)).tolist() == [30]
+    assert len(flight.complete()) == len(flight) - 1
 
 
 def test_a_quoted_cell_may_hold_line_ends(tmp_path):

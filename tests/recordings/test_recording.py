@@ -64,7 +64,7 @@ def test_a_window_includes_its_ends(tmp_path):
 
 
 def test_values_outside_the_window_need_not_be_valid(tmp_path):
-    rows = [*ROWS, (2.5, math.nan, math.nan)]
+    rows = [*ROWS, (2.5, math.inf, math.nan)]
     assert len(read(write(tmp_path, rows), window=(0.0, 2.0))) == 20
     with pytest.raises(dtm.RecordingError, match="line 22"):
         read(write(tmp_path, rows))
@@ -81,7 +81,7 @@ def broken(**change):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (broken(_4_2="nan"), ["line 6", "height_m", "nan"]),
+        (broken(_4_2="-inf"), ["line 6", "height_m", "-inf"]),
         (broken(_4_1="inf"), ["line 6", "ref_m", "inf"]),
         (broken(_7_2="high"), ["line 9", "'high'", "not a number"]),
         (broken(_7_0=0.2), ["line 9", "goes back"]),
@@ -170,7 +170,10 @@ def make(**change):
         ({"output": np.zeros(9)}, "differ in length"),
         ({"time": np.zeros(10)}, "repeats at row 1"),
         ({"time": np.arange(10.0)[::-1]}, "goes back at row 1"),
-        ({"output": [*np.zeros(9), np.nan]}, "nan at row 9"),
+        ({"output": [*np.zeros(9), np.inf]}, "inf at row 9"),
+        ({"output": [*np.zeros(7), *[np.nan] * 3]}, "known in 7 of 10 rows, at least 8"),
+        ({"time": [*np.arange(9.0), np.nan]}, "time is nan at row 9"),
+        ({"command": np.full(10, np.nan)}, "command is nan at row 0"),
         ({"output": np.zeros((10, 1))}, "shape"),
         ({"output": ["a"] * 10}, "not an array of numbers"),
         ({"command": np.full(10, np.inf)}, "command is inf"),

@@ -90,15 +90,19 @@ KINDS_OF_MISSING = ["masked", "pandas", "polars", "Arrow"]
 
 @pytest.mark.parametrize("kind", KINDS_OF_MISSING)
 @pytest.mark.parametrize("column", NAMES.values())
-def test_a_missing_value_is_a_row_left_out(kind, column):
+def test_a_missing_value_is_a_row_that_is_missing(kind, column):
     flight = dtm.read_recording(with_missing(kind, 30, column), **NAMES)
-    np.testing.assert_array_equal(flight.time, np.delete(T, 30))
-    np.testing.assert_array_equal(flight.output, np.delete(Y, 30))
+    if column == NAMES["reference"]:  # it holds
+        assert flight == dtm.read_recording(COLUMNS, **NAMES)
+        return
+    assert np.isnan(flight.output).any() == (column == NAMES["output"])
+    np.testing.assert_array_equal(flight.complete().time, np.delete(T, 30))
+    np.testing.assert_array_equal(flight.complete().output, np.delete(Y, 30))
 
 
 @pytest.mark.parametrize("kind", KINDS_OF_MISSING)
 def test_a_missing_value_that_hides_a_step_is_refused(kind):
-    with pytest.raises(dtm.RecordingError, match="row 10 is masked, and the reference changes"):
+    with pytest.raises(dtm.RecordingError, match="row 10 is missing, and the reference changes"):
         dtm.read_recording(with_missing(kind, 10, "ref_m"), **NAMES)
 
 
@@ -112,7 +116,7 @@ def test_missing_values_outside_the_window_do_not_matter(kind):
 
 @pytest.mark.parametrize("kind", ["dict of arrays", "pandas", "polars", "xarray", "Arrow"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_value_that_is_not_finite_is_refused_with_its_row(kind, value):
+def test_an_infinite_value_is_refused_with_its_row_and_nan_is_missing(kind, value):
     spoilt = COLUMNS | {"height_m": np.where(T[30] == T, value, Y)}
     columns = dict(COLUMNS)
     try:
@@ -121,6 +125,9 @@ def test_a_value_that_is_not_finite_is_refused_with_its_row(kind, value):
     finally:
         COLUMNS.update(columns)
     table = spoilt if kind == "dict of arrays" else table
+    if np.isnan(value):
+        assert np.flatnonzero(np.isnan(dtm.read_recording(table, **NAMES).output)).tolist() == [30]
+        return
     with pytest.raises(dtm.RecordingError, match=f"the table, row 30: 'height_m' is {value}"):
         dtm.read_recording(table, **NAMES)
     assert len(dtm.read_recording(table, **NAMES, window=(None, 2.0))) == 21

@@ -24,7 +24,7 @@ DEFECT = 70
 
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
-    "estimate": "Estimate the delay of a loop from a recording of it, or from several together.",
+    "estimate": "Find the plant of a recording, or the delay of a known loop, with a verdict.",
     "inspect": "Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
     "latency": "Tell how long each loop of a vehicle takes to respond, by stage, and what that "
     "costs.",

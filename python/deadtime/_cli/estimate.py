@@ -1,4 +1,4 @@
-"""``deadtime estimate``: the delay in a recording, or in several of one vehicle together."""
+"""``deadtime estimate``: the plant of a recording, or the delay of a loop in one or several."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from deadtime._base.drawing import empty_figure, new_figure
 from deadtime._cli import options as opt
 from deadtime._cli.checks import grave_findings, print_grave_findings, show_checks
 from deadtime._cli.comparisons import choice_table, estimates_table
+from deadtime._cli.estimate_plant import Asked, estimate_plant
 from deadtime._cli.fits import print_details, print_headline
 from deadtime._cli.free import check_fitted, checked_free
 from deadtime._cli.plants import with_names
@@ -55,12 +56,13 @@ def command(
         ),
     ],
     kp: Annotated[
-        list[float],
+        list[float] | None,
         typer.Option(
-            help="Proportional gain. This and the other gains: one, or one for each file.",
+            help="Proportional gain of the controller in the loop. This and the other gains: one, "
+            "or one for each file. Without: the plant is found from command and output alone.",
             show_default=False,
         ),
-    ],
+    ] = None,
     kv: Annotated[
         list[float] | None, typer.Option(help="Velocity gain, of PV.", show_default=False)
     ] = None,
@@ -71,9 +73,9 @@ def command(
         list[float] | None, typer.Option(help="Derivative gain, of PD and PID.", show_default=False)
     ] = None,
     filter: opt.Filter = None,  # noqa: A002
-    time: opt.Time = "time",
-    reference: opt.Reference = "reference",
-    output: opt.Output = "output",
+    time: opt.Time = None,
+    reference: opt.Reference = None,
+    output: opt.Output = None,
     command: opt.Command = None,
     sample_time: opt.Sample_time = None,
     limit: opt.Limit = None,
@@ -82,7 +84,8 @@ def command(
         typer.Option(
             help="Plant in place of the integrator, such as '0.9/(s*(0.1*s+1))'; delay(T) in it is "
             "a delay of T s, added to that of the loop. auto/s: an integrator with as many lags as "
-            "the recording shows; auto: the same without an integrator."
+            "the recording shows; auto: the same without an integrator. Without --kp: a kind, such "
+            "as 'two lags'."
         ),
     ] = None,
     gain: opt.Gain = 1.0,
@@ -116,6 +119,26 @@ def command(
             help="True output at the start, if known; for output_error, waveform, grid, cta."
         ),
     ] = None,
+    at_rest: Annotated[
+        bool | None,
+        typer.Option(
+            "--at-rest/--not-at-rest",
+            help="Without --kp: was the plant at rest at the first row? Not given: as it shows.",
+            show_default=False,
+        ),
+    ] = None,
+    closed_loop: Annotated[
+        bool | None,
+        typer.Option(
+            "--closed-loop/--open-loop",
+            help="Without --kp: does a controller compute the command? Not given: a reference that "
+            "moves says so.",
+            show_default=False,
+        ),
+    ] = None,
+    largest_delay: Annotated[
+        float | None, typer.Option(help="Without --kp: largest delay that is tried, s.")
+    ] = None,
     check: Annotated[
         bool,
         typer.Option(
@@ -127,8 +150,29 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Estimate the delay of a loop from a recording of it, or from several together."""
+    """Find the plant of a recording, or the delay of a known loop, with a verdict."""
     files, windows = files_and_windows(files, window)
+    columns: dict[str, Any] = {
+        "time": time,
+        "reference": reference,
+        "output": output,
+        "command": command,
+    }
+    known = {"at_rest": at_rest, "closed_loop": closed_loop, "largest_delay": largest_delay}
+    if kp is None:
+        loops_only = {
+            "kv": kv, "ki": ki, "kd": kd, "filter": filter, "sample_time": sample_time,
+            "limit": limit, "method": method, "free": free, "map": map, "noise": noise,
+            "initial_output": initial_output, "check": check or None,
+        }  # fmt: skip
+        _refuse_given(loops_only, "is for a loop whose controller is named: give --kp, or leave it")
+        if len(files) > 1:
+            raise ValueError(f"{len(files)} files are fitted together in a loop: give --kp")
+        columns["command"] = command or "auto"
+        asked = Asked(files[0], columns, windows[0], {**known, "plant": plant}, plot)
+        estimate_plant(asked, as_json)
+        return
+    _refuse_given(known, "is for a recording without a named controller: leave it or --kp out")
     given = {"map": map, "noise": noise, "initial_output": initial_output}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if plant in AUTOMATIC and method is None:
@@ -158,10 +202,7 @@ def command(
         for Kp, Kv, Ki, Kd in gains
     ]
     loops = [loop.replace(plant=with_names(loop.plant)) for loop in loops]
-    flights = [
-        read_recording(file, time=time, reference=reference, output=output, command=command)
-        for file in files
-    ]
+    flights = [read_recording(file, **columns) for file in files]
     if name == "auto":
         name = automatic_method(flights)
     fitted = checked_free(free, loops[0], name)
@@ -203,6 +244,13 @@ def command(
         print_headline(fit)
         print_grave_findings(findings)
         print_details(fit)
+
+
+def _refuse_given(options: dict[str, Any], why: str) -> None:
+    """Refuse options of the other way to estimate."""
+    for name, value in options.items():
+        if value is not None:
+            raise ValueError(f"--{name.replace('_', '-')} {why}")
 
 
 def _each(name: str, values: Sequence[Each], files: Sequence[Path]) -> list[Each]:

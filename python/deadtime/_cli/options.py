@@ -43,9 +43,22 @@ File = Annotated[
         help="Table: CSV with a header line, Parquet, Arrow or MAT.", show_default=False
     ),
 ]
-Time = Annotated[str, typer.Option(help="Column of the time stamps, s.")]
-Reference = Annotated[str, typer.Option(help="Column of the reference.")]
-Output = Annotated[str, typer.Option(help="Column of the measured output.")]
+Time = Annotated[
+    str | None,
+    typer.Option(
+        help="Column of the time stamps, s; without: one of a usual name.", show_default=False
+    ),
+]
+Reference = Annotated[
+    str | None,
+    typer.Option(help="Column of the reference; without: one of a usual name.", show_default=False),
+]
+Output = Annotated[
+    str | None,
+    typer.Option(
+        help="Column of the measured output; without: one of a usual name.", show_default=False
+    ),
+]
 Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
 Window = Annotated[Ends | None, typer.Option(help="Use the samples between these times, s.")]
 Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]

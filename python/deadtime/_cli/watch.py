@@ -25,8 +25,8 @@ from deadtime.recordings import Row, Sent, growing_rows, read_recording
 def command(
     *,
     source: Annotated[str, typer.Argument(show_default=False)],
-    time: opt.Time = "time",
-    output: opt.Output = "output",
+    time: Annotated[str, typer.Option(help="Column of the time stamps, s.")] = "time",
+    output: Annotated[str, typer.Option(help="Column of the measured output.")] = "output",
     command: str = "command",
     numbers: Annotated[Given, Fills(opt.described_loop, "plant gain lag")],
     lags: opt.Ends | None = None,
@@ -142,11 +142,11 @@ def _events(
 def recorded_rows(file: Path, columns: tuple[str, str, str]) -> Iterator[Row]:
     """The rows of a table that is complete."""
     time, output, command = columns
-    # No reference is needed.
-    found = read_recording(file, time=time, reference=output, output=output, command=command)
+    found = read_recording(file, time=time, output=output, command=command)
     assert found.command is not None
     values = (found.time, found.output, found.command)
-    return (Row(*row) for row in zip(*(column.tolist() for column in values), strict=True))
+    rows = zip(*(column.tolist() for column in values), strict=True)
+    return (Row(now, None if math.isnan(y) else y, u) for now, y, u in rows)
 
 
 def _estimates(

@@ -7,7 +7,8 @@ while the loop runs. Each method is a class that holds its options.
 """
 
 # The files. `_estimate` chooses and runs a method, `_compare` runs several, `_choose` tries several
-# plants, `_result` is what they return, `_shared` combines several. `methods` holds one file a
+# plants, `_result` is what they return, `_shared` combines several. `evidence` finds the plant of a
+# recording without a loop. `methods` holds one file a
 # method, `data` what they read from a recording, `models` what they fit, `fit` least squares,
 # profiles and residuals, `planning` the bounds of planned experiments, `running` what is
 # estimated while a loop runs.
@@ -40,6 +41,11 @@ from deadtime.estimation._plots import (
 )
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
+from deadtime.estimation.evidence._candidate import PlantCandidate
+from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._numbers import LoopView
+from deadtime.estimation.evidence._question import PLANTS as PLANTS
+from deadtime.estimation.evidence._words import Advice
 from deadtime.estimation.fit._profile import unit_of as unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._power import unseen_in_words as unseen_in_words
@@ -74,6 +80,7 @@ __all__ = [
     "CTA",
     "GCC",
     "ARXScan",
+    "Advice",
     "Comparison",
     "CramerRaoBound",
     "Decay",
@@ -85,6 +92,7 @@ __all__ = [
     "Graphical",
     "Grid",
     "Identifiability",
+    "LoopView",
     "Method",
     "MethodDifference",
     "MonteCarlo",
@@ -93,7 +101,9 @@ __all__ = [
     "OutputError",
     "Overshoot",
     "PlannedBound",
+    "PlantCandidate",
     "PlantChoice",
+    "PlantEstimate",
     "Relay",
     "SharedNumber",
     "Waveform",

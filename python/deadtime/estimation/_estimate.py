@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, overload
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.validation import OpenRange
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._find import estimate_by_evidence
+from deadtime.estimation.evidence._question import Between
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
@@ -26,6 +31,7 @@ from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import Waveform
+from deadtime.loops import Controller
 from deadtime.recordings import Recording
 
 #: The methods by name.
@@ -47,10 +53,14 @@ METHODS: Mapping[str, type[Method]] = {
     )
 }
 
+#: What is fitted in a loop if nothing is said.
+FREE = ("delay", "gain")
+
 #: Names of those that fit several recordings together.
 JOINT = tuple(name for name, method in METHODS.items() if method.joint)
 
 
+@overload
 def estimate_delay(
     recording: Recordings,
     loop: Loops,
@@ -58,15 +68,55 @@ def estimate_delay(
     method: str | Method = "auto",
     free: Sequence[str] = ("delay", "gain"),
     window: Windows = None,
-) -> DelayEstimate:
-    """Estimate the delay of a closed loop from a recording of it.
+) -> DelayEstimate: ...
+
+
+@overload
+def estimate_delay(
+    recording: Recording,
+    loop: None = None,
+    *,
+    window: OpenRange | None = None,
+    plant: str | None = None,
+    controller: Controller | None = None,
+    limit: float | None = None,
+    closed_loop: bool | None = None,
+    at_rest: bool | None = None,
+    largest_delay: float | None = None,
+    between: Between = "undecided",
+    progress: Callable[[int], object] | None = None,
+) -> PlantEstimate: ...
+
+
+def estimate_delay(
+    recording: Recordings,
+    loop: Loops | None = None,
+    *,
+    method: str | Method = "auto",
+    free: Sequence[str] = FREE,
+    window: Any = None,
+    plant: str | None = None,
+    controller: Controller | None = None,
+    limit: float | None = None,
+    closed_loop: bool | None = None,
+    at_rest: bool | None = None,
+    largest_delay: float | None = None,
+    between: Between = "undecided",
+    progress: Callable[[int], object] | None = None,
+) -> DelayEstimate | PlantEstimate:
+    """Estimate the delay of a plant, or that of a closed loop, from a recording.
+
+    Without `loop`, nothing is known but the recording: plants that integrate or come to rest, with
+    no, one or two lags, real or complex, with or without a zero, compete on the same rows. With
+    `loop`, its plant and controller are known, and `method` and `free` say what is fitted.
 
     Parameters
     ----------
     recording : Recording or list of Recording
-        Reference and output over time, as logged where the controller runs. Several recordings of
-        one vehicle are fitted together, by ``"output_error"`` and ``"waveform"``.
-    loop : ControlLoop or list of ControlLoop
+        Reference, output and command over time, as logged where the controller runs. Without
+        `loop` it has a command, and needs no reference. Several recordings of one vehicle are
+        fitted together, by ``"output_error"`` and ``"waveform"``.
+    loop : ControlLoop or list of ControlLoop, optional
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
         One for all recordings, or one each.
     method : str or Method
@@ -102,11 +152,38 @@ def estimate_delay(
         The part to use, s, None for an open end: one for all recordings, or a list with one each.
         For ``"waveform"``, ``"grid"``, ``"cta"`` and all methods that read a step, it should begin
         at rest and hold one step; ``"output_error"``, ``"frequency"``, ``"gcc"`` and
-        ``"arx_scan"`` take any in which the command changes.
+        ``"arx_scan"`` take any in which the command changes. Without `loop` any will do, and the
+        commands before it are used.
+    plant : str, optional
+        Without `loop`: the kind of plant, if it is known: ``"delay"``, ``"lag"``, ``"two lags"``,
+        ``"integrator"``, ``"integrator, lag"``, ``"integrator, two lags"``, or one that ends in
+        ``"lag, zero"`` or ``"two lags, zero"``. Whether another explains the recording clearly
+        better is said.
+    controller : Controller, optional
+        Without `loop`: the controller that computes the command from the output, if it is known.
+        The command of a P controller need not be logged.
+    limit : float, optional
+        Largest size of the command of `controller`.
+    closed_loop : bool, optional
+        Without `loop`: whether a controller computes the command from the output. If it is not
+        given, a reference that moves says so.
+    at_rest : bool, optional
+        Without `loop`: whether the plant was at rest at the first row. If it is not given, the
+        recording says so, or the state is unknown.
+    largest_delay : float, optional
+        Without `loop`: largest delay that is tried, s; by default 0.3 of the recording.
+    between : {"undecided", "held", "straight", "samples"}
+        Without `loop`: how the command moves between two rows. By default the recording
+        decides; where it does not, intervals hold for a held and a straight command.
+    progress : callable, optional
+        Without `loop`: called with a number that grows while plants are compared.
 
     Returns
     -------
     DelayEstimate
+        With `loop`.
+    PlantEstimate
+        Without.
 
     Raises
     ------
@@ -159,7 +236,41 @@ def estimate_delay(
     >>> fit = dtm.estimate_delay(recording, known, method=Waveform(initial_output=0.0))
     >>> round(fit.delay, 6)
     0.4
+
+    Without a loop, from a command and an output alone:
+
+    >>> rng = np.random.default_rng(1)
+    >>> valve = np.where(np.arange(300) < 30, 40.0, 45.0)
+    >>> after = np.maximum(np.arange(300) - 42.0, 0.0)
+    >>> level = 9.0 * (1.0 - np.exp(-after / 20.0)) + rng.normal(0.0, 0.05, 300)
+    >>> bump = dtm.Recording(np.arange(300.0), None, level, valve)
+    >>> fit = dtm.estimate_delay(bump)
+    >>> fit.verdict, fit.best.name, round(fit.delay)
+    ('reliable', 'lag', 12)
     """
+    known: dict[str, Any] = {
+        "plant": plant,
+        "controller": controller,
+        "limit": limit,
+        "closed_loop": closed_loop,
+        "at_rest": at_rest,
+        "largest_delay": largest_delay,
+    }
+    if loop is None:
+        if method != "auto" or free is not FREE:
+            raise ValueError("method and free are for a loop: give the loop, or leave them out")
+        if not isinstance(recording, Recording):
+            if not recording:
+                raise ValueError("no recording was given: give one")
+            raise TypeError(
+                "without a loop one Recording is taken, not a list: give the loop to fit several"
+            )
+        return estimate_by_evidence(
+            recording, window=window, between=between, progress=progress, **known
+        )
+    given = [name for name, value in known.items() if value is not None]
+    if given:
+        raise ValueError(f"{given[0]} is for a recording without a loop: leave it or the loop out")
     runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:

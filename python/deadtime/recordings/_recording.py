@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.validation import OpenRange, open_interval, unmasked
+from deadtime.recordings._missing import HELD, rows_with_output, with_rows_missing
 
 if TYPE_CHECKING:
     from deadtime.loops import ControlLoop
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 #: Largest absolute value. The squares of larger ones may overflow, and no physical quantity has
 #: them.
 LARGEST = 1e100
+
+#: Columns that may have missing values, NaN; a reference in all rows or none.
+MAY_MISS = ("reference", "output")
 
 #: Fewest samples of a recording: enough for two parameters, an initial output, and a test of the
 #: residuals.
@@ -74,10 +78,11 @@ class Recording(ReadOnlyArrays):
     ----------
     time : array_like, shape (n,)
         Time stamps in seconds, strictly increasing.
-    reference : array_like, shape (n,)
-        The reference of the loop.
+    reference : array_like, shape (n,), or None
+        The reference of the loop; None where there is none or it was not logged, and `reference`
+        is then NaN in all rows.
     output : array_like, shape (n,)
-        The measured output, in the unit of the reference.
+        The measured output, in the unit of the reference; NaN in rows where it is missing.
     command : array_like, shape (n,), optional
         The command sent to the plant, after any limit.
     units : dict of str to str, optional
@@ -93,15 +98,17 @@ class Recording(ReadOnlyArrays):
     Raises
     ------
     RecordingError
-        When the time does not increase, lengths differ, values are not finite or beyond 1e100,
-        or there are fewer than 8 samples; when a masked row hides a change of the reference or
+        When the time does not increase, lengths differ, values are infinite or beyond 1e100,
+        or there are fewer than 8 samples; when a missing value hides a change of the reference or
         of the command.
     TypeError
         When both `command` and `sent` are given.
 
     Notes
     -----
-    A row in which one of the columns is masked (`numpy.ma`) is left out.
+    A value that is masked (`numpy.ma`) or NaN is missing. A row whose output is missing stays, with
+    its command: `complete` leaves such rows out. Reference and command hold where they are missing
+    between equal values. A row without a time is left out.
 
     Examples
     --------
@@ -124,7 +131,7 @@ class Recording(ReadOnlyArrays):
     def __init__(
         self,
         time: ArrayLike,
-        reference: ArrayLike,
+        reference: ArrayLike | None,
         output: ArrayLike,
         command: ArrayLike | None = None,
         units: dict[str, str] | None = None,
@@ -133,14 +140,20 @@ class Recording(ReadOnlyArrays):
     ) -> None:
         if command is not None and sent is not None:
             raise TypeError("give the command of each row or those sent between, not both")
+        if reference is None:
+            reference = np.full(np.shape(output), np.nan)
         columns = {"time": time, "reference": reference, "output": output}
         if command is not None:
             columns["command"] = command
-        arrays = {name: _column(name, values) for name, values in _unmasked_rows(columns).items()}
+        arrays = {
+            name: _column(name, values, may_miss=name in MAY_MISS)
+            for name, values in with_rows_missing(columns).items()
+        }
         lengths = {name: array.size for name, array in arrays.items()}
         if len(set(lengths.values())) > 1:
             raise RecordingError(f"the columns of a recording differ in length: {lengths}")
         _check_time(arrays["time"])
+        _check_missing(arrays)
         commands = None
         if sent is not None:
             commands = _sent(*sent)
@@ -155,11 +168,19 @@ class Recording(ReadOnlyArrays):
 
     def __repr__(self) -> str:
         origin = f" from {self.source}" if self.source else ""
-        signals = "reference, output" + (", command" if self.command is not None else "")
+        signals = ("reference, " if self.has_reference else "") + "output"
+        signals += ", command" if self.command is not None else ""
+        missing = int(np.count_nonzero(np.isnan(self.output)))
+        signals += f", {missing} without output" if missing else ""
         return (
             f"<Recording{origin}: {len(self)} samples, {self.time[0]:g} to {self.time[-1]:g} s, "
             f"{signals}>"
         )
+
+    @property
+    def has_reference(self) -> bool:
+        """Whether a reference was given."""
+        return not bool(np.isnan(self.reference[0]))
 
     @property
     def sample_time(self) -> float:
@@ -177,6 +198,10 @@ class Recording(ReadOnlyArrays):
         rows = self.rows(start, stop)
         if rows == slice(0, len(self)) and self.sent is None:
             return self
+        return self._part(rows)
+
+    def _part(self, rows: slice | NDArray[np.bool_]) -> Recording:
+        """The recording with these rows alone."""
         parts: dict[str, Any] = {name: one[rows] for name, one in self._columns().items()}
         if self.sent is not None:
             kept = int(np.searchsorted(self.sent.time, parts["time"][-1], side="right"))
@@ -203,6 +228,34 @@ class Recording(ReadOnlyArrays):
                 f"{self.time[-1]:g} s"
             )
         return slice(first, last)
+
+    def complete(self) -> Recording:
+        """The rows that have an output, for methods that need all of them.
+
+        Raises
+        ------
+        RecordingError
+            When there is no reference, or when the reference or the command changes in a row whose
+            output is missing: without that row, the change would be at an unknown time.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import deadtime as dtm
+        >>> t = np.arange(20.0)
+        >>> flight = dtm.Recording(t, t > 5.5, np.where(t == 9.0, np.nan, 0.1 * t))
+        >>> len(flight), len(flight.complete())
+        (20, 19)
+        """
+        if not self.has_reference:
+            raise RecordingError(
+                "the recording has no reference, which this method needs: name its column, or "
+                "estimate without a loop: dtm.estimate_delay(recording)"
+            )
+        columns = self._columns()
+        held = HELD if self.sent is None else ("reference",)
+        kept = rows_with_output(self.output, {one: columns[one] for one in held if one in columns})
+        return self if kept is None else self._part(kept)
 
     def check(self, loop: ControlLoop, window: OpenRange | None = None) -> RecordingCheck:
         """Check the recording against the loop that made it, before anything is fitted.
@@ -255,6 +308,9 @@ class Recording(ReadOnlyArrays):
             raise TypeError(f"loop must be a ControlLoop, got {type(loop).__name__}")
         open_interval("window", window)
         low, high = (None, None) if window is None else window
+        whole = self.complete()
+        if whole is not self:
+            return whole.check(loop, window)
         rows = self.rows(low, high)
         command = None if self.command is None else self.command[rows]
         sent = None
@@ -265,7 +321,9 @@ class Recording(ReadOnlyArrays):
         return check_columns(columns, loop, in_motion=rows.start > 0)
 
     def steps(self) -> list[Step]:
-        """Every change of the reference, in order of time."""
+        """Every change of the reference, in order of time; none without a reference."""
+        if not self.has_reference:
+            return []
         changed = np.flatnonzero(np.diff(self.reference)) + 1
         return [
             Step(
@@ -355,44 +413,9 @@ class Recording(ReadOnlyArrays):
         return columns if self.command is None else columns | {"command": self.command}
 
 
-def _unmasked_rows(columns: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
-    """Leave out the rows in which a column is masked.
-
-    Reference and command hold until they change, so a missing row loses no information where
-    neither changes. Where one changes, or may change, the time of the change is unknown: refused.
-    """
-    masks = {
-        name: np.ma.getmaskarray(values)
-        for name, values in columns.items()
-        if isinstance(values, np.ma.MaskedArray)
-    }
-    if len({np.shape(values) for values in columns.values()}) > 1:
-        return columns  # refused below, with the lengths
-    missing = np.logical_or.reduce(list(masks.values())) if masks else np.zeros(0, dtype=bool)
-    if missing.ndim != 1 or not missing.any():
-        return columns
-    kept = np.flatnonzero(~missing)
-    # Each missing row, and the kept rows before and after it.
-    rows = np.flatnonzero(missing)
-    place = np.searchsorted(kept, rows)
-    rows, place = rows[(place > 0) & (place < kept.size)], place[(place > 0) & (place < kept.size)]
-    before, after = kept[place - 1], kept[place]
-    for name in ("reference", "command"):
-        if name not in columns:
-            continue
-        values: Any = np.ma.asarray(columns[name])
-        unknown = masks.get(name, np.zeros(missing.size, dtype=bool))[rows]
-        data = values.data
-        moved = np.where(unknown, data[after] != data[before], data[rows] != data[before])
-        if moved.any():
-            raise RecordingError(
-                f"row {rows[moved][0]} is masked, and the {name} changes there, at an unknown "
-                "time; fill in the masked values, or choose a window without them"
-            )
-    return {name: np.ma.getdata(values)[kept] for name, values in columns.items()}
-
-
-def _column(name: str, values: ArrayLike, fewest: int = MINIMUM_SAMPLES) -> NDArray[np.float64]:
+def _column(
+    name: str, values: ArrayLike, fewest: int = MINIMUM_SAMPLES, may_miss: bool = False
+) -> NDArray[np.float64]:
     try:
         given = np.asarray(unmasked(name, values))
         if given.dtype.kind == "c":
@@ -404,19 +427,30 @@ def _column(name: str, values: ArrayLike, fewest: int = MINIMUM_SAMPLES) -> NDAr
         raise RecordingError(f"the {name} has shape {array.shape}: give a column (n,)")
     if array.size < fewest:
         raise RecordingError(f"the {name} has {array.size} samples, at least {fewest} are needed")
-    bad = np.flatnonzero(~np.isfinite(array))
+    bad = np.flatnonzero(np.isinf(array) if may_miss else ~np.isfinite(array))
     if bad.size:
         raise RecordingError(
             f"the {name} is {array[bad[0]]} at row {bad[0]} ({bad.size} such values): leave these "
             "rows out, or choose a window without them"
         )
-    if np.max(np.abs(array)) > LARGEST:
+    far = np.flatnonzero(np.abs(array) > LARGEST)
+    if far.size:
         raise RecordingError(
-            f"the {name} reaches {array[np.argmax(np.abs(array))]:g}: values beyond {LARGEST:g} "
+            f"the {name} reaches {array[far[0]]:g}: values beyond {LARGEST:g} "
             "may overflow; use another unit"
         )
     array.flags.writeable = False
     return array
+
+
+def _check_missing(columns: dict[str, NDArray[np.float64]]) -> None:
+    """Refuse too few outputs."""
+    known = int(np.count_nonzero(~np.isnan(columns["output"])))
+    if known < MINIMUM_SAMPLES:
+        raise RecordingError(
+            f"the output is known in {known} of {columns['output'].size} rows, at least "
+            f"{MINIMUM_SAMPLES} are needed"
+        )
 
 
 def _sent(time: ArrayLike, values: ArrayLike) -> SentCommands:

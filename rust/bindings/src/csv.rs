@@ -7,11 +7,13 @@ use deadtime_wire::csv::{self, Columns, Fault, Layout};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
-/// Columns of a table; and line, time before and time where the time does not increase.
+/// Columns of a table; and line, time before and time where the time goes back, and where it first
+/// repeats.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 pub(crate) struct CsvColumns {
     values: Vec<Py<PyArray1<f64>>>,
     backward: Option<(usize, f64, f64)>,
+    repeated: Option<(usize, f64, f64)>,
 }
 
 /// What a table in text holds, and what of it is read.
@@ -60,5 +62,6 @@ pub(crate) fn csv_columns(py: Python<'_>, table: &[u8], layout: CsvLayout) -> Py
     Ok(CsvColumns {
         values: arrays.map(|one| one.into_pyarray(py).unbind()).collect(),
         backward: found.backward.map(|at| (at.line, at.before, at.now)),
+        repeated: found.repeated.map(|at| (at.line, at.before, at.now)),
     })
 }

@@ -7,6 +7,7 @@ mod csv;
 mod dde;
 mod errors;
 mod estimation;
+mod family;
 mod fixed_step;
 mod frequency;
 mod loading;
@@ -46,6 +47,8 @@ mod _deadtime {
     use super::estimation::{
         FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
     };
+    #[pymodule_export]
+    use super::family::{FamilyCandidate, FamilyFit, fit_family};
     #[pymodule_export]
     use super::fixed_step::FixedStepResponse;
     #[pymodule_export]

@@ -99,6 +99,36 @@ fn a_time_that_does_not_increase_ends_the_reading() {
 }
 
 #[test]
+fn a_repeated_time_is_told_and_an_empty_cell_is_missing() {
+    let found = two("0,1\n0,\n0, \n2,3").unwrap();
+    let repeated = found.repeated.unwrap();
+    assert_eq!(
+        (repeated.line, repeated.before, repeated.now),
+        (3, 0.0, 0.0)
+    );
+    assert_eq!(found.values[0], [0.0, 0.0, 0.0, 2.0]);
+    let missing: Vec<_> = found.values[1].iter().map(|value| value.is_nan()).collect();
+    assert_eq!(missing, [false, true, true, false]);
+    assert!(two(",1").is_err(), "a row without a time");
+}
+
+#[test]
+fn dates_are_seconds_after_the_first() {
+    let found = two("2024-02-28T23:59:59.75Z,1\n2024-02-29 01:00+01:00,2\n2024/03/01 00:00:00,3");
+    assert_eq!(found.unwrap().values[0], [0.0, 0.25, 86400.25]);
+    for wrong in [
+        "2024-13-01 00:00",
+        "2024-01-01",
+        "2024-01-01 25:00",
+        "24-01-01 00:00",
+    ] {
+        assert!(two(&format!("{wrong},1")).is_err(), "{wrong}");
+    }
+    let mixed = two("1,1\n2024-01-01 00:00,2").unwrap_err().to_string();
+    assert!(mixed.contains("is a date, and the times above it are numbers"));
+}
+
+#[test]
 fn rows_outside_the_window_need_a_time_only() {
     let mut layout = layout(b' ', &["t", "y"]);
     layout.window = (1.0, 2.0);

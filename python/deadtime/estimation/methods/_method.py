@@ -54,7 +54,7 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
             raise TypeError(f"loop[{index}] must be a ControlLoop, got {type(its_loop).__name__}")
         open_interval("window", ends)
         low, high = (None, None) if ends is None else ends
-        runs.append(Run(one, its_loop, (low, high)))
+        runs.append(Run(one.complete(), its_loop, (low, high)))
     plants = {type(run.loop.plant).__name__ for run in runs}
     if len(plants) > 1:
         raise ValueError(

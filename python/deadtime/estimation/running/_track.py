@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -223,5 +224,6 @@ def track_of(
         while place < time.size and time[place] < row:
             estimator.command(float(time[place]), float(values[place]))
             place += 1
-        found.append(estimator.update(row, output))
+        if not math.isnan(output):
+            found.append(estimator.update(row, output))
     return DelayTrack.of(found)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.validation import Range
+from deadtime.recordings.readers._repeated import spread, time_error
 
 #: Columns by their signals: "time", "reference", "output" and, if it is there, "command".
 Signals = dict[str, NDArray[np.float64]]
@@ -64,10 +65,10 @@ def read_table(table: Table, names: Mapping[str, str], ends: Range) -> Signals:
     lengths = {names[signal]: column.size for signal, column in columns.items()}
     if len(set(lengths.values())) > 1:
         raise RecordingError(f"{table.label}: the columns differ in length: {lengths}")
-    rows = _rows(table.label, names["time"], columns["time"], ends)
+    rows, columns["time"] = _rows(table.label, names["time"], columns["time"], ends)
     columns = {signal: column[rows] for signal, column in columns.items()}
     for signal, column in columns.items():
-        bad = np.flatnonzero(~np.isfinite(np.ma.getdata(column)) & ~np.ma.getmaskarray(column))
+        bad = np.flatnonzero(np.isinf(np.ma.getdata(column)) & ~np.ma.getmaskarray(column))
         if bad.size:
             raise RecordingError(
                 f"{table.label}, row {rows.start + bad[0]}: {names[signal]!r} is "
@@ -76,8 +77,10 @@ def read_table(table: Table, names: Mapping[str, str], ends: Range) -> Signals:
     return columns
 
 
-def _rows(label: str, name: str, time: NDArray[np.float64], ends: Range) -> slice:
-    """Rows from the first time in the window to the last one."""
+def _rows(
+    label: str, name: str, time: NDArray[np.float64], ends: Range
+) -> tuple[slice, NDArray[np.float64]]:
+    """Rows from the first time in the window to the last one, and all times."""
     known = np.flatnonzero(~np.ma.getmaskarray(time))
     stamps = np.ma.getdata(time)[known]
     bad = np.flatnonzero(~np.isfinite(stamps))
@@ -85,21 +88,20 @@ def _rows(label: str, name: str, time: NDArray[np.float64], ends: Range) -> slic
         raise RecordingError(
             f"{label}, row {known[bad[0]]}: {name!r} is {stamps[bad[0]]}; leave the row out"
         )
-    backward = np.flatnonzero(np.diff(stamps) <= 0)
-    if backward.size:
-        before, now = stamps[backward[0] : backward[0] + 2].tolist()
-        raise time_error(f"{label}, row {known[backward[0] + 1]}", before, now)
+    for wrong in (np.diff(stamps) < 0.0, np.diff(stamps) == 0.0):
+        place = int(np.argmax(wrong)) if wrong.any() else None
+        if place is None:
+            continue
+        before, now = stamps[place : place + 2].tolist()
+        where = f"{label}, row {known[place + 1]}"
+        if now < before:
+            raise time_error(where, before, now)
+        stamps = spread(stamps, where, now)
+        time = time.copy()
+        time[known] = stamps
     inside = known[(stamps >= ends[0]) & (stamps <= ends[1])]
-    return slice(int(inside[0]), int(inside[-1]) + 1) if inside.size else slice(0, 0)
-
-
-def time_error(where: str, before: float, now: float) -> RecordingError:
-    """What is wrong with a time that does not increase."""
-    what = "repeats" if now == before else "goes back"
-    return RecordingError(
-        f"{where}: the time {what} ({before!r} is followed by {now!r}); sort the rows and keep "
-        "one of each time stamp"
-    )
+    rows = slice(int(inside[0]), int(inside[-1]) + 1) if inside.size else slice(0, 0)
+    return rows, time
 
 
 def numbers(label: str, values: Any) -> NDArray[np.float64]:

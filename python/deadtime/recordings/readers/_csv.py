@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace as changed
 import deadtime.recordings._native as native
 from deadtime._base.errors import RecordingError
 from deadtime._base.validation import Range
-from deadtime.recordings.readers._columns import Signals, time_error
+from deadtime.recordings.readers._columns import Signals
+from deadtime.recordings.readers._repeated import spread, time_error
 from deadtime.recordings.readers._text import Text, indices
 
 #: Stands for a separator that is not ASCII: the separator of ASCII itself.
@@ -40,4 +41,8 @@ def read_csv(text: Text, names: dict[str, str], ends: Range) -> Signals:
     if found.backward is not None:
         line, before, now = found.backward
         raise time_error(f"{text.path}, line {line}", before, now)
-    return dict(zip(names, found.values, strict=True))
+    signals = dict(zip(names, found.values, strict=True))
+    if found.repeated is not None:
+        line, _, now = found.repeated
+        signals["time"] = spread(signals["time"], f"{text.path}, line {line}", now)
+    return signals

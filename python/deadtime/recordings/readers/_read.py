@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from deadtime._base.errors import RecordingError
 from deadtime._base.validation import OpenRange, Range, open_interval
 from deadtime.recordings._first_bytes import HEAD, format_of, opened, whole
 from deadtime.recordings._recording import Recording
 from deadtime.recordings.readers._arrow import arrow_file
-from deadtime.recordings.readers._columns import Signals, read_table, widened
+from deadtime.recordings.readers._columns import Signals, Table, read_table, widened
 from deadtime.recordings.readers._csv import read_csv
 from deadtime.recordings.readers._mat import mat_file
 from deadtime.recordings.readers._mat73 import mat73_file
 from deadtime.recordings.readers._tables import LABEL, table_in_memory
 from deadtime.recordings.readers._text import as_text, not_text
+from deadtime.recordings.readers._usual import chosen_columns
+
+#: From the label of a table and the names of its columns to the name for each signal.
+Choice: TypeAlias = Callable[[object, Sequence[str]], dict[str, str]]
 
 
 def read_recording(
     source: str | os.PathLike[str] | Any,
     *,
-    time: str = "time",
-    reference: str = "reference",
-    output: str = "output",
+    time: str | None = None,
+    reference: str | None = None,
+    output: str | None = None,
     command: str | None = None,
     window: OpenRange | None = None,
     delimiter: str | None = None,
@@ -38,10 +44,14 @@ def read_recording(
         version 5 or 7.3. The first bytes tell the format, not the name. Or a table in memory: a
         DataFrame of pandas or polars, an Arrow table, a dict of arrays, an `xarray.Dataset`, or a
         structured array.
-    time, reference, output : str
-        Names of the columns that hold the time stamps (s), the reference and the measurement.
+    time, reference, output : str, optional
+        Names of the columns that hold the time stamps (s), the reference and the measurement. If
+        they are not given, they are found by usual names: time, t, Time (s), Timestamp; reference,
+        SP, setpoint; output, PV, y; and so on. The reference may be missing where there is a
+        command.
     command : str, optional
-        Name of the column that holds the command sent to the plant.
+        Name of the column that holds the command sent to the plant; ``"auto"`` for one of a usual
+        name: command, OP, MV, u. If it is not given, no command is read.
     window : (low, high), optional
         Keep only the rows between these times, s; None leaves an end open.
     delimiter : str, optional
@@ -56,7 +66,8 @@ def read_recording(
     ------
     RecordingError
         When the file cannot be read, is of no such format, lacks a column, holds a value that is
-        no finite number, a time that does not increase, a constant reference, or too few samples.
+        no number or infinite, a time that goes back or repeats in more than 1 % of the rows, too
+        few samples, or neither a command nor a reference that changes.
         The message names the line of a text, or the row of another table, counted from 0. The log
         of an autopilot is refused by the name of its format.
     MissingExtraError
@@ -75,9 +86,10 @@ def read_recording(
     axis is time, ``"log.signals.values[2]"`` one of a structure, as Simulink writes it, and
     ``"log.signals[1].values"`` one of the second element of an array of structures.
 
-    Dates become seconds after the first of them, durations seconds. The index of a pandas
-    DataFrame is a column if it has a name. Missing values (null, a masked entry) are rows left out,
-    as `Recording` leaves out masked rows; NaN is refused inside the window.
+    Dates (in a text as ISO 8601 writes them) become seconds after the first of them, durations
+    seconds. The index of a pandas DataFrame is a column if it has a name. Missing values (an empty
+    cell, null, NaN, a masked entry) are missing rows, as `Recording` has them. A row with the time
+    of the next one is placed before it.
 
     Examples
     --------
@@ -92,23 +104,28 @@ def read_recording(
     >>> dtm.read_recording(table, time="t", reference="r", output="y", window=(0.2, 1.5))
     <Recording: 14 samples, 0.2 to 1.5 s, reference, output>
     """
-    names = {"time": time, "reference": reference, "output": output}
+    given = {"time": time, "reference": reference, "output": output}
+    optional = set() if command is None else {"reference"}
     if command is not None:
-        names["command"] = command
+        given["command"] = None if command == "auto" else command
+    choose = partial(chosen_columns, given=given, optional=optional)
     ends = widened(*open_interval("window", window))
     if isinstance(source, (str, os.PathLike)):
         path = Path(source)
         label, own = str(path), path.name
-        columns = _from_file(path, names, ends, delimiter)
+        columns = _from_file(
+            path, {name for name in given.values() if name}, choose, ends, delimiter
+        )
     else:
         label, own = LABEL, ""
         if delimiter is not None:
             raise ValueError(f"delimiter={delimiter!r}: a table in memory has none; leave it out")
-        columns = read_table(table_in_memory(source), names, ends)
+        table = table_in_memory(source)
+        columns = read_table(table, choose(LABEL, table.names), ends)
     try:
         recording = Recording(
             columns["time"],
-            columns["reference"],
+            columns.get("reference"),
             columns["output"],
             columns.get("command"),
             source=own,
@@ -116,29 +133,36 @@ def read_recording(
     except RecordingError as error:
         where = "" if window is None else f" in the window {window} s"
         raise RecordingError(f"{label}{where}: {error}") from None
-    if not recording.steps():
+    if recording.command is None and not recording.steps():
+        called = "reference" if reference is None else f"reference {reference!r}"
         raise RecordingError(
-            f"{label}: the reference {reference!r} is {recording.reference[0]:g} throughout, "
-            "so there is no step; choose another column or window"
+            f"{label}: the {called} is {recording.reference[0]:g} throughout, so there is no "
+            "step; choose another column or window, or name the column of the command"
         )
     return recording
 
 
-def _from_file(path: Path, names: dict[str, str], ends: Range, delimiter: str | None) -> Signals:
-    wanted = set(names.values())
+def _from_file(
+    path: Path, named: set[str], choose: Choice, ends: Range, delimiter: str | None
+) -> Signals:
     with opened(path) as stream:
         head = stream.read(HEAD)
         kind = format_of(path, head, "read_recording")
         if kind is None and b"\0" in head:  # not even in part: it may have no end
             raise not_text(path)
         if kind in (None, "text", "gzip"):
-            return read_csv(as_text(path, whole(stream, head), wanted, delimiter), names, ends)
+            text = as_text(path, whole(stream, head), named, delimiter)
+            return read_csv(text, choose(path, text.header), ends)
     if delimiter is not None:
         raise ValueError(f"delimiter={delimiter!r}: {path} is a file of {kind}, which has none")
-    if kind == "MAT v5":
-        table = mat_file(path, wanted)
-    elif kind == "MAT v7.3":
-        table = mat73_file(path, wanted)
-    else:
-        table = arrow_file(path, kind, wanted)
+    table = _table(path, kind, named)
+    names = choose(path, table.names)
+    if not named.issuperset(names.values()):
+        table = _table(path, kind, set(names.values()))
     return read_table(table, names, ends)
+
+
+def _table(path: Path, kind: str, wanted: set[str]) -> Table:
+    if kind == "MAT v5":
+        return mat_file(path, wanted)
+    return mat73_file(path, wanted) if kind == "MAT v7.3" else arrow_file(path, kind, wanted)

@@ -11,6 +11,7 @@
 //! searched (`search`, `fit`), and intervals are those of the profile (`profile`).
 
 mod disturbance;
+mod family;
 mod fit;
 mod kept;
 mod kicks;
@@ -35,6 +36,10 @@ mod waves;
 mod whiten;
 
 pub use disturbance::{Disturbance, Entry};
+pub use family::{
+    Between, Candidate, Class, Coefficients, Family, Grade, Named, Noise as FamilyNoise, Numbers,
+    Question, Record, Triple, Verdict, fit_family,
+};
 pub use fit::{Fit, Model, Search};
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};

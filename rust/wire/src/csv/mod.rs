@@ -7,8 +7,10 @@
 //!
 //! A number is read as Python's `float` reads it, correctly rounded, but without underscores and
 //! foreign digits. Commas stand for decimal points in all cells that are read or in none. `1,234`
-//! may be a thousand as well: it is read as a decimal if another cell can be nothing else.
+//! may be a thousand as well: it is read as a decimal if another cell can be nothing else. An empty
+//! cell is a missing value, NaN, but for a time. Times may be dates.
 
+mod date;
 mod number;
 mod record;
 mod table;

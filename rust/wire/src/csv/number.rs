@@ -111,7 +111,7 @@ fn comma(cell: &str) -> Result<Number, NoNumber> {
 }
 
 /// What Python's `str.strip` removes.
-fn is_blank(sign: char) -> bool {
+pub(super) fn is_blank(sign: char) -> bool {
     sign.is_whitespace() || ('\x1c'..='\x1f').contains(&sign)
 }
 

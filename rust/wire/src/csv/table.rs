@@ -1,6 +1,7 @@
 //! The columns of a table within a window of its first one.
 
-use super::number::{NoNumber, Number, number, text};
+use super::date::date;
+use super::number::{self, NoNumber, Number, number, text};
 use super::record::{Cells, is_blank, next};
 
 /// Records between two checks whether to go on.
@@ -24,10 +25,13 @@ pub struct Layout {
 /// The columns, in the order of the layout.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Columns {
-    /// Their values, one vector a column.
+    /// Their values, one vector a column; NaN where a cell is empty or holds one. Dates are seconds
+    /// after the first of them.
     pub values: Vec<Vec<f64>>,
-    /// Where the time does not increase; reading ends there.
+    /// Where the time goes back; reading ends there.
     pub backward: Option<Backward>,
+    /// The first time that is that of the row before.
+    pub repeated: Option<Backward>,
 }
 
 /// A time that is not above the one before it.
@@ -116,7 +120,7 @@ pub fn read<E: From<Fault>>(
     let mut cells = Cells::new();
     let mut rest = table;
     let mut line = layout.line;
-    let mut last = f64::NEG_INFINITY;
+    let mut clock = Clock::default();
     let mut records = 0_usize;
     while !rest.is_empty() {
         if records.is_multiple_of(CHECKED) {
@@ -134,10 +138,11 @@ pub fn read<E: From<Fault>>(
                 line,
             };
             row.check_width()?;
-            if let Some(backward) = row.push(&mut values, &mut last, &mut marks)? {
+            if let Some(backward) = row.push(&mut values, &mut clock, &mut marks)? {
                 return Ok(Columns {
                     values,
                     backward: Some(backward),
+                    repeated: clock.repeated,
                 });
             }
         }
@@ -147,7 +152,19 @@ pub fn read<E: From<Fault>>(
     Ok(Columns {
         values,
         backward: None,
+        repeated: clock.repeated,
     })
+}
+
+/// The times so far.
+#[derive(Default)]
+struct Clock {
+    /// The last one, s.
+    last: Option<f64>,
+    /// The first one, ns, where times are dates.
+    first_date: Option<i64>,
+    /// The first time that is that of the row before.
+    repeated: Option<Backward>,
 }
 
 /// One record.
@@ -174,32 +191,88 @@ impl Row<'_> {
     fn push(
         &self,
         values: &mut [Vec<f64>],
-        last: &mut f64,
+        clock: &mut Clock,
         marks: &mut Marks,
     ) -> Result<Option<Backward>, Fault> {
         let (low, high) = self.layout.window;
         let mut is_time = true;
         for ((column, name), kept) in self.layout.columns.iter().zip(values) {
-            let value = self.value(*column, name, marks)?;
-            if is_time {
-                let before = std::mem::replace(last, value);
-                if value <= before {
-                    return Ok(Some(Backward {
-                        line: self.line,
-                        before,
-                        now: value,
-                    }));
+            let value = if is_time {
+                let now = self.time(*column, name, clock, marks)?;
+                if let Some(before) = clock.last.replace(now).filter(|&before| now <= before) {
+                    let line = self.line;
+                    let found = Backward { line, before, now };
+                    if now < before {
+                        return Ok(Some(found));
+                    }
+                    clock.repeated.get_or_insert(found);
                 }
-                if !(low..=high).contains(&value) {
+                if !(low..=high).contains(&now) {
                     return Ok(None);
                 }
                 is_time = false;
-            }
+                now
+            } else if self.is_empty(*column) {
+                f64::NAN
+            } else {
+                self.value(*column, name, marks)?
+            };
             kept.try_reserve(1)
                 .map_err(|_| Fault::Memory { line: self.line })?;
             kept.push(value);
         }
         Ok(None)
+    }
+
+    /// Whether the cell is there and has nothing in it.
+    fn is_empty(&self, column: usize) -> bool {
+        let cell = self.cells.get(column);
+        cell.is_some_and(|cell| text(cell).trim_matches(number::is_blank).is_empty())
+    }
+
+    /// The time, s: a number, or a date.
+    fn time(
+        &self,
+        column: usize,
+        name: &str,
+        clock: &mut Clock,
+        marks: &mut Marks,
+    ) -> Result<f64, Fault> {
+        let written = self.cells.get(column).map(|cell| text(cell));
+        let found = written.as_deref().and_then(date);
+        let kind = match (found, clock.last, clock.first_date) {
+            (Some(_), Some(_), None) => Some("is a date, and the times above it are numbers"),
+            (None, _, Some(_)) => Some("is no date, as the times above it are"),
+            _ => None,
+        };
+        if let Some(reason) = kind {
+            return Err(Fault::Cell {
+                line: self.line,
+                cell: quoted(written.as_deref().unwrap_or_default()),
+                name: quoted(name),
+                reason: reason.to_owned(),
+            });
+        }
+        let Some(now) = found else {
+            let now = self.value(column, name, marks)?;
+            let is_known = !now.is_nan();
+            return is_known
+                .then_some(now)
+                .ok_or_else(|| self.not_finite(name, now));
+        };
+        let first = *clock.first_date.get_or_insert(now);
+        #[allow(clippy::cast_precision_loss)] // up to 104 days in ns are exact
+        let nanos = now.saturating_sub(first) as f64;
+        Ok(nanos / 1e9)
+    }
+
+    fn not_finite(&self, name: &str, value: f64) -> Fault {
+        let written = value.to_string();
+        Fault::NotFinite {
+            line: self.line,
+            name: quoted(name),
+            value: written.to_lowercase(),
+        }
     }
 
     fn value(&self, column: usize, name: &str, marks: &mut Marks) -> Result<f64, Fault> {
@@ -247,17 +320,8 @@ impl Row<'_> {
             }
             Err(NoNumber::Other) => return Err(fault("is not a number".to_owned())),
         };
-        if !value.is_finite() {
-            let shown = if value.is_nan() {
-                "nan".to_owned()
-            } else {
-                value.to_string()
-            };
-            return Err(Fault::NotFinite {
-                line,
-                name: quoted(name),
-                value: shown,
-            });
+        if value.is_infinite() {
+            return Err(self.not_finite(name, value));
         }
         Ok(value)
     }

@@ -1,0 +1,161 @@
+"""`PlantEstimate`: the plant that a recording shows, and what a loop around it feels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from deadtime._base.drawing import Axes, Figure, new_figure
+from deadtime._base.notebook import Pictured
+from deadtime._base.plain import plain
+from deadtime.estimation.evidence._numbers import FoundPlant
+from deadtime.estimation.evidence._words import (
+    Advice,
+    advice_on,
+    headline_of,
+    lines_of,
+    summary_of,
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlantEstimate(FoundPlant, Pictured):
+    """The plant that a recording shows, chosen by evidence from a family of plants.
+
+    Attributes
+    ----------
+    verdict : {"reliable", "indication", "none"}
+        Whether the intervals are claimed to hold; whether the numbers are an indication, whose
+        intervals are not; or whether the recording determines too little.
+    reason : str
+        Why the verdict is not ``"reliable"``, in a sentence; empty where it is.
+    delay : float
+        Dead time of the likeliest plant, s.
+    plant : Plant or None
+        The likeliest plant, without its dead time; None if no plant could be fitted.
+    parameters : dict of str to float
+        The numbers of the likeliest plant, the delay among them.
+    crossover : float
+        Frequency, rad/s, at which half of `largest_gain` crosses over; NaN if no gain is largest.
+    largest_gain : float
+        Largest proportional gain of a controller that keeps the loop stable, without a hold;
+        infinite if none is largest.
+    candidates : tuple of PlantCandidate
+        All kinds of plant that were tried, the likeliest first.
+    intervals : dict of str to (float, float)
+        The 95 % intervals by name, over all kinds of plant that the recording does not rule
+        out.
+    determined, asked : int
+        How many numbers the recording determines, and how many the likeliest plant has.
+    shift : int
+        Rows by which the command was moved, because it was logged so much late (above zero) or
+        early.
+    at_rest : bool
+        Whether the plant was taken to be at rest at the first row.
+    excited : ndarray
+        Frequencies, rad/s, at which the command moves.
+    recording : Recording
+        The rows that were used, and those before them.
+    fitted, residuals : ndarray, shape (n,)
+        Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
+
+    See Also
+    --------
+    deadtime.estimate_delay : Makes it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import deadtime as dtm
+    >>> time = np.arange(200.0)
+    >>> heater = np.where(time < 20, 40.0, 45.0)
+    >>> warmth = 9.0 * (1.0 - np.exp(-np.maximum(time - 32.0, 0.0) / 20.0))
+    >>> warmth += np.random.default_rng(1).normal(0.0, 0.05, time.size)
+    >>> fit = dtm.estimate_delay(dtm.Recording(time, None, warmth, heater))
+    >>> fit.best.in_words()
+    'a process that comes to rest, time constant 20 s'
+    >>> low, high = fit.ci(0.95, "largest_gain")
+    >>> fit.loop(dtm.P(0.5 * low)).is_stable()
+    True
+    """
+
+    def headline(self) -> str:
+        """The verdict and what it is about, in a line."""
+        return headline_of(self)
+
+    def advice(self) -> Advice:
+        """What to do next, computed from the recording."""
+        return self._advice
+
+    def lines(self) -> list[str]:
+        """The summary without what to do next, a line each."""
+        return lines_of(self)
+
+    def summary(self) -> str:
+        """The answer as a few lines of text, the verdict first."""
+        return summary_of(self, self._advice)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All results but the arrays, as plain values for JSON."""
+        names = ["name", "delay", "parameters", "behind", "determined", "noise_std"]
+        tried = [
+            {one: getattr(candidate, one) for one in names} | {"words": candidate.in_words()}
+            for candidate in self.candidates
+        ]
+        found_one = self.verdict != "none"
+        found: dict[str, Any] = {
+            "verdict": self.verdict,
+            "reason": self.reason,
+            "headline": self.headline(),
+            "plant": self.best.in_words() if found_one else None,
+            "parameters": dict(self.parameters) if found_one else None,
+            "interval_95": dict(self.intervals) if self.verdict == "reliable" else None,
+            "crossover": self.crossover if found_one else None,
+            "largest_gain": self.largest_gain if found_one else None,
+            "delay_at_crossover": self.delay_at_crossover if found_one else None,
+            "candidates": tried,
+            "determined": self.determined,
+            "asked": self.asked,
+            "shift": self.shift,
+            "at_rest": self.at_rest,
+            "noise_std": self.noise_std,
+        }
+        return {name: plain(value) for name, value in found.items()}
+
+    def plot(self, ax: Sequence[Axes] | None = None) -> list[Axes]:
+        """Draw the output with the fitted one over it, and the residuals.
+
+        Needs matplotlib.
+
+        Parameters
+        ----------
+        ax : sequence of matplotlib.axes.Axes, optional
+            One for the output, one for the residuals. By default those of a new figure.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+        """
+        upper, lower = new_figure(7.0, 4.6, rows=2)[1] if ax is None else ax
+        time = self.recording.time
+        upper.plot(time, self.recording.output, ".", color="0.35", ms=3, label="measured")
+        upper.plot(time, self.fitted, lw=1.6, label=self.best.in_words())
+        upper.set(ylabel="output", title=self.headline())
+        upper.legend(frameon=False, fontsize="small")
+        lower.plot(time, self.residuals, lw=0.9)
+        lower.set(xlabel="time / s", ylabel="residual")
+        return [upper, lower]
+
+    def _picture(self) -> Figure:
+        figure, axes = new_figure(7.0, 4.6, rows=2)
+        self.plot(axes)
+        return figure
+
+    @cached_property
+    def _advice(self) -> Advice:
+        return advice_on(self)
+
+    def __repr__(self) -> str:
+        return f"<PlantEstimate {self.headline()}>"

@@ -1,0 +1,91 @@
+"""Ask for the plant of a recording, and put the answer into words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+
+import deadtime.estimation._native as native
+from deadtime._base.validation import OpenRange
+from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._estimate import PlantEstimate
+from deadtime.estimation.evidence._numbers import Verdict
+from deadtime.estimation.evidence._question import Between, Question, question_of
+from deadtime.estimation.evidence._words import CLEAR, reason_of
+from deadtime.loops import Controller
+from deadtime.recordings import Recording
+
+
+def estimate_by_evidence(
+    recording: Recording,
+    *,
+    window: OpenRange | None = None,
+    closed_loop: bool | None = None,
+    at_rest: bool | None = None,
+    largest_delay: float | None = None,
+    between: Between = "undecided",
+    plant: str | None = None,
+    controller: Controller | None = None,
+    limit: float | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> PlantEstimate:
+    """The plant that a recording shows; what is not given is taken from the recording."""
+    question = question_of(
+        recording, window, closed_loop, at_rest, largest_delay, between, plant, controller, limit
+    )
+    found = question.answer(progress=progress)
+    better = None if plant is None else _clearly_better(question, found)
+    return estimate_of(question, found, better)
+
+
+def _clearly_better(question: Question, named: native.FamilyFit) -> PlantCandidate | None:
+    """The plant of the whole family that leads the named one clearly, if one does."""
+    best = question.of(None).answer().candidates[0]
+    least = named.candidates[0].bic
+    return candidate_of(best, least) if least - best.bic > CLEAR else None
+
+
+def estimate_of(
+    question: Question, found: native.FamilyFit, better: PlantCandidate | None = None
+) -> PlantEstimate:
+    """The answer of the kernel as a result."""
+    answering = [one for one in found.candidates if one.values[one.names.index("gain")] != 0.0]
+    candidates = tuple(candidate_of(one, answering[0].bic) for one in answering)
+    first, best = (answering[0], candidates[0]) if answering else (None, None)
+    unknown = np.full(len(question.recording), math.nan)
+    numbers: dict[str, Any] = {
+        "delay": math.nan if best is None else best.delay,
+        "plant": None if best is None else best.plant,
+        "parameters": {} if best is None else dict(best.parameters),
+    }
+    return PlantEstimate(
+        verdict=cast(Verdict, found.verdict),
+        reason=reason_of(
+            found.reason, found.reason_size, found.told, found.asked, numbers["delay"]
+        ),
+        **numbers,
+        crossover=found.crossover,
+        largest_gain=found.largest_gain,
+        candidates=candidates,
+        intervals={name: (float(low), float(high)) for name, (low, high) in found.hull.items()},
+        determined=found.told,
+        asked=found.asked,
+        shift=found.shift,
+        at_rest=found.at_rest,
+        excited=np.array(found.excited, dtype=float),
+        recording=question.recording,
+        fitted=unknown if first is None else np.array(first.fitted),
+        residuals=unknown.copy() if first is None else np.array(first.residuals),
+        _code=found.reason,
+        _question=question,
+        _better=better,
+        _at_crossover=(
+            found.gain_at_crossover,
+            found.phase_at_crossover,
+            found.delay_at_crossover,
+        ),
+        _native=[found],
+    )

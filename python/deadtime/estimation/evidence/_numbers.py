@@ -1,0 +1,265 @@
+"""The numbers of an estimate, with their intervals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import deadtime.estimation._native as native
+from deadtime._base.arrays import Array
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.validation import one_dimensional
+from deadtime.estimation.evidence._candidate import PlantCandidate
+from deadtime.estimation.evidence._question import Question
+from deadtime.loops import Controller, ControlLoop, Plant
+from deadtime.recordings import Recording
+
+#: What an answer claims.
+Verdict: TypeAlias = Literal["reliable", "indication", "none"]
+
+
+@dataclass(frozen=True, eq=False)
+class LoopView(ReadOnlyArrays):
+    """What a loop feels of a plant at some frequencies, with the ends of the intervals.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (n,)
+        Frequencies, rad/s.
+    gain, phase, delay : ndarray, shape (n,)
+        Size of G, its angle in rad, and the equivalent delay -(arg G + 90° for each integrator)
+        / omega in s. Where the gain of the plant is negative, angle and delay are those of -G.
+    gain_ci, phase_ci, delay_ci : ndarray, shape (2, n)
+        Lower and upper ends of the 95 % intervals, over all kinds of plant that the recording does
+        not rule out.
+    """
+
+    omega: Array
+    gain: Array
+    phase: Array
+    delay: Array
+    gain_ci: Array
+    phase_ci: Array
+    delay_ci: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FoundPlant(ReadOnlyArrays):
+    """The plant that a recording shows, as numbers.
+
+    Attributes
+    ----------
+    verdict : {"reliable", "indication", "none"}
+        Whether the intervals are claimed to hold; whether the numbers are an indication, whose
+        intervals are not; or whether the recording determines too little.
+    reason : str
+        Why the verdict is not ``"reliable"``, in a sentence; empty where it is.
+    delay : float
+        Dead time of the likeliest plant, s.
+    plant : Plant or None
+        The likeliest plant, without its dead time; None if no plant could be fitted.
+    parameters : dict of str to float
+        The numbers of the likeliest plant, the delay among them.
+    crossover : float
+        Frequency, rad/s, at which half of `largest_gain` crosses over; NaN if no gain is largest.
+    largest_gain : float
+        Largest proportional gain of a controller that keeps the loop stable, without a hold;
+        infinite if none is largest.
+    candidates : tuple of PlantCandidate
+        All kinds of plant that were tried, the likeliest first.
+    intervals : dict of str to (float, float)
+        The 95 % intervals by name, over all kinds of plant that the recording does not rule
+        out.
+    determined, asked : int
+        How many numbers the recording determines, and how many the likeliest plant has.
+    shift : int
+        Rows by which the command was moved, because it was logged so much late (above zero) or
+        early.
+    at_rest : bool
+        Whether the plant was taken to be at rest at the first row.
+    excited : ndarray
+        Frequencies, rad/s, at which the command moves.
+    recording : Recording
+        The rows that were used, and those before them.
+    fitted, residuals : ndarray, shape (n,)
+        Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
+    """
+
+    verdict: Verdict
+    reason: str
+    delay: float
+    plant: Plant | None
+    parameters: dict[str, float]
+    crossover: float
+    largest_gain: float
+    candidates: tuple[PlantCandidate, ...]
+    intervals: dict[str, tuple[float, float]]
+    determined: int
+    asked: int
+    shift: int
+    at_rest: bool
+    excited: Array
+    recording: Recording
+    fitted: Array
+    residuals: Array
+    _code: str = ""
+    _question: Question = field(kw_only=True)
+    _better: PlantCandidate | None = None
+    _at_crossover: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    _native: list[native.FamilyFit] = field(default_factory=list)
+
+    @property
+    def best(self) -> PlantCandidate:
+        """The likeliest plant, or the one that was named."""
+        if not self.candidates:
+            raise ValueError(f"no plant: {self.reason}")
+        return self.candidates[0]
+
+    @property
+    def better(self) -> PlantCandidate | None:
+        """A plant that explains the recording clearly better than the one that was named."""
+        return self._better
+
+    @property
+    def noise_std(self) -> float:
+        """Standard deviation of the residuals, in the unit of the output."""
+        return self.best.noise_std if self.candidates else math.nan
+
+    @property
+    def delay_at_crossover(self) -> float:
+        """Equivalent delay at `crossover`, s."""
+        return self._at_crossover[2]
+
+    @property
+    def gain_at_crossover(self) -> float:
+        """Size of G at `crossover`."""
+        return self._at_crossover[0]
+
+    @property
+    def phase_at_crossover(self) -> float:
+        """Angle of G at `crossover`, rad."""
+        return self._at_crossover[1]
+
+    def ci(self, level: float = 0.95, name: str = "delay") -> tuple[float, float]:
+        """Interval of a number, over all kinds of plant that explain the recording alike.
+
+        Parameters
+        ----------
+        level : float
+            Between 0 and 1.
+        name : str
+            One of `intervals`: ``"delay"``, ``"gain"``, ``"lag"`` (the largest time constant),
+            ``"largest_gain"``, ``"crossover"``, ``"gain_at_crossover"``, ``"phase_at_crossover"``
+            and ``"delay_at_crossover"``, as far as the plant has them.
+
+        Returns
+        -------
+        (float, float)
+            Claimed to hold the true value in a share `level` of recordings where the verdict is
+            ``"reliable"``; not claimed where it is ``"indication"``.
+
+        Raises
+        ------
+        ValueError
+            If the verdict is ``"none"``, the level is not between 0 and 1, or there is no such
+            interval.
+        """
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
+        if self.verdict == "none":
+            raise ValueError(f"no interval: {self.reason}")
+        found = self.intervals if level == 0.95 else self._question.answer(level).hull
+        if name not in found:
+            raise ValueError(f"{name!r} has no interval, there are those of {', '.join(found)}")
+        low, high = found[name]
+        return float(low), float(high)
+
+    def value(self, name: str) -> float:
+        """The number that an interval belongs to.
+
+        Parameters
+        ----------
+        name : str
+            One of `intervals`.
+        """
+        if name == "lag":
+            return max(self.best.lags, default=math.nan)
+        return float(self.parameters[name] if name in self.parameters else getattr(self, name))
+
+    def at(self, omega: ArrayLike) -> LoopView:
+        """Gain, phase and equivalent delay at some frequencies, with intervals of 95 %.
+
+        Parameters
+        ----------
+        omega : array_like, shape (n,)
+            Frequencies above zero, rad/s.
+
+        Returns
+        -------
+        LoopView
+        """
+        given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
+        bad = given[~(given > 0.0)]
+        if bad.size:
+            raise ValueError(f"omega={bad[0]:g} rad/s is not above zero")
+        found = self._answer().at(given.tolist())
+        values = {name: np.array(found[name][0]) for name in ("gain", "phase", "delay")}
+        ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}
+        return LoopView(given, **values, **ends)
+
+    def loop(
+        self,
+        controller: Controller,
+        *,
+        sample_time: float | None = None,
+        limit: float | None = None,
+    ) -> ControlLoop:
+        """A controller around the likeliest plant with its dead time.
+
+        Parameters
+        ----------
+        controller : P, PI, PD, PV or PID
+            The controller.
+        sample_time : float, optional
+            Time between its commands, s; continuous without.
+        limit : float, optional
+            Largest size of its command.
+
+        Returns
+        -------
+        ControlLoop
+
+        Raises
+        ------
+        ValueError
+            If the verdict is ``"none"``.
+        """
+        if self.plant is None or self.verdict == "none":
+            raise ValueError(f"no plant: {self.reason}")
+        return ControlLoop(
+            self.plant, controller, delay=self.delay, sample_time=sample_time, limit=limit
+        )
+
+    @property
+    def crossover_in_loop(self) -> float:
+        """Highest frequency, rad/s, at which the loop with the given controller crosses over.
+
+        NaN if no controller was given, or if it crosses over nowhere.
+        """
+        controller = self._question.controller
+        if controller is None or self.verdict == "none":
+            return math.nan
+        return float(max(self.loop(controller).margin().gain_crossovers, default=math.nan))
+
+    def _answer(self) -> native.FamilyFit:
+        """The answer of the kernel, asked again after the estimate was pickled."""
+        if not self._native:
+            self._native.append(self._question.answer())
+        return self._native[0]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_native": []}

@@ -1,0 +1,184 @@
+"""What is asked of the kernel: a record, and what the caller knows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+import deadtime.estimation._native as native
+from deadtime._base.arrays import Array
+from deadtime._base.errors import RecordingError
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.validation import OpenRange, open_interval, positive
+from deadtime.loops import Controller, ControlLoop, Integrator, P
+from deadtime.recordings import Columns, Recording
+
+#: How the command moves between two rows.
+Between: TypeAlias = Literal["held", "straight", "samples", "undecided"]
+
+#: The kinds of plant that compete, by name.
+PLANTS = (
+    "delay",
+    "lag",
+    "two lags",
+    "two lags, zero",
+    "integrator",
+    "integrator, lag",
+    "integrator, lag, zero",
+    "integrator, two lags",
+    "integrator, two lags, zero",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Question(ReadOnlyArrays):
+    """A record and what is known of it, as the kernel takes it.
+
+    Attributes
+    ----------
+    recording : Recording
+        The rows up to the end of the window; the first `earlier` of them lie before it.
+    earlier : int
+        Rows before the window: their commands count, their outputs do not.
+    closed_loop : bool
+        Whether a controller computes the command from the output.
+    at_rest : bool or None
+        Whether the plant was at rest at the first row; None: as the record shows.
+    largest_delay : float or None
+        Largest delay that is tried, s; None: a share of the record.
+    between : str
+        How the command moves between two rows.
+    plant : str or None
+        The kind of plant, one of `PLANTS`; None: all.
+    controller : Controller or None
+        The controller in the loop, where it is known.
+    window : (low, high) or None
+        The window as it was given, s.
+    """
+
+    recording: Recording
+    earlier: int = 0
+    closed_loop: bool = False
+    at_rest: bool | None = None
+    largest_delay: float | None = None
+    between: Between = "undecided"
+    plant: str | None = None
+    controller: Controller | None = None
+    window: OpenRange | None = None
+
+    def answer(
+        self,
+        level: float = 0.95,
+        omega: Sequence[float] = (),
+        progress: Callable[[int], object] | None = None,
+    ) -> native.FamilyFit:
+        """Ask the kernel; every interval of the answer has this level."""
+        return native.fit_family(
+            self.recording.time,
+            self.command,
+            self.recording.output,
+            kind=self.between,
+            controller=self.closed_loop,
+            at_rest=self.at_rest,
+            largest_delay=self.largest_delay,
+            earlier=self.earlier,
+            plant=self.plant,
+            level=level,
+            omega=tuple(omega),
+            progress=progress,
+        )
+
+    def of(self, plant: str | None) -> Question:
+        """The same for another kind of plant."""
+        return replace(self, plant=plant)
+
+    def options(self) -> dict[str, Any]:
+        """What was given besides the recording, as arguments of `estimate_delay`."""
+        names = ("window", "controller", "at_rest", "largest_delay", "plant")
+        found = {name: getattr(self, name) for name in names}
+        if self.between != "undecided":
+            found["between"] = self.between
+        if self.controller is None and self.closed_loop != shows_controller(self.recording):
+            found["closed_loop"] = self.closed_loop
+        return {name: value for name, value in found.items() if value is not None}
+
+    def part(self, low: float, high: float) -> Question:
+        """The same for the rows between two shares of the window; rows before them are kept."""
+        rows = len(self.recording) - self.earlier
+        first, last = (self.earlier + round(share * (rows - 1)) for share in (low, high))
+        time = self.recording.time
+        window = (float(time[first]), float(time[last]))
+        recording = self.recording.window(None, window[1])
+        return replace(self, recording=recording, earlier=first, window=window)
+
+    @property
+    def command(self) -> Array:
+        """The command of every row."""
+        assert self.recording.command is not None
+        return self.recording.command
+
+
+def question_of(
+    recording: Recording,
+    window: OpenRange | None,
+    closed_loop: bool | None,
+    at_rest: bool | None,
+    largest_delay: float | None,
+    between: Between,
+    plant: str | None,
+    controller: Controller | None = None,
+    limit: float | None = None,
+) -> Question:
+    """Check what the caller has given."""
+    if not isinstance(recording, Recording):
+        raise TypeError(f"recording must be a Recording, got {type(recording).__name__}")
+    if controller is not None:
+        recording = _with_command(recording, controller, limit)
+    elif limit is not None:
+        raise ValueError(f"limit={limit!r} is that of a controller: give the controller too")
+    if recording.command is None:
+        raise RecordingError(
+            "the recording has no command, and without a loop nothing else says what moved the "
+            "plant: name the column of the command, or give the loop"
+        )
+    if recording.sent is not None:
+        raise RecordingError(
+            "the commands of this recording have times of their own, which is not possible without "
+            "a loop: give the loop, or the command of each row"
+        )
+    if plant is not None and plant not in PLANTS:
+        raise ValueError(f"plant={plant!r} is not one of {', '.join(map(repr, PLANTS))}")
+    if largest_delay is not None:
+        positive("largest_delay", largest_delay)
+    low, high = open_interval("window", window)
+    rows = recording.rows(low, high)
+    part = recording.window(None, float(recording.time[rows.stop - 1]))
+    if closed_loop is None:
+        closed_loop = controller is not None or shows_controller(part)
+    return Question(
+        part, rows.start, closed_loop, at_rest, largest_delay, between, plant, controller, window
+    )
+
+
+def _with_command(recording: Recording, controller: Controller, limit: float | None) -> Recording:
+    """The recording with the command that its controller computes, where none was logged."""
+    loop = ControlLoop(Integrator(), controller, limit=limit)
+    if recording.command is not None:
+        return recording
+    if not (isinstance(controller, P) and recording.has_reference):
+        raise RecordingError(
+            "the recording has no command; only that of a P controller follows from reference and "
+            "output: name the column of the command"
+        )
+    columns = Columns(recording.time, recording.reference, recording.output, None)
+    return replace(recording, command=columns.commands(loop))
+
+
+def shows_controller(recording: Recording) -> bool:
+    """Whether there is a reference that moves and is not the command itself."""
+    command = recording.command
+    copied = command is not None and np.array_equal(recording.reference, command)
+    return bool(recording.steps()) and not copied

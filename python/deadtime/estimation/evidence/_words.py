@@ -1,0 +1,268 @@
+"""An estimate in words: verdict, reasons, numbers, what came second, what to do next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from deadtime._base.digits import between, shown
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.validation import OpenRange
+from deadtime.estimation.evidence._numbers import FoundPlant
+from deadtime.estimation.evidence._question import Question
+from deadtime.loops import Controller
+from deadtime.recordings import MINIMUM_SAMPLES
+
+#: Lead in BIC from which a plant explains a recording clearly better: 10 is "very strong" of Kass
+#: and Raftery (1995). Smaller: the second is ruled out by chance; larger: hulls are wider.
+CLEAR = 10.0
+
+#: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
+#: frequencies that the command hardly moves are listed too.
+KNOWN = 2.0
+
+#: Parts of a window that are tried where a disturbance spoils the whole, as shares of it. More or
+#: finer parts: more of a good stretch is used, and the advice takes longer.
+PARTS = ((0.0, 0.75), (0.25, 1.0), (0.0, 0.5), (0.5, 1.0))
+
+#: Names of numbers with the words and unit for each.
+NUMBERS = (
+    ("delay", "dead time", "s"),
+    ("gain", "gain", ""),
+    ("lag", "time constant", "s"),
+    ("largest_gain", "largest stable gain", ""),
+    ("crossover", "crossover of half of it", "rad/s"),
+    ("delay_at_crossover", "equivalent delay there", "s"),
+    ("gain_at_crossover", "gain there", ""),
+)
+
+#: Numbers that are shown rounded where no interval says how exact they are: an error of this share.
+ROUGH = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Advice(ReadOnlyArrays):
+    """What to do next.
+
+    Attributes
+    ----------
+    words : str
+        A sentence.
+    options : dict of str to object
+        What to give `estimate_delay` besides what was given, if it is to be asked again.
+    given : dict of str to object
+        What was given.
+    controller : str
+        Kind of controller to design, ``"P"`` or ``"PI"``; empty where none can be.
+    draw : bool
+        Whether to look at the residuals.
+    """
+
+    words: str
+    options: dict[str, Any] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)
+    controller: str = ""
+    draw: bool = False
+
+    @property
+    def statement(self) -> str:
+        """The line of Python that does it; empty where another recording is needed."""
+        if self.options:
+            named = {**self.given, **self.options}
+            asked = "".join(f", {name}={_python(value)}" for name, value in named.items())
+            return f"dtm.estimate_delay(recording{asked})"
+        if self.controller:
+            kind, gains = f"dtm.{self.controller}", ", ".join(["1.0"] * len(self.controller))
+            return f"dtm.design(fit.loop({kind}({gains})), controller={kind}, delay=fit.ci())"
+        return "fit.plot()" if self.draw else ""
+
+
+def _python(value: Any) -> str:
+    """A value as Python writes it where the package is `dtm`."""
+    return f"dtm.{value!r}" if isinstance(value, Controller) else repr(value)
+
+
+def reason_of(code: str, size: float, determined: int, asked: int, delay: float) -> str:
+    """Why an estimate is not reliable, in a sentence."""
+    sentences: Mapping[str, str] = {
+        "": "",
+        "too few told": "the command moves too little: the recording determines "
+        f"{determined} of the {asked} numbers of the plant",
+        "classes contradict": "plants of different kinds explain the recording alike and differ "
+        "where a loop crosses over",
+        "residuals not white": "what the plant leaves unexplained is no noise of a sensor: there "
+        "is a disturbance, or the plant is of another kind",
+        "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
+        "2 ln L), and was moved",
+        "delay at its limit": "a number of the plant is at the limit of what is tried (dead time "
+        f"{delay:.4g} s)",
+        "crossover not told": "the largest stable gain is not known to a factor of 2",
+        "no response": "the output does not respond to the command",
+    }
+    return sentences.get(code, code)
+
+
+def headline_of(fit: FoundPlant) -> str:
+    """The verdict, the dead time and the plant; without a number where there is none."""
+    if fit.verdict == "none":
+        return f"none: {fit.reason}"
+    plant = fit.best.in_words()
+    if fit.verdict == "indication":
+        return f"indication: dead time about {_rough(fit.delay, 's')}, {plant}; {fit.reason}"
+    ends = _ends(fit.ci(), "s")
+    return f"reliable: dead time {_value(fit, 'delay', 's')} (95 %: {ends}), {plant}"
+
+
+def lines_of(fit: FoundPlant) -> list[str]:
+    """Verdict, numbers, what came second: a line each."""
+    lines = [headline_of(fit)]
+    if fit.verdict != "none":
+        lines += _numbers(fit)
+    return [*lines, *_seen(fit), *_beside(fit)]
+
+
+def summary_of(fit: FoundPlant, advice: Advice) -> str:
+    """All lines, and what to do next."""
+    first, *rest = lines_of(fit)
+    lines = [first, *(f"  {line}" for line in rest), f"next: {advice.words}"]
+    return "\n".join([*lines, f"  {advice.statement}"] if advice.statement else lines)
+
+
+def _numbers(fit: FoundPlant) -> list[str]:
+    """A line a number, with its interval where that is claimed."""
+    lines = []
+    for name, words, unit in NUMBERS:
+        value = fit.value(name) if name in fit.intervals else math.nan
+        if not math.isfinite(value):
+            continue
+        if fit.verdict == "reliable":
+            ends = _ends(fit.intervals[name], unit)
+            lines.append(f"{words:<24} {_value(fit, name, unit):<14} 95 %: {ends}")
+        else:
+            lines.append(f"{words:<24} about {_rough(value, unit)}")
+    if math.isfinite(fit.crossover_in_loop):
+        lines.append(
+            f"with its controller the loop crosses over at {fit.crossover_in_loop:.3g} rad/s"
+        )
+    if not math.isfinite(fit.largest_gain):
+        lines.append("no proportional gain makes the loop unstable")
+    return lines
+
+
+def _seen(fit: FoundPlant) -> list[str]:
+    """Gain and equivalent delay at the frequencies of the command, where no more is determined."""
+    if (
+        fit._code not in ("too few told", "classes contradict")
+        or not fit.excited.size
+        or fit.determined < 2
+    ):
+        return []
+    view = fit.at(fit.excited)
+    return [
+        f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 %), "
+        f"or that and half periods of {_rough(math.pi / omega, 's')}"
+        for omega, gain, delay in zip(
+            fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
+        )
+        if gain[1] < KNOWN * gain[0]
+    ]
+
+
+def _beside(fit: FoundPlant) -> list[str]:
+    """What came second, what explains the recording better, what was changed, and the noise."""
+    lines = []
+    if fit.better is not None:
+        lines.append(
+            f"{fit.better.in_words()} explains the recording clearly better: by "
+            f"{-fit.better.behind:.3g} in BIC"
+        )
+    for second in fit.candidates[1:2] if fit.verdict != "none" else ():
+        clear = "clearly behind" if second.behind >= CLEAR else "not ruled out, it is behind"
+        lines.append(f"second: {second.in_words()}; {clear}, by {second.behind:.3g} in BIC")
+    if fit.shift:
+        lines.append(
+            f"the command is {abs(fit.shift)} row {'late' if fit.shift > 0 else 'early'} in the "
+            "recording, and was moved"
+        )
+    rows = int((~_isnan(fit.residuals)).sum())
+    if rows:
+        lines.append(f"unexplained: {fit.noise_std:.3g} (standard deviation) in {rows} rows")
+    return lines
+
+
+def advice_on(fit: FoundPlant) -> Advice:
+    """What to do next, by why the estimate is not reliable."""
+    if fit.verdict == "reliable":
+        if fit.best.name == "delay":
+            return Advice("nothing: the output is the command, later")
+        kind = "P" if fit.best.integrates else "PI"
+        return Advice(
+            f"design a {kind} controller for the whole interval of the dead time", controller=kind
+        )
+    if not fit.at_rest and not _moves_in(fit):
+        return Advice(
+            "the command moves only before the rows that count; if the process was at rest at the "
+            "first row, say so",
+            {"at_rest": True},
+            fit._question.options(),
+        )
+    return _advice_by_reason(fit, fit._question.options())
+
+
+def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
+    if fit._code in ("too few told", "classes contradict", "crossover not told"):
+        known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
+        words = "record a run in which the command steps up and down at uneven times"
+        if known and "plant" not in given:
+            words += f"; or name the plant, if you know that it is {known[0].in_words()}"
+            return Advice(words, {"plant": known[0].name}, given)
+        return Advice(words)
+    if fit._code == "no response":
+        return Advice("look whether these are the right columns", draw=True)
+    window = _reliable_part(fit._question)
+    if window is not None:
+        ends = " to ".join(f"{end:g}" for end in window)
+        words = f"from {ends} s the recording is explained: use that part"
+        return Advice(words, {"window": window}, given)
+    if fit._code == "delay at its limit":
+        larger = float(f"{2.0 * fit.delay:.3g}")
+        return Advice("allow a larger dead time", {"largest_delay": larger}, given)
+    return Advice("look where the residuals are large, and leave that out by a window", draw=True)
+
+
+def _reliable_part(question: Question) -> OpenRange | None:
+    """The first of `PARTS` of the window that is explained reliably."""
+    for low, high in PARTS:
+        part = question.part(low, high)
+        enough = len(part.recording) - part.earlier >= MINIMUM_SAMPLES
+        if enough and part.answer().verdict == "reliable":
+            return part.window
+    return None
+
+
+def _moves_in(fit: FoundPlant) -> bool:
+    """Whether the command changes in the rows that count."""
+    used = ~_isnan(fit.residuals)
+    first = int(used.argmax()) if used.any() else 0
+    command = fit._question.command[max(first - 1, 0) :]
+    return bool((command != command[0]).any())
+
+
+def _isnan(values: Any) -> Any:
+    return values != values
+
+
+def _value(fit: FoundPlant, name: str, unit: str) -> str:
+    low, high = fit.intervals[name]
+    return shown(fit.value(name), 0.25 * (high - low), unit)
+
+
+def _ends(ends: Iterable[float], unit: str = "") -> str:
+    low, high = map(float, ends)
+    return between(low, high, 0.25 * (high - low), unit)
+
+
+def _rough(value: float, unit: str) -> str:
+    return shown(value, ROUGH * abs(value), unit)

@@ -1,0 +1,96 @@
+"""Columns by their usual names, where the caller names none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from deadtime._base.errors import RecordingError
+from deadtime.recordings.readers._columns import column_index
+
+#: Usual names of each signal, the likelier ones first, in small letters and without units.
+USUAL: Mapping[str, tuple[str, ...]] = {
+    "time": (
+        *("time", "t", "sec", "secs", "seconds", "second", "elapsed", "timestamp", "time_stamp"),
+        *("datetime", "date_time", "date", "clock"),
+    ),
+    "reference": ("reference", "ref", "sp", "setpoint", "set_point", "target", "desired", "r"),
+    "output": (
+        *("output", "pv", "y", "process_value", "process_variable", "measured", "measurement"),
+        "height",
+    ),
+    "command": (
+        *("command", "cmd", "op", "mv", "co", "u", "controller_output", "manipulated_variable"),
+        *("control", "actuator", "valve"),
+    ),
+}
+
+#: What a name may end in besides: a unit.
+UNITS = ("s", "m", "deg", "rad", "c", "k", "pct", "v", "mps", "degps", "radps")
+
+#: Units of a time stamp that is read as it is.
+SECONDS = ("", "s", "sec", "seconds")
+
+_BRACKETS = re.compile(r"\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
+
+
+def chosen_columns(
+    label: object, names: Sequence[str], given: Mapping[str, str | None], optional: set[str]
+) -> dict[str, str]:
+    """The column of each signal: the one that is given, or one of a usual name.
+
+    Parameters
+    ----------
+    label : object
+        What messages call the table.
+    names : sequence of str
+        Names of its columns.
+    given : mapping of str to str or None
+        Name of the column by signal, None where it is to be found.
+    optional : set of str
+        Signals that need not be there.
+    """
+    found = {signal: name for signal, name in given.items() if name is not None}
+    for signal, name in found.items():
+        column_index(label, names, signal, name)
+    for signal in given:
+        if signal in found:
+            continue
+        free = [name for name in names if name not in found.values()]
+        # A vehicle that is told its reference has one column for both.
+        usual = _usual(signal, free) or (_usual(signal, names) if signal == "reference" else None)
+        if usual is not None:
+            found[signal] = usual
+        elif signal not in optional:
+            shown = ", ".join(map(repr, names[:12])) + (", …" if len(names) > 12 else "")
+            raise RecordingError(
+                f"{label} has no column with a usual name for the {signal}, such as "
+                f"{USUAL[signal][0]!r} or {USUAL[signal][1]!r}: it has {shown}; name the column by "
+                f"{signal}=, on the command line --{signal}"
+            )
+    return {signal: found[signal] for signal in given if signal in found}
+
+
+def _usual(signal: str, names: Sequence[str]) -> str | None:
+    """The first column of the likeliest usual name."""
+    plain = [(name, *_plain(name)) for name in names]
+    if signal == "time":
+        plain = [one for one in plain if one[2] in SECONDS]
+    for usual in USUAL[signal]:
+        # As it is written, before other capitals: t is a time beside a temperature T.
+        exact = [name for name, _, _ in plain if name == usual]
+        alike = exact or [name for name, short, _ in plain if short == usual]
+        if alike:
+            return alike[0]
+    return None
+
+
+def _plain(name: str) -> tuple[str, str]:
+    """A name in small letters without its unit, and the unit."""
+    brackets = _BRACKETS.search(name)
+    unit = brackets[1].lower() if brackets else ""
+    short = re.sub(
+        r"[\s.-]+", "_", (name[: brackets.start()] if brackets else name).strip().lower()
+    )
+    head, _, last = short.rpartition("_")
+    return (head, last) if head and not unit and last in UNITS else (short, unit)

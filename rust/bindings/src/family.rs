@@ -1,0 +1,302 @@
+//! Bindings of the family of plants of `deadtime::estimation`.
+
+use deadtime::estimation::{
+    Between, Candidate, Class, Family, FamilyNoise, Grade, Question, Record, fit_family as fit,
+};
+use numpy::{PyArray1, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{frozen, owned};
+use crate::runtime::{run, run_here};
+
+type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
+
+type Array = Py<PyArray1<f64>>;
+
+/// One class of plants, fitted.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct FamilyCandidate {
+    plant: &'static str,
+    integrating: bool,
+    order: usize,
+    has_zero: bool,
+    names: Vec<&'static str>,
+    values: Array,
+    errors: Array,
+    /// Row-major.
+    covariance: Array,
+    quantile: f64,
+    dispersion: f64,
+    complex_poles: bool,
+    lags: Vec<f64>,
+    pole_frequency: f64,
+    pole_damping: f64,
+    noise: &'static str,
+    ar: Vec<f64>,
+    ma: Vec<f64>,
+    noise_std: f64,
+    innovation_std: f64,
+    deviance: f64,
+    bic: f64,
+    parameters: usize,
+    told: usize,
+    whiteness: f64,
+    residuals: Array,
+    fitted: Array,
+    at_limit: bool,
+}
+
+impl FamilyCandidate {
+    fn new(py: Python<'_>, one: &Candidate) -> Self {
+        let array = |values: &[f64]| frozen(py, values.to_vec()).unbind();
+        let poles = one.poles();
+        let order = one.noise.order();
+        Self {
+            plant: one.class.name(),
+            integrating: one.class.integrating,
+            order: one.class.order,
+            has_zero: one.class.has_zero,
+            names: one.class.numbers(),
+            values: array(&one.values),
+            errors: array(&one.errors()),
+            covariance: array(&one.covariance),
+            quantile: one.quantile,
+            dispersion: one.dispersion,
+            complex_poles: one.numbers.are_complex(),
+            lags: one.numbers.lags(),
+            pole_frequency: poles.0,
+            pole_damping: poles.1,
+            noise: one.noise.name(),
+            ar: one.coefficients.ar[..order].to_vec(),
+            ma: one.coefficients.ma[..order].to_vec(),
+            noise_std: one.deviation,
+            innovation_std: one.innovation,
+            deviance: one.deviance,
+            bic: one.bic,
+            parameters: one.parameters,
+            told: one.told,
+            whiteness: one.white,
+            residuals: array(&one.residuals),
+            fitted: array(&one.fitted),
+            at_limit: one.at_limit,
+        }
+    }
+}
+
+/// The family of plants fitted to a record.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct FamilyFit {
+    core: Family,
+    omega: Vec<f64>,
+    #[pyo3(get)]
+    candidates: Vec<Py<FamilyCandidate>>,
+}
+
+#[pymethods]
+impl FamilyFit {
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        match self.core.verdict.grade {
+            Grade::Reliable => "reliable",
+            Grade::Indication => "indication",
+            Grade::None => "none",
+        }
+    }
+
+    #[getter]
+    fn reason(&self) -> &'static str {
+        self.core.verdict.reason
+    }
+
+    #[getter]
+    fn reason_size(&self) -> f64 {
+        self.core.verdict.size
+    }
+
+    #[getter]
+    fn shift(&self) -> i64 {
+        self.core.shift
+    }
+
+    #[getter]
+    fn kind(&self) -> &'static str {
+        if self.core.straight {
+            "straight"
+        } else {
+            "held"
+        }
+    }
+
+    #[getter]
+    fn kind_decided(&self) -> bool {
+        self.core.decided
+    }
+
+    #[getter]
+    fn rows(&self) -> usize {
+        self.core.rows
+    }
+
+    #[getter]
+    fn first_row(&self) -> usize {
+        self.core.first_row
+    }
+
+    #[getter]
+    fn at_rest(&self) -> bool {
+        self.core.at_rest
+    }
+
+    #[getter]
+    fn told(&self) -> usize {
+        self.core.candidates.first().map_or(0, |best| best.told)
+    }
+
+    #[getter]
+    fn asked(&self) -> usize {
+        self.core
+            .candidates
+            .first()
+            .map_or(0, |best| best.values.len())
+    }
+
+    #[getter]
+    fn excited<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        frozen(py, self.core.excited.clone())
+    }
+
+    #[getter]
+    fn omega<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        frozen(py, self.omega.clone())
+    }
+
+    #[getter]
+    fn hull<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        for one in &self.core.hull {
+            out.set_item(one.name, (one.low, one.high))?;
+        }
+        Ok(out)
+    }
+
+    #[getter]
+    fn crossover(&self) -> f64 {
+        self.value("crossover")
+    }
+
+    #[getter]
+    fn largest_gain(&self) -> f64 {
+        self.value("largest_gain")
+    }
+
+    #[getter]
+    fn gain_at_crossover(&self) -> f64 {
+        self.value("gain_at_crossover")
+    }
+
+    #[getter]
+    fn phase_at_crossover(&self) -> f64 {
+        self.value("phase_at_crossover")
+    }
+
+    #[getter]
+    fn delay_at_crossover(&self) -> f64 {
+        self.value("delay_at_crossover")
+    }
+
+    /// Gain, phase and equivalent delay at frequencies; each a list of values, lower and upper ends.
+    fn at<'py>(&self, py: Python<'py>, omega: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
+        if let Some(wrong) = omega
+            .iter()
+            .find(|omega| !(omega.is_finite() && **omega > 0.0))
+        {
+            return Err(PyValueError::new_err(format!(
+                "frequency {wrong} rad/s: give frequencies above 0"
+            )));
+        }
+        let found = run_here(py, |task| self.core.at(&omega, task))?;
+        let out = PyDict::new(py);
+        for (name, of) in [("gain", 0), ("phase", 1), ("delay", 2)] {
+            let parts = |part: fn(&(f64, f64, f64)) -> f64| {
+                let values = found.iter().map(|one| part(&one[of])).collect();
+                frozen(py, values)
+            };
+            out.set_item(name, (parts(|x| x.0), parts(|x| x.1), parts(|x| x.2)))?;
+        }
+        Ok(out)
+    }
+}
+
+impl FamilyFit {
+    fn value(&self, name: &str) -> f64 {
+        let found = self.core.hull.iter().find(|one| one.name == name);
+        found.map_or(f64::NAN, |one| one.value)
+    }
+}
+
+fn between(kind: &str) -> PyResult<Between> {
+    match kind {
+        "held" => Ok(Between::Held),
+        "straight" | "samples" => Ok(Between::Straight),
+        "undecided" => Ok(Between::Undecided),
+        _ => Err(PyValueError::new_err(format!(
+            "kind {kind:?}: give 'held', 'straight', 'samples' or 'undecided'"
+        ))),
+    }
+}
+
+fn unknown<T>(what: &str, name: &str, found: Option<T>) -> PyResult<T> {
+    found.ok_or_else(|| PyValueError::new_err(format!("{what} {name:?} is not known")))
+}
+
+/// Fit the family of plants to the rows of a record.
+#[pyfunction]
+#[pyo3(signature = (time, command, output, *, kind="held", controller=false, at_rest=None,
+    largest_delay=None, earlier=0, plant=None, noise=None, level=0.95, omega=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "given by name")]
+pub(crate) fn fit_family(
+    py: Python<'_>,
+    time: Floats<'_>,
+    command: Floats<'_>,
+    output: Floats<'_>,
+    kind: &str,
+    controller: bool,
+    at_rest: Option<bool>,
+    largest_delay: Option<f64>,
+    earlier: usize,
+    plant: Option<&str>,
+    noise: Option<&str>,
+    level: f64,
+    omega: Option<Vec<f64>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<FamilyFit> {
+    let record = Record {
+        time: owned(&time)?,
+        command: owned(&command)?,
+        output: owned(&output)?,
+        earlier,
+    };
+    let class = plant.map(|name| unknown("plant", name, Class::named(name)));
+    let noise = noise.map(|name| unknown("noise", name, FamilyNoise::named(name)));
+    let question = Question {
+        between: between(kind)?,
+        in_loop: controller,
+        at_rest,
+        largest_delay,
+        class: class.transpose()?,
+        noise: noise.transpose()?,
+        level,
+    };
+    let core = run(py, Some(1), progress.as_ref(), |task| {
+        fit(&record.checked()?, &question, task)
+    })?;
+    let candidates = core.candidates.iter();
+    let candidates = candidates.map(|one| Py::new(py, FamilyCandidate::new(py, one)));
+    Ok(FamilyFit {
+        candidates: candidates.collect::<PyResult<_>>()?,
+        omega: omega.unwrap_or_else(|| core.excited.clone()),
+        core,
+    })
+}

@@ -1,0 +1,259 @@
+//! A minimum with the errors of its numbers and how many of them the input tells.
+
+use super::class::{Class, Numbers};
+use super::dispersion::dispersion;
+use super::loop_view::Seen;
+use super::minima::Minimum;
+use super::noise::{Coefficients, Noise};
+use super::quantiles::{beyond, student};
+use super::tolerances::EVIDENCE;
+use crate::linear_algebra::cholesky::inverse_of_positive;
+use crate::linear_algebra::eigenvalues::eigenvalues;
+use crate::linear_algebra::vectors::dot;
+
+/// The spread of a number about which the record says nothing, in its scale: errors end there.
+const UNKNOWN: f64 = 10.0;
+
+/// Lags at which residuals are compared, and rows for each.
+const LAGS: usize = 20;
+const ROWS_A_LAG: usize = 5;
+
+/// One class of plants, fitted.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The class of the plant.
+    pub class: Class,
+    /// The numbers that are searched.
+    pub numbers: Numbers,
+    /// The static gain, or that of the integrator.
+    pub gain: f64,
+    /// The noise that suits it best, and its coefficients.
+    pub noise: Noise,
+    /// Its coefficients.
+    pub coefficients: Coefficients,
+    /// Values in the order of [`Class::numbers`].
+    pub values: Vec<f64>,
+    /// Their covariance, row-major, with the dispersion.
+    pub covariance: Vec<f64>,
+    /// The factor of the variance by which numbers scatter more than the likelihood says.
+    pub dispersion: f64,
+    /// The quantile that goes with the standard errors.
+    pub quantile: f64,
+    /// −2 ln L.
+    pub deviance: f64,
+    /// −2 ln L and ln n for each number.
+    pub bic: f64,
+    /// How many numbers that are.
+    pub parameters: usize,
+    /// How many numbers of the plant the input tells.
+    pub told: usize,
+    /// Is a number at the end of its range?
+    pub at_limit: bool,
+    /// Probability that white residuals are correlated as much.
+    pub white: f64,
+    /// Standard deviation of the residuals, and of one-step errors.
+    pub deviation: f64,
+    /// That of one-step errors.
+    pub innovation: f64,
+    /// Output less model, NaN where no row counts.
+    pub residuals: Vec<f64>,
+    /// The output of the model, NaN before the first row that counts.
+    pub fitted: Vec<f64>,
+    /// Covariance of ln gain, delay, ln of the numbers of the lags, zero.
+    pub(super) inner: Vec<f64>,
+    row: f64,
+}
+
+impl Candidate {
+    pub(super) fn new(found: &Minimum<'_>, level: f64) -> Self {
+        let model = &found.model;
+        let (rows, point) = (model.rows, &found.point);
+        let seen = Seen {
+            class: model.class,
+            gain: model.gain(point),
+            numbers: model.numbers(&point.x),
+        };
+        let noise = model.noise.coefficients(&point.x[model.plant_numbers()..]);
+        let count = rows.used.len();
+        let free = count.saturating_sub(model.parameters()).max(1) as f64;
+        let variance = point.squares / free;
+        let sensitivities = model.sensitivities(point);
+        let (factor, freedom) = dispersion(&sensitivities, &point.whitened, variance);
+        let scales: Vec<f64> = (0..seen.count())
+            .map(|at| seen.scale(at, rows.row))
+            .collect();
+        let information = products(&sensitivities, &scales, variance);
+        let inner = covariance(&information, &scales, factor);
+        let scatter =
+            |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
+        let mut out = Self {
+            class: model.class,
+            numbers: seen.numbers,
+            gain: seen.gain,
+            noise: model.noise,
+            coefficients: noise,
+            values: Vec::new(),
+            covariance: Vec::new(),
+            dispersion: factor,
+            quantile: student(level, freedom),
+            deviance: found.deviance,
+            bic: found.bic,
+            parameters: model.parameters(),
+            told: told(&information, scales.len()),
+            at_limit: found.is_at_limit(),
+            white: whiteness(&point.whitened, model.noise.searched()),
+            deviation: scatter(&point.residual),
+            innovation: variance.sqrt(),
+            residuals: vec![f64::NAN; rows.time.len()],
+            fitted: vec![f64::NAN; rows.time.len()],
+            inner,
+            row: rows.row,
+        };
+        for ((at, residual), output) in rows.used.iter().zip(&point.residual).zip(&rows.output) {
+            out.residuals[*at] = *residual;
+            out.fitted[*at] = output + rows.mean - residual;
+        }
+        out.name_values();
+        out
+    }
+
+    /// Values and covariance of the named numbers.
+    fn name_values(&mut self) {
+        let seen = self.seen();
+        let names = self.class.numbers();
+        let number = |name: &str| {
+            if name == "gain" {
+                self.gain
+            } else {
+                self.numbers.named(name)
+            }
+        };
+        self.values = names.iter().map(|name| number(name)).collect();
+        // The order inside is ln gain, delay, …; d value/d ln value is the value.
+        let places: Vec<(usize, f64)> = names
+            .iter()
+            .enumerate()
+            .map(|(at, name)| match *name {
+                "delay" => (1, 1.0),
+                "gain" => (0, self.gain),
+                "zero" => (at, 1.0),
+                _ => (at, self.values[at]),
+            })
+            .collect();
+        let n = seen.count();
+        self.covariance = places
+            .iter()
+            .flat_map(|(i, left)| {
+                places
+                    .iter()
+                    .map(move |(j, right)| (i * n + j, left * right))
+            })
+            .map(|(at, factor)| factor * self.inner[at])
+            .collect();
+    }
+
+    /// Standard errors of the values.
+    pub fn errors(&self) -> Vec<f64> {
+        let n = self.values.len();
+        (0..n)
+            .map(|at| self.covariance[at * (n + 1)].max(0.0).sqrt())
+            .collect()
+    }
+
+    /// Frequency and damping of a pair of complex poles, NaN where there is none.
+    pub fn poles(&self) -> (f64, f64) {
+        if !self.numbers.are_complex() {
+            return (f64::NAN, f64::NAN);
+        }
+        let root = self.numbers.product.sqrt();
+        (1.0 / root, 0.5 * self.numbers.sum / root)
+    }
+
+    pub(super) fn seen(&self) -> Seen {
+        Seen {
+            class: self.class,
+            gain: self.gain,
+            numbers: self.numbers,
+        }
+    }
+
+    /// A quantity and its interval.
+    pub(super) fn interval(&self, of: impl Fn(&Seen) -> f64) -> (f64, f64, f64) {
+        let seen = self.seen();
+        let gradient = seen.gradient(self.row, &of);
+        let n = gradient.len();
+        let mut variance = 0.0;
+        for (i, left) in gradient.iter().enumerate() {
+            variance += left * dot(&self.inner[i * n..][..n], &gradient);
+        }
+        let reach = self.quantile * variance.max(0.0).sqrt();
+        let value = of(&seen);
+        (value, value - reach, value + reach)
+    }
+}
+
+/// WᵀW/σ² in the scale of each number.
+fn products(columns: &[Vec<f64>], scales: &[f64], variance: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(columns.len() * columns.len());
+    for (left, a) in columns.iter().zip(scales) {
+        for (right, b) in columns.iter().zip(scales) {
+            out.push(dot(left, right) * a * b / variance);
+        }
+    }
+    out
+}
+
+/// The covariance from the information, with the little that is known without a record.
+fn covariance(information: &[f64], scales: &[f64], factor: f64) -> Vec<f64> {
+    let n = scales.len();
+    let mut matrix = information.to_vec();
+    for i in 0..n {
+        matrix[i * n + i] = matrix[i * n + i] / factor + 1.0 / (UNKNOWN * UNKNOWN);
+        for j in 0..n {
+            if i != j {
+                matrix[i * n + j] /= factor;
+            }
+        }
+    }
+    let mut out = inverse_of_positive(&matrix, n, 0.0).unwrap_or_else(|| {
+        let unknown = |at: usize| {
+            if at.is_multiple_of(n + 1) {
+                UNKNOWN * UNKNOWN
+            } else {
+                0.0
+            }
+        };
+        (0..n * n).map(unknown).collect()
+    });
+    for i in 0..n {
+        for j in 0..n {
+            out[i * n + j] *= scales[i] * scales[j];
+        }
+    }
+    out
+}
+
+/// How many combinations of numbers stand out of the noise.
+fn told(information: &[f64], n: usize) -> usize {
+    let least = EVIDENCE.told * EVIDENCE.told;
+    eigenvalues(information, n).map_or(0, |values| {
+        values.iter().filter(|value| value.re > least).count()
+    })
+}
+
+/// The probability of correlations as large in white residuals (Ljung & Box 1978).
+fn whiteness(residual: &[f64], searched: usize) -> f64 {
+    let count = residual.len();
+    let lags = LAGS.min(count / ROWS_A_LAG);
+    if lags <= searched {
+        return 1.0;
+    }
+    let square = dot(residual, residual);
+    let mut sum = 0.0;
+    for lag in 1..=lags {
+        let correlation = dot(&residual[lag..], &residual[..count - lag]) / square;
+        sum += correlation * correlation / (count - lag) as f64;
+    }
+    let rows = count as f64;
+    beyond(rows * (rows + 2.0) * sum, (lags - searched) as f64)
+}

@@ -1,0 +1,134 @@
+//! The classes of plants: k (1 + z s) e^(−T s) / (s^i (q s² + p s + 1)).
+//!
+//! Two lags and a pair of complex poles are one class, by the sum p and the product q of the time
+//! constants, so that nothing ends where the poles meet.
+
+/// A class of plants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Class {
+    /// Does the plant integrate?
+    pub integrating: bool,
+    /// Lags beside the integrator.
+    pub order: usize,
+    /// Has it a zero?
+    pub has_zero: bool,
+}
+
+/// Every class and its name, each after those that it contains.
+const CLASSES: [(&str, Class); 9] = [
+    ("delay", class(false, 0, false)),
+    ("integrator", class(true, 0, false)),
+    ("lag", class(false, 1, false)),
+    ("integrator, lag", class(true, 1, false)),
+    ("integrator, lag, zero", class(true, 1, true)),
+    ("two lags", class(false, 2, false)),
+    ("two lags, zero", class(false, 2, true)),
+    ("integrator, two lags", class(true, 2, false)),
+    ("integrator, two lags, zero", class(true, 2, true)),
+];
+
+const fn class(integrating: bool, order: usize, has_zero: bool) -> Class {
+    Class {
+        integrating,
+        order,
+        has_zero,
+    }
+}
+
+impl Class {
+    /// All classes, each after those that it contains.
+    pub fn all() -> impl Iterator<Item = Self> {
+        CLASSES.iter().map(|(_, class)| *class)
+    }
+
+    /// The class of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        let found = CLASSES.iter().find(|(own, _)| *own == name);
+        found.map(|(_, class)| *class)
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        let found = CLASSES.iter().find(|(_, class)| *class == self);
+        found.map_or("", |(name, _)| name)
+    }
+
+    /// The names of its numbers, the gain second.
+    pub fn numbers(self) -> Vec<&'static str> {
+        let mut names = vec!["delay", "gain"];
+        match self.order {
+            0 => {}
+            1 => names.push("lag"),
+            _ => names.extend(["lag_sum", "lag_product"]),
+        }
+        if self.has_zero {
+            names.push("zero");
+        }
+        names
+    }
+
+    /// Is the other class this one with lags of zero, or none of its zero?
+    pub(super) fn contains(self, other: Self) -> bool {
+        self.integrating == other.integrating
+            && self.order >= other.order
+            && (self.has_zero || !other.has_zero)
+    }
+
+    /// How many numbers are searched: all but the gain.
+    pub(super) fn searched(self) -> usize {
+        1 + self.order + usize::from(self.has_zero)
+    }
+}
+
+/// The numbers of a plant that are searched, s and s².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numbers {
+    /// T.
+    pub delay: f64,
+    /// p, the sum of the time constants.
+    pub sum: f64,
+    /// q, their product.
+    pub product: f64,
+    /// z.
+    pub zero: f64,
+}
+
+impl Numbers {
+    /// A delay alone.
+    pub(super) const fn of_delay(delay: f64) -> Self {
+        Self {
+            delay,
+            sum: 0.0,
+            product: 0.0,
+            zero: 0.0,
+        }
+    }
+
+    /// A number by its name.
+    pub(super) fn named(&self, name: &str) -> f64 {
+        match name {
+            "delay" => self.delay,
+            "lag" | "lag_sum" => self.sum,
+            "lag_product" => self.product,
+            _ => self.zero,
+        }
+    }
+
+    /// Are the poles a complex pair?
+    pub fn are_complex(&self) -> bool {
+        self.sum * self.sum < 4.0 * self.product
+    }
+
+    /// The real time constants, largest first.
+    pub fn lags(&self) -> Vec<f64> {
+        if self.are_complex() || self.sum <= 0.0 {
+            return Vec::new();
+        }
+        if self.product <= 0.0 {
+            return vec![self.sum];
+        }
+        let root = (self.sum * self.sum - 4.0 * self.product).sqrt();
+        let largest = 0.5 * (self.sum + root);
+        vec![largest, self.product / largest]
+    }
+}

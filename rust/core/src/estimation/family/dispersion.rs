@@ -1,0 +1,70 @@
+//! How much more the numbers scatter than the likelihood says, from the scores of blocks of rows.
+//!
+//! With Q R = W the whitened sensitivities and g = Qᵀe of a block, A = QᵀQ its leverage, the sum of
+//! gᵀ(I − A)⁻¹g over the blocks is p σ² where the model is right (Bell & McCaffrey 2002, CR2). Where no
+//! block has much leverage, the jackknife takes its place: gᵀ(I − A)⁻²g (m − 1)/m.
+
+use super::projection::Projection;
+use super::tolerances::BLOCKS;
+use crate::linear_algebra::eigenvalues::eigenvalues;
+use crate::linear_algebra::lu::Lu;
+use crate::linear_algebra::vectors::dot;
+
+/// The factor of the variance, at least 1, and the degrees of freedom that go with it.
+pub(super) fn dispersion(
+    sensitivities: &[Vec<f64>],
+    residual: &[f64],
+    variance: f64,
+) -> (f64, f64) {
+    let basis = Projection::new(sensitivities.to_vec()).into_columns();
+    let p = basis.len();
+    let freedom = BLOCKS.freedom * (p * (BLOCKS.count - 1)) as f64;
+    let (mut corrected, mut jackknifed, mut most) = (0.0, 0.0, 0.0_f64);
+    for block in blocks(&basis, residual.len()) {
+        let own: Vec<&[f64]> = basis.iter().map(|column| &column[block.clone()]).collect();
+        let score: Vec<f64> = own
+            .iter()
+            .map(|q| dot(q, &residual[block.clone()]))
+            .collect();
+        let mut leverage = vec![0.0; p * p];
+        for (i, left) in own.iter().enumerate() {
+            for (j, right) in own.iter().enumerate() {
+                leverage[i * p + j] = dot(left, right);
+            }
+        }
+        let values = eigenvalues(&leverage, p).unwrap_or_default();
+        most = values.iter().fold(most, |most, value| most.max(value.re));
+        let mut without: Vec<f64> = leverage.iter().map(|a| -BLOCKS.most_leverage * a).collect();
+        (0..p).for_each(|i| without[i * p + i] += 1.0);
+        let mut solved = score.clone();
+        if let Some(factors) = Lu::regular(without, p) {
+            factors.solve(&mut solved);
+        }
+        corrected += dot(&score, &solved);
+        jackknifed += dot(&solved, &solved);
+    }
+    let count = BLOCKS.count as f64;
+    let sum = if most <= BLOCKS.jackknife {
+        jackknifed * (count - 1.0) / count
+    } else {
+        corrected
+    };
+    let factor = sum / (p.max(1) as f64 * variance);
+    (if factor > 1.0 { factor } else { 1.0 }, freedom)
+}
+
+/// Blocks of rows of about equal leverage.
+fn blocks(basis: &[Vec<f64>], rows: usize) -> Vec<std::ops::Range<usize>> {
+    let leverage = |row: usize| basis.iter().map(|q| q[row] * q[row]).sum::<f64>();
+    let share = basis.len() as f64 / BLOCKS.count as f64;
+    let (mut out, mut start, mut sum) = (Vec::new(), 0, 0.0);
+    for row in 0..rows {
+        sum += leverage(row);
+        if sum >= share * (out.len() + 1) as f64 && out.len() + 1 < BLOCKS.count {
+            out.push(start..row + 1);
+            start = row + 1;
+        }
+    }
+    out.push(start..rows);
+    out
+}

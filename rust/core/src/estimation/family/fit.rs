@@ -1,0 +1,320 @@
+//! The whole family fitted to one record: rows, minima, intervals, verdict.
+
+use super::candidate::Candidate;
+use super::class::Class;
+use super::excitation::{excited, is_one_sine};
+use super::hull::{Named, Triple, at, hull, turning};
+use super::minima::{Minimum, Plan, minima, without_plant};
+use super::noise::Noise;
+use super::rows::{Record, Rows, Start};
+use super::tolerances::{EVIDENCE, RANGES};
+use super::verdict::{Findings, Verdict, shifted, verdict};
+use crate::{Error, Task};
+
+/// Rows that a fit needs beyond its numbers.
+const FEWEST_ROWS: usize = 20;
+
+/// What the largest delay is above those of the first pass, as a factor and in rows: more leaves out more
+/// rows at the start, less may end at a delay that the noise of the first pass made too short.
+const ROOM: (f64, f64) = (1.25, 3.0);
+
+/// Numbers that one sine tells.
+const TOLD_BY_SINE: usize = 2;
+
+/// Delay, in rows, below which the command may have been logged late: more tries that more often.
+const EARLY: f64 = 0.5;
+
+/// How a command moves between its rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Between {
+    /// It is held.
+    Held,
+    /// It is straight.
+    Straight,
+    /// Not known.
+    Undecided,
+}
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub struct Question {
+    /// How the command moves between rows.
+    pub between: Between,
+    /// Does a controller compute the command from the output?
+    pub in_loop: bool,
+    /// Is the plant at rest at the first row? None: as the record shows.
+    pub at_rest: Option<bool>,
+    /// Largest delay, s. None: from the record.
+    pub largest_delay: Option<f64>,
+    /// Only this class.
+    pub class: Option<Class>,
+    /// Only this noise.
+    pub noise: Option<Noise>,
+    /// Level of the intervals.
+    pub level: f64,
+}
+
+/// The answer.
+#[derive(Debug, Clone)]
+pub struct Family {
+    /// Whether it holds.
+    pub verdict: Verdict,
+    /// One for each class, the least BIC first.
+    pub candidates: Vec<Candidate>,
+    /// Intervals over the classes within reach.
+    pub hull: Vec<Named>,
+    /// Are commands taken as straight, and is that known?
+    pub straight: bool,
+    /// Was it known or decided?
+    pub decided: bool,
+    /// Was the plant taken to be at rest at the first row?
+    pub at_rest: bool,
+    /// Rows that count, and the first of them.
+    pub rows: usize,
+    /// The first of them.
+    pub first_row: usize,
+    /// Rows by which the command was moved, above 0 to later ones.
+    pub shift: i64,
+    /// Frequencies at which the command has power, rad/s.
+    pub excited: Vec<f64>,
+    minima: Vec<Candidate>,
+}
+
+impl Family {
+    /// Gain, phase and equivalent delay at frequencies, each with its ends.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] and [`Error::Memory`].
+    pub fn at(&self, omega: &[f64], task: &Task) -> Result<Vec<[Triple; 3]>, Error> {
+        let turning = turning(&self.minima, task)?;
+        Ok(omega.iter().map(|omega| at(&turning, *omega)).collect())
+    }
+}
+
+/// Fit the family.
+///
+/// # Errors
+/// [`Error::Argument`] for numbers out of range or too few rows, and as a task ends.
+pub fn fit_family(record: &Record, question: &Question, task: &Task) -> Result<Family, Error> {
+    if let Some(delay) = question.largest_delay {
+        refuse_if!(
+            !(delay > 0.0 && delay <= record.span()),
+            "largest delay {delay} s: give one above 0 and below the length of the record, {} s",
+            record.span()
+        );
+    }
+    refuse_if!(
+        !(question.level > 0.0 && question.level < 1.0),
+        "level {}: give one between 0 and 1",
+        question.level
+    );
+    let start = match question.at_rest {
+        Some(true) => Start::Rest,
+        None if record.begins_at_rest() => Start::Held,
+        _ => Start::Unknown,
+    };
+    let kinds: &[bool] = match question.between {
+        Between::Held => &[false],
+        Between::Straight => &[true],
+        Between::Undecided => &[false, true],
+    };
+    let mut found = Vec::with_capacity(kinds.len());
+    for straight in kinds {
+        found.push(one_kind(record, question, start, *straight, task)?);
+    }
+    let out = joined(found, task)?;
+    moved(record, question, start, &out, task).map(|moved| moved.unwrap_or(out))
+}
+
+/// The more likely kind of command; where neither is, its intervals are those of both.
+fn joined(mut found: Vec<Family>, task: &Task) -> Result<Family, Error> {
+    let least = |family: &Family| {
+        family
+            .candidates
+            .first()
+            .map_or(f64::INFINITY, |one| one.deviance)
+    };
+    found.sort_by(|a, b| least(a).total_cmp(&least(b)));
+    let mut kinds = found.into_iter();
+    let mut out = kinds
+        .next()
+        .ok_or_else(|| Error::argument("no kind of command was given"))?;
+    for other in kinds {
+        out.decided = least(&other) - least(&out) > EVIDENCE.likely;
+        if !out.decided {
+            out.minima.extend(other.minima);
+            out.hull = hull(&turning(&out.minima, task)?);
+        }
+    }
+    Ok(out)
+}
+
+/// The family with the command a row earlier, where no delay is too much and that is better. In a
+/// closed loop it would be the controller.
+fn moved(
+    record: &Record,
+    question: &Question,
+    start: Start,
+    found: &Family,
+    task: &Task,
+) -> Result<Option<Family>, Error> {
+    let Some(best) = found.candidates.first() else {
+        return Ok(None);
+    };
+    if question.in_loop || best.numbers.delay > EARLY * record.row() {
+        return Ok(None);
+    }
+    let mut earlier = record.clone();
+    earlier.command.rotate_left(1);
+    if let [.., before, last] = &mut earlier.command[..] {
+        *last = *before;
+    }
+    let mut out = one_kind(&earlier, question, start, found.straight, task)?;
+    let fall = out
+        .candidates
+        .first()
+        .map_or(0.0, |own| best.deviance - own.deviance);
+    out.shift = -1;
+    out.decided = found.decided;
+    out.verdict = shifted(out.verdict, fall);
+    Ok((fall > EVIDENCE.shifted).then_some(out))
+}
+
+/// Classes that contain the best one and whose further number the record does not tell say nothing
+/// new: their errors have no end, their likelihood is that of the best. Two numbers may be those of one
+/// sine, and then they do.
+fn leave_out_what_adds_nothing(minima: &mut Vec<Candidate>) {
+    let Some(best) = minima.first().filter(|best| best.told >= EVIDENCE.enough) else {
+        return;
+    };
+    let best = (best.class, best.deviance);
+    minima.retain(|one| {
+        one.class == best.0
+            || !one.class.contains(best.0)
+            || one.told == one.values.len()
+            || best.1 - one.deviance > EVIDENCE.adds
+    });
+}
+
+fn one_kind(
+    record: &Record,
+    question: &Question,
+    start: Start,
+    straight: bool,
+    task: &Task,
+) -> Result<Family, Error> {
+    let largest = question
+        .largest_delay
+        .unwrap_or(RANGES.delay_share * record.span());
+    let rows = |largest| Rows::new(record, start, largest, straight, question.in_loop);
+    let classes: Vec<Class> = match question.class {
+        Some(class) => vec![class],
+        None => Class::all()
+            .filter(|class| !question.in_loop || class.integrating || class.order > 0)
+            .collect(),
+    };
+    let noises: Vec<Noise> = question
+        .noise
+        .map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
+    let mut used = rows(largest);
+    refuse_if!(
+        used.used.len() < FEWEST_ROWS,
+        "{} rows count, those after the largest delay of {largest} s whose output is known; a fit needs \
+         {FEWEST_ROWS}: give more rows, or a smaller largest delay",
+        used.used.len()
+    );
+    if start == Start::Unknown && question.largest_delay.is_none() {
+        let white = Plan {
+            rows: &used,
+            classes: &classes,
+            noises: &[Noise::White],
+        };
+        let first = minima(&white, task)?;
+        let reach = within_reach(&first);
+        let longest = reach
+            .iter()
+            .fold(0.0, |most: f64, one| most.max(one.point.x[0]));
+        let room = ROOM.0 * longest + ROOM.1 * used.row;
+        if room < largest {
+            used = rows(room);
+        }
+    }
+    let plan = Plan {
+        rows: &used,
+        classes: &classes,
+        noises: &noises,
+    };
+    let found = minima(&plan, task)?;
+    let silent = without_plant(&plan, task)?;
+    answer(&found, silent, question, task)
+}
+
+/// The minima that may be the true one.
+fn within_reach<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
+    let least = found.first().map_or(f64::INFINITY, |best| best.bic);
+    let reach = |one: &&'b Minimum<'a>| one.bic <= least + EVIDENCE.reach;
+    found.iter().filter(reach).collect()
+}
+
+/// The best, and the minima that are as likely, whatever number of numbers they need.
+fn as_likely<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
+    let best = found.first().map_or(f64::INFINITY, |best| best.deviance);
+    let is_likely = |place: &(usize, &'b Minimum<'a>)| {
+        place.0 == 0 || place.1.deviance <= best + EVIDENCE.likely
+    };
+    found
+        .iter()
+        .enumerate()
+        .filter(is_likely)
+        .map(|(_, one)| one)
+        .collect()
+}
+
+fn answer(
+    found: &[Minimum<'_>],
+    silent: f64,
+    question: &Question,
+    task: &Task,
+) -> Result<Family, Error> {
+    let rows = found.first().map(|best| best.model.rows);
+    let excited = rows.map_or(Vec::new(), excited);
+    let is_sine = rows.is_some_and(|rows| is_one_sine(rows, &excited));
+    let candidate = |one: &Minimum<'_>| {
+        let mut out = Candidate::new(one, question.level);
+        if is_sine {
+            out.told = out.told.min(TOLD_BY_SINE);
+        }
+        out
+    };
+    let mut minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
+    leave_out_what_adds_nothing(&mut minima);
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for one in found {
+        if candidates
+            .iter()
+            .all(|known| known.class != one.model.class)
+        {
+            candidates.push(candidate(one));
+        }
+    }
+    let likely: Vec<Candidate> = as_likely(found).into_iter().map(candidate).collect();
+    let evidence = Findings {
+        response: silent - found.first().map_or(f64::INFINITY, |best| best.bic),
+        is_sine: is_sine && question.class.is_none(),
+    };
+    Ok(Family {
+        verdict: verdict(&turning(&likely, task)?, &evidence),
+        hull: hull(&turning(&minima, task)?),
+        candidates,
+        straight: rows.is_some_and(|rows| rows.straight),
+        decided: true,
+        at_rest: rows.is_some_and(|rows| rows.start != Start::Unknown),
+        rows: rows.map_or(0, |rows| rows.used.len()),
+        first_row: rows
+            .and_then(|rows| rows.used.first().copied())
+            .unwrap_or(0),
+        shift: 0,
+        excited,
+        minima,
+    })
+}

@@ -1,0 +1,199 @@
+//! Intervals over all classes that the record does not tell from the best.
+
+use std::f64::consts::{PI, TAU};
+
+use super::candidate::Candidate;
+use super::loop_view::Seen;
+use crate::elementary::{exp, log};
+use crate::{Error, Task};
+
+/// A value and the ends of its interval.
+pub type Triple = (f64, f64, f64);
+
+/// An interval of a named quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// The name.
+    pub name: &'static str,
+    /// Its value for the best class, and the ends.
+    pub value: f64,
+    /// The lower end.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+/// A candidate as the best one sees it: classes of the other kind have other signs and turns.
+pub(super) struct Turning<'a> {
+    pub(super) candidate: &'a Candidate,
+    /// The frequency at which its largest stable gain oscillates.
+    pub(super) turn: Option<f64>,
+    /// Added to its phase: half turns that make it comparable with the best.
+    offset: f64,
+    /// Those of the integrators of the best.
+    turns: f64,
+}
+
+/// All candidates, the best first, each compared with it.
+pub(super) fn turning<'a>(all: &'a [Candidate], task: &Task) -> Result<Vec<Turning<'a>>, Error> {
+    let Some(best) = all.first() else {
+        return Ok(Vec::new());
+    };
+    let seen = best.seen();
+    let turn = own_turn(&seen, task)?;
+    let finite = turn.filter(|turn| turn.is_finite());
+    let mut out = Vec::with_capacity(all.len());
+    for candidate in all {
+        let other = candidate.seen();
+        let mut offset = 0.0;
+        let own = match finite {
+            Some(turn) => {
+                let differ = other.sign() * seen.sign() < 0.0;
+                let half = if differ { PI } else { 0.0 };
+                let off = seen.phase(turn) - other.phase(turn) - half;
+                offset = half + (off / TAU).round() * TAU;
+                let target = seen.phase(turn) - offset;
+                Some(other.passing(turn, target))
+            }
+            None if out.is_empty() => turn,
+            None => own_turn(&other, task)?,
+        };
+        out.push(Turning {
+            candidate,
+            turn: own,
+            offset,
+            turns: seen.turns(),
+        });
+    }
+    Ok(out)
+}
+
+fn own_turn(seen: &Seen, task: &Task) -> Result<Option<f64>, Error> {
+    match seen.turn(task) {
+        Err(error) if error.ends_all() => Err(error),
+        // A gain too far from one for its margins: no gain is known to be largest.
+        Err(_) => Ok(None),
+        Ok(turn) => Ok(turn),
+    }
+}
+
+impl Turning<'_> {
+    fn finite_turn(&self) -> Option<f64> {
+        self.turn.filter(|turn| turn.is_finite())
+    }
+
+    pub(super) fn crossover(&self) -> Option<f64> {
+        self.finite_turn()
+            .map(|turn| self.candidate.seen().crossover(turn))
+    }
+
+    /// The size of the largest stable gain; infinite where none is.
+    pub(super) fn largest(&self) -> Triple {
+        match self.turn {
+            None => (f64::INFINITY, f64::INFINITY, f64::INFINITY),
+            Some(turn) => exponential(self.candidate.interval(|seen| seen.log_largest(turn))),
+        }
+    }
+
+    /// The delay and its interval.
+    pub(super) fn delay(&self) -> Triple {
+        self.candidate.interval(|seen| seen.numbers.delay)
+    }
+
+    pub(super) fn phase(&self, seen: &Seen, omega: f64) -> f64 {
+        seen.phase(omega) + self.offset
+    }
+
+    /// −(arg G + 90° for each integrator of the best)/ω.
+    fn equivalent_delay(&self, seen: &Seen, omega: f64) -> f64 {
+        -(self.phase(seen, omega) + self.turns) / omega
+    }
+}
+
+fn exponential((value, low, high): Triple) -> Triple {
+    (exp(value), exp(low), exp(high))
+}
+
+/// Gain, phase and equivalent delay at a frequency, each with its ends, over all of these.
+pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [Triple; 3] {
+    let over = |of: &dyn Fn(&Turning<'_>, &Seen) -> f64| {
+        union(
+            all.iter()
+                .map(|one| one.candidate.interval(|seen| of(one, seen))),
+        )
+    };
+    [
+        exponential(over(&|_, seen| seen.log_gain(omega))),
+        over(&|one, seen| one.phase(seen, omega)),
+        over(&|one, seen| one.equivalent_delay(seen, omega)),
+    ]
+}
+
+/// The first value with the least and the largest end.
+fn union(parts: impl Iterator<Item = Triple>) -> Triple {
+    let join = |a: Triple, b: Triple| (a.0, a.1.min(b.1), a.2.max(b.2));
+    parts.reduce(join).unwrap_or((f64::NAN, f64::NAN, f64::NAN))
+}
+
+/// The intervals of all quantities; the best candidate comes first.
+pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
+    let Some(best) = all.first() else {
+        return Vec::new();
+    };
+    let kind = best.candidate.class.integrating;
+    let same = || {
+        all.iter()
+            .filter(|one| one.candidate.class.integrating == kind)
+    };
+    let mut out = Vec::new();
+    let mut add = |name, (value, low, high): Triple| {
+        out.push(Named {
+            name,
+            value,
+            low,
+            high,
+        });
+    };
+    let (value, low, high) = union(all.iter().map(Turning::delay));
+    add("delay", (value, low.max(0.0), high));
+    // An integrator beside a slow zero has the gain of neither.
+    let alike = same().filter(|one| one.candidate.gain * best.candidate.gain > 0.0);
+    add(
+        "gain",
+        union(alike.map(|one| one.candidate.interval(|seen| seen.gain))),
+    );
+    if let Some(largest) = best.candidate.numbers.lags().first() {
+        let lag = |seen: &Seen| {
+            seen.numbers
+                .lags()
+                .first()
+                .copied()
+                .unwrap_or(0.5 * seen.numbers.sum)
+        };
+        let real = same().filter(|one| !one.candidate.numbers.lags().is_empty());
+        let (_, low, high) = union(real.map(|one| one.candidate.interval(lag)));
+        add("lag", (*largest, low.max(0.0), high));
+    }
+    let sign = best.candidate.seen().sign();
+    let (value, low, high) = union(all.iter().map(Turning::largest));
+    let [low, high] = if sign > 0.0 {
+        [low, high]
+    } else {
+        [-high, -low]
+    };
+    add("largest_gain", (sign * value, low, high));
+    if let Some(omega) = best.crossover() {
+        let over = all.iter().filter_map(|one| {
+            let turn = one.finite_turn()?;
+            let near = one.candidate.seen().crossover(turn);
+            let log_crossover = |seen: &Seen| log(seen.crossover_near(near, turn));
+            Some(exponential(one.candidate.interval(log_crossover)))
+        });
+        add("crossover", union(over));
+        let [gain, phase, delay] = at(all, omega);
+        add("gain_at_crossover", gain);
+        add("phase_at_crossover", phase);
+        add("delay_at_crossover", delay);
+    }
+    out
+}

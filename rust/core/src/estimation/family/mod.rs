@@ -1,0 +1,38 @@
+//! Plants by evidence: a family of plants and noises fitted to the same rows and compared by BIC.
+//!
+//! ```text
+//! G(s) = k (1 + z s) e^(−T s) / (s^i (q s² + p s + 1)),  i = 0 or 1, with or without q, p and z,
+//! y = G u + offset (+ trend where it integrates) + free responses of the lags + noise,
+//! ```
+//!
+//! The state at the first row is unknown, and so is the command before it. `rows` says which rows
+//! count, `response` is exact, `model` the likelihood of one class under one `noise`, `search` its
+//! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
+//! numbers the input tells, `hull` intervals over all classes within reach, `verdict` what is claimed.
+
+mod candidate;
+mod class;
+mod dispersion;
+mod excitation;
+mod fit;
+mod hull;
+mod loop_view;
+mod minima;
+mod model;
+mod noise;
+mod projection;
+mod quantiles;
+mod response;
+mod rows;
+mod search;
+mod starts;
+mod tolerances;
+mod verdict;
+
+pub use candidate::Candidate;
+pub use class::{Class, Numbers};
+pub use fit::{Between, Family, Question, fit_family};
+pub use hull::{Named, Triple};
+pub use noise::{Coefficients, Noise};
+pub use rows::Record;
+pub use verdict::{Grade, Verdict};

@@ -1,0 +1,329 @@
+//! One class under one noise: −2 ln L with the linear numbers eliminated, and its sensitivities.
+//!
+//! Linear are gain, offset, the trend of an integrating plant and the free responses. What is searched
+//! are T, ln p, ln q, z and the numbers of the noise (variable projection, Golub & Pereyra 1973, with
+//! Kaufman's derivative 1975).
+
+use super::class::{Class, Numbers};
+use super::noise::{Noise, Whitener};
+use super::projection::Projection;
+use super::response::{Response, free_responses, response};
+use super::rows::{Rows, Start};
+use super::tolerances::{RANGES, SEARCH};
+use crate::elementary::{exp, log};
+use crate::linear_algebra::vectors::{add_multiple, dot};
+
+/// A class of plants under a model of the noise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Model<'a> {
+    pub(super) rows: &'a Rows,
+    pub(super) class: Class,
+    pub(super) noise: Noise,
+    /// Is there a plant at all? Without one, the command does nothing.
+    pub(super) responds: bool,
+    /// Is the output (of an integrator the slope) that goes with a command of zero free? It is zero
+    /// otherwise.
+    pub(super) level: bool,
+}
+
+/// The likelihood at one point.
+#[derive(Debug, Clone)]
+pub(super) struct Point {
+    pub(super) x: Vec<f64>,
+    /// The sum of squares of the whitened residuals, with the floor of rounding.
+    pub(super) squares: f64,
+    /// Coefficients of the linear columns, the gain last.
+    pub(super) linear: Vec<f64>,
+    /// Whitened residuals.
+    pub(super) whitened: Vec<f64>,
+    /// Output less model.
+    pub(super) residual: Vec<f64>,
+    response: Response,
+    free: Vec<Vec<f64>>,
+    projection: Projection,
+}
+
+impl Model<'_> {
+    /// How many numbers are searched.
+    pub(super) fn searched(&self) -> usize {
+        self.plant_numbers() + self.noise.searched()
+    }
+
+    pub(super) fn plant_numbers(&self) -> usize {
+        if self.responds {
+            self.class.searched()
+        } else {
+            0
+        }
+    }
+
+    /// How many numbers there are, with the variance of the noise.
+    pub(super) fn parameters(&self) -> usize {
+        let free = match self.rows.start {
+            Start::Rest => 1,
+            _ => self.class.order + usize::from(self.class.integrating) + usize::from(self.level),
+        };
+        self.searched() + usize::from(self.responds) + free + 1
+    }
+
+    pub(super) fn numbers(&self, x: &[f64]) -> Numbers {
+        let mut out = Numbers::of_delay(x.first().copied().unwrap_or(0.0));
+        if self.class.order > 0 {
+            out.sum = exp(x[1]);
+        }
+        if self.class.order > 1 {
+            out.product = exp(x[2]);
+        }
+        if self.class.has_zero {
+            out.zero = x[1 + self.class.order];
+        }
+        out
+    }
+
+    /// What is searched, from the numbers of a plant and of the noise.
+    pub(super) fn point_of(&self, numbers: &Numbers, noise: &[f64]) -> Vec<f64> {
+        let mut x = vec![numbers.delay];
+        if self.class.order > 0 {
+            x.push(log(numbers.sum));
+        }
+        if self.class.order > 1 {
+            x.push(log(numbers.product));
+        }
+        if self.class.has_zero {
+            x.push(numbers.zero);
+        }
+        x.extend_from_slice(noise);
+        self.clamp(&mut x);
+        x
+    }
+
+    /// Move a point into the ranges of its numbers.
+    pub(super) fn clamp(&self, x: &mut [f64]) {
+        if !self.responds {
+            return;
+        }
+        let rows = self.rows;
+        let fastest = if rows.in_loop {
+            RANGES.fastest_in_loop
+        } else {
+            RANGES.fastest
+        } * rows.row;
+        let slowest = RANGES.slowest * rows.span;
+        let least = if rows.in_loop && rows.straight {
+            rows.row
+        } else {
+            0.0
+        };
+        x[0] = x[0].clamp(least, rows.largest_delay.max(least));
+        if self.class.order > 0 {
+            x[1] = x[1].clamp(log(fastest), log(slowest));
+        }
+        if self.class.order > 1 {
+            // 2 ζ √q = p.
+            let most = 2.0 * (x[1] - log(2.0 * RANGES.least_damping));
+            x[2] = x[2].clamp(x[1] + log(RANGES.fastest * rows.row), most);
+        }
+        if self.class.has_zero {
+            let at = 1 + self.class.order;
+            x[at] = x[at].clamp(-RANGES.inverse * rows.span, slowest);
+        }
+    }
+
+    /// The linear columns beside the response, and the responses of the lags among them.
+    fn beside(&self, free: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let rows = self.rows;
+        let mut columns = Vec::with_capacity(4);
+        if self.level || self.class.integrating {
+            columns.push(vec![1.0; rows.used.len()]);
+        }
+        if rows.start != Start::Rest {
+            if self.class.integrating && self.level {
+                let middle = 0.5 * rows.span;
+                let from = rows.time[0] + middle;
+                let slope = rows.used.iter().map(|at| (rows.time[*at] - from) / middle);
+                columns.push(slope.collect());
+            }
+            columns.extend(free.iter().cloned());
+        }
+        columns
+    }
+
+    /// The response of unit gain, with that to the command of the first row where no level is free.
+    fn response(&self, numbers: &Numbers) -> Response {
+        let rows = self.rows;
+        let mut out = response(rows, self.class, numbers);
+        if !self.level {
+            for (value, at) in out.value.iter_mut().zip(&rows.used) {
+                *value += if self.class.integrating {
+                    rows.base * (rows.time[*at] - rows.time[0])
+                } else {
+                    rows.base
+                };
+            }
+        }
+        out
+    }
+
+    /// The output, less its mean where a level is free.
+    fn output(&self) -> Vec<f64> {
+        let mean = if self.level || self.class.integrating {
+            0.0
+        } else {
+            self.rows.mean
+        };
+        self.rows.output.iter().map(|y| y + mean).collect()
+    }
+
+    fn free(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
+        if self.rows.start == Start::Rest {
+            Vec::new()
+        } else {
+            free_responses(self.rows, self.class, numbers)
+        }
+    }
+
+    fn whitener(&self, x: &[f64]) -> Whitener<'_> {
+        Whitener::new(&self.rows.gaps, self.noise, &x[self.plant_numbers()..])
+    }
+
+    /// The sum of squares of residuals under other numbers of the noise.
+    pub(super) fn squares_of(&self, residual: &[f64], noise: &[f64]) -> f64 {
+        let whitener = Whitener::new(&self.rows.gaps, self.noise, noise);
+        let whitened = whitener.whiten(residual);
+        dot(&whitened, &whitened)
+    }
+
+    /// The likelihood at a point.
+    pub(super) fn at(&self, x: Vec<f64>) -> Point {
+        let rows = self.rows;
+        let numbers = self.numbers(&x);
+        let (response, free) = if self.responds {
+            (self.response(&numbers), self.free(&numbers))
+        } else {
+            (Response::default(), Vec::new())
+        };
+        let whitener = self.whitener(&x);
+        let mut raw = self.beside(&free);
+        if self.responds {
+            raw.push(response.value.clone());
+        }
+        let whitened: Vec<Vec<f64>> = raw.iter().map(|column| whitener.whiten(column)).collect();
+        let projection = Projection::new(whitened);
+        let output = self.output();
+        let mut left = whitener.whiten(&output);
+        let parts = projection.taken(&mut left);
+        let linear = projection.coefficients(&parts);
+        let mut residual = output;
+        for (column, factor) in raw.iter().zip(&linear) {
+            add_multiple(&mut residual, -factor, column);
+        }
+        let floor = SEARCH.rounding * rows.deviation * whitener.factor();
+        let squares = dot(&left, &left) + rows.used.len() as f64 * floor * floor;
+        Point {
+            x,
+            squares,
+            linear,
+            whitened: left,
+            residual,
+            response,
+            free,
+            projection,
+        }
+    }
+
+    /// −2 ln L.
+    pub(super) fn deviance(&self, point: &Point) -> f64 {
+        let count = self.rows.used.len() as f64;
+        count * (log(point.squares / count) + 1.0 + log(std::f64::consts::TAU))
+    }
+
+    /// The gain, zero where there is no plant.
+    pub(super) fn gain(&self, point: &Point) -> f64 {
+        match point.linear.last() {
+            Some(gain) if self.responds => *gain,
+            _ => 0.0,
+        }
+    }
+
+    /// Derivatives of the whitened model with respect to what is searched, beside the linear columns.
+    pub(super) fn slopes(&self, point: &Point) -> Vec<Vec<f64>> {
+        let whitener = self.whitener(&point.x);
+        let mut columns = Vec::with_capacity(self.searched());
+        if self.responds {
+            for raw in self.raw_slopes(point) {
+                columns.push(whitener.whiten(&raw));
+            }
+        }
+        let before = whitener.whiten(&point.residual);
+        for at in self.plant_numbers()..self.searched() {
+            let mut x = point.x.clone();
+            x[at] += SEARCH.step;
+            let after = self.whitener(&x).whiten(&point.residual);
+            let change = before.iter().zip(&after);
+            columns.push(change.map(|(b, a)| (b - a) / SEARCH.step).collect());
+        }
+        for column in &mut columns {
+            point.projection.taken(column);
+        }
+        columns
+    }
+
+    /// Derivatives of the model's output with respect to the numbers of the plant.
+    fn raw_slopes(&self, point: &Point) -> Vec<Vec<f64>> {
+        let gain = self.gain(point);
+        let scaled = |column: &[f64]| column.iter().map(|entry| gain * entry).collect();
+        let mut columns: Vec<Vec<f64>> = vec![scaled(&point.response.by_delay)];
+        for at in 1..=self.class.order {
+            let mut x = point.x.clone();
+            x[at] += SEARCH.step;
+            let numbers = self.numbers(&x);
+            let after = self.response(&numbers);
+            let mut change = vec![0.0; after.value.len()];
+            add_multiple(&mut change, gain / SEARCH.step, &after.value);
+            add_multiple(&mut change, -gain / SEARCH.step, &point.response.value);
+            if !point.free.is_empty() {
+                let places = point.linear.len() - 1 - point.free.len()..;
+                let later = self.free(&numbers);
+                for ((factor, after), before) in
+                    point.linear[places].iter().zip(&later).zip(&point.free)
+                {
+                    add_multiple(&mut change, factor / SEARCH.step, after);
+                    add_multiple(&mut change, -factor / SEARCH.step, before);
+                }
+            }
+            columns.push(change);
+        }
+        if self.class.has_zero {
+            columns.push(scaled(&point.response.by_zero));
+        }
+        columns
+    }
+
+    /// Take what the linear numbers explain, apart from the gain, from the slopes of the plant's
+    /// numbers: ln gain, delay, those of the lags, zero.
+    pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
+        let whitener = self.whitener(&point.x);
+        let beside = self.beside(&point.free);
+        let nuisance = Projection::new(
+            beside
+                .iter()
+                .map(|column| whitener.whiten(column))
+                .collect(),
+        );
+        let gain = self.gain(point);
+        let by_gain = point
+            .response
+            .value
+            .iter()
+            .map(|entry| gain * entry)
+            .collect();
+        std::iter::once(by_gain)
+            .chain(self.raw_slopes(point))
+            .map(|raw: Vec<f64>| {
+                let mut column = whitener.whiten(&raw);
+                nuisance.taken(&mut column);
+                column
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,232 @@
+//! Exact responses of the plants of the family to held or straight commands, with the slope over the
+//! delay and the zero, and the free responses of their lags.
+//!
+//! With v the output of 1/(q s² + p s + 1), u = a + b t on a piece, and x = (v, v′):
+//!     x ← x_p + e^(A t) (x − x_p),   x_p = (u − p b, b),
+//!     ∫ v = ∫ u − q Δv′ − p Δv.
+//! Both hold for one lag with q = 0. Values at a row are those just before it.
+
+use super::class::{Class, Numbers};
+use super::rows::Rows;
+use crate::elementary::{exp, sin_cos};
+
+/// Two steps closer than this share of a row are one, and their transition is computed once.
+const SAME_STEP: f64 = 1e-9;
+
+/// (r t)² below which two poles are taken for one in a series.
+const MEETING: f64 = 1e-8;
+
+/// Responses at the rows that are used.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Response {
+    pub(super) value: Vec<f64>,
+    /// The derivative with respect to the delay.
+    pub(super) by_delay: Vec<f64>,
+    /// The derivative with respect to the zero.
+    pub(super) by_zero: Vec<f64>,
+}
+
+/// e^(A t) of the last two lengths of a step.
+struct Transitions {
+    order: usize,
+    sum: f64,
+    product: f64,
+    tolerance: f64,
+    known: [(f64, [f64; 4]); 2],
+}
+
+impl Transitions {
+    fn new(class: Class, numbers: &Numbers, row: f64) -> Self {
+        Self {
+            order: class.order,
+            sum: numbers.sum,
+            product: numbers.product,
+            tolerance: SAME_STEP * row,
+            known: [(f64::NAN, [0.0; 4]); 2],
+        }
+    }
+
+    fn over(&mut self, step: f64) -> [f64; 4] {
+        if (self.known[0].0 - step).abs() < self.tolerance {
+            return self.known[0].1;
+        }
+        self.known.swap(0, 1);
+        let is_known = (self.known[0].0 - step).abs() < self.tolerance;
+        if !is_known {
+            self.known[0] = (step, self.computed(step));
+        }
+        self.known[0].1
+    }
+
+    fn computed(&self, step: f64) -> [f64; 4] {
+        match self.order {
+            0 => [0.0; 4],
+            1 => [exp(-step / self.sum), 0.0, 0.0, 0.0],
+            _ => pair(self.sum, self.product, step),
+        }
+    }
+}
+
+/// e^(A t) of A = [[0, 1], [−1/q, −p/q]].
+fn pair(sum: f64, product: f64, step: f64) -> [f64; 4] {
+    let middle = 0.5 * sum / product;
+    let square = middle * middle - 1.0 / product;
+    let (even, odd) = if (square * step * step).abs() < MEETING {
+        let decay = exp(-middle * step);
+        let part = square * step * step;
+        (
+            decay * (1.0 + part / 2.0),
+            decay * step * (1.0 + part / 6.0),
+        )
+    } else if square > 0.0 {
+        let root = square.sqrt();
+        let slow = exp(-step / (product * (middle + root)));
+        let fast = exp(-(middle + root) * step);
+        (0.5 * (slow + fast), 0.5 * (slow - fast) / root)
+    } else {
+        let root = (-square).sqrt();
+        let decay = exp(-middle * step);
+        let (sine, cosine) = sin_cos(root * step);
+        (decay * cosine, decay * sine / root)
+    };
+    [
+        even + middle * odd,
+        odd,
+        -odd / product,
+        even - middle * odd,
+    ]
+}
+
+/// The state of a plant of unit gain under a command.
+struct State<'a> {
+    class: Class,
+    numbers: &'a Numbers,
+    transitions: Transitions,
+    value: f64,
+    slope: f64,
+    integral: f64,
+    command: f64,
+    rate: f64,
+}
+
+impl State<'_> {
+    fn advance(&mut self, step: f64) {
+        if step <= 0.0 {
+            return;
+        }
+        let (p, q) = (self.numbers.sum, self.numbers.product);
+        let area = step * (self.command + 0.5 * step * self.rate);
+        let transition = self.transitions.over(step);
+        let (before, before_slope) = (self.value, self.slope);
+        let end = self.command + self.rate * step;
+        match self.class.order {
+            0 => self.value = end,
+            1 => {
+                let off = before - (self.command - p * self.rate);
+                self.value = end - p * self.rate + transition[0] * off;
+            }
+            _ => {
+                let off = before - (self.command - p * self.rate);
+                let off_slope = before_slope - self.rate;
+                self.value = end - p * self.rate + transition[0] * off + transition[1] * off_slope;
+                self.slope = self.rate + transition[2] * off + transition[3] * off_slope;
+            }
+        }
+        self.command = end;
+        if self.class.integrating {
+            self.integral += match self.class.order {
+                0 => area,
+                1 => area - p * (self.value - before),
+                _ => area - q * (self.slope - before_slope) - p * (self.value - before),
+            };
+        }
+    }
+
+    fn record(&self, out: &mut Response) {
+        let (p, q, z) = (self.numbers.sum, self.numbers.product, self.numbers.zero);
+        let left = self.command - self.value;
+        let (first, second) = match self.class.order {
+            0 => (self.rate, 0.0),
+            1 => (left / p, (self.rate - left / p) / p),
+            _ => (self.slope, (left - p * self.slope) / q),
+        };
+        let [zeroth, first, second] = if self.class.integrating {
+            [self.integral, self.value, first]
+        } else {
+            [self.value, first, second]
+        };
+        out.value.push(zeroth + z * first);
+        out.by_delay.push(-(first + z * second));
+        out.by_zero.push(first);
+    }
+}
+
+/// The response of a plant of unit gain that is at rest until the first command arrives.
+pub(super) fn response(rows: &Rows, class: Class, numbers: &Numbers) -> Response {
+    let (time, command) = (&rows.time, &rows.command);
+    let count = rows.used.len();
+    let mut out = Response {
+        value: Vec::with_capacity(count),
+        by_delay: Vec::with_capacity(count),
+        by_zero: Vec::with_capacity(count),
+    };
+    let mut state = State {
+        class,
+        numbers,
+        transitions: Transitions::new(class, numbers, rows.row),
+        value: 0.0,
+        slope: 0.0,
+        integral: 0.0,
+        command: 0.0,
+        rate: 0.0,
+    };
+    // A signal behind a delay alone is taken as straight: a held one would jump between rows.
+    let straight = rows.straight || class.order == 0 && !class.integrating;
+    let mut now = time[0] + numbers.delay;
+    let mut next = 0;
+    for &row in &rows.used {
+        // Commands that arrive before this row.
+        while next < time.len() && time[next] + numbers.delay < time[row] {
+            let arrival = time[next] + numbers.delay;
+            state.advance(arrival - now);
+            now = arrival;
+            state.command = command[next];
+            state.rate = match time.get(next + 1) {
+                Some(after) if straight => {
+                    (command[next + 1] - command[next]) / (after - time[next])
+                }
+                _ => 0.0,
+            };
+            next += 1;
+        }
+        if next > 0 {
+            state.advance(time[row] - now);
+            now = time[row];
+        }
+        state.record(&mut out);
+    }
+    out
+}
+
+/// The free responses of the lags from the first row that is used on, one column a state.
+pub(super) fn free_responses(rows: &Rows, class: Class, numbers: &Numbers) -> Vec<Vec<f64>> {
+    let mut transitions = Transitions::new(class, numbers, rows.row);
+    let start = rows.used.first().map_or(0.0, |row| rows.time[*row]);
+    let mut columns = vec![Vec::with_capacity(rows.used.len()); class.order];
+    let mut states = [[1.0, 0.0], [0.0, 1.0]];
+    let mut now = start;
+    for row in &rows.used {
+        let step = rows.time[*row] - now;
+        now = rows.time[*row];
+        if step > 0.0 {
+            let [a, b, c, d] = transitions.over(step);
+            for state in &mut states[..class.order] {
+                *state = [a * state[0] + b * state[1], c * state[0] + d * state[1]];
+            }
+        }
+        for (column, state) in columns.iter_mut().zip(&states) {
+            column.push(state[0]);
+        }
+    }
+    columns
+}

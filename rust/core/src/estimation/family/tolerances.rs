@@ -1,0 +1,171 @@
+//! The tolerances of each stage, with what a larger value trades.
+
+/// Ranges of the numbers of plants and of noise.
+pub(super) struct Ranges {
+    /// Largest delay as a share of the record where none is given: more rows at the start are left out.
+    pub(super) delay_share: f64,
+    /// Most inverse response, as a zero in spans: a slower one is a drift under another name.
+    pub(super) inverse: f64,
+    /// Most time constants and zeros, in spans of the record: slower ones look like integrators.
+    pub(super) slowest: f64,
+    /// Shortest lag in rows: faster ones look like delays.
+    pub(super) fastest: f64,
+    /// The same with a controller in the loop, where a fast plant could be the controller itself.
+    pub(super) fastest_in_loop: f64,
+    /// Least damping of a pair of poles: less fits single lines of a spectrum.
+    pub(super) least_damping: f64,
+    /// Largest partial correlation of the autoregression: nearer to 1, drift is noise and no trend.
+    pub(super) memory: f64,
+    /// Largest of the moving average: nearer to 1, the noise model fits away the offset.
+    pub(super) averaging: f64,
+}
+
+pub(super) const RANGES: Ranges = Ranges {
+    delay_share: 0.3,
+    inverse: 0.3,
+    slowest: 20.0,
+    fastest: 0.05,
+    fastest_in_loop: 0.5,
+    least_damping: 0.05,
+    memory: 0.999,
+    averaging: 0.9,
+};
+
+/// The search for one minimum.
+pub(super) struct Search {
+    /// Fall of −2 ln L that is still followed: more ends sooner, further from the minimum.
+    pub(super) fall: f64,
+    /// Most steps.
+    pub(super) steps: usize,
+    /// Step of numerical derivatives: more loses curvature, less digits.
+    pub(super) step: f64,
+    /// First damping of the steps; more is slower and surer.
+    pub(super) damping: f64,
+    /// Factor by which damping changes.
+    pub(super) change: f64,
+    /// Damping at which the search has come to an end.
+    pub(super) most_damping: f64,
+    /// Residuals are never smaller than this share of the output's deviation, so that outputs
+    /// without noise keep an interval: more is wider there.
+    pub(super) rounding: f64,
+    /// Norm of what is left of a column, as a share, below which it depends on the others.
+    pub(super) dependent: f64,
+}
+
+pub(super) const SEARCH: Search = Search {
+    fall: 1e-4,
+    steps: 40,
+    step: 1e-5,
+    damping: 1e-3,
+    change: 5.0,
+    most_damping: 1e6,
+    rounding: 1e-7,
+    dependent: 1e-9,
+};
+
+/// Where searches start: more points find more minima and take more time.
+pub(super) struct Starts {
+    /// Delays on a grid up to the largest.
+    pub(super) delays: usize,
+    /// Delays beside a grid of time constants.
+    pub(super) few_delays: usize,
+    /// Time constants on a grid.
+    pub(super) lags: usize,
+    /// Dampings of pairs of poles.
+    pub(super) dampings: [f64; 2],
+    /// Starts from the grid that are kept.
+    pub(super) gridded: usize,
+    /// Starts that are followed, of all.
+    pub(super) followed: usize,
+    /// Minima of a class that are kept.
+    pub(super) kept: usize,
+    /// Two delays closer than so many rows belong to one minimum.
+    pub(super) apart: f64,
+}
+
+pub(super) const STARTS: Starts = Starts {
+    delays: 40,
+    few_delays: 10,
+    lags: 8,
+    dampings: [0.3, 0.9],
+    gridded: 2,
+    followed: 4,
+    kept: 2,
+    apart: 0.5,
+};
+
+/// How classes and noise models are compared.
+pub(super) struct Evidence {
+    /// BIC within which a class may still be the true one: more widens the hull.
+    pub(super) reach: f64,
+    /// −2 ln L above the best within which a class has to agree with it: more finds more contradictions.
+    pub(super) likely: f64,
+    /// BIC from the best beyond which a class is not given ARMA(2,2) after ARMA(1,1): more costs time.
+    pub(super) hopeless: f64,
+    /// Standard errors a combination of numbers must stand from nothing to count.
+    pub(super) told: f64,
+    /// Fall of −2 ln L by a further number from which on its class counts though it is not told.
+    pub(super) adds: f64,
+    /// Ratio of largest stable gains of two classes that contradict each other.
+    pub(super) contradiction: f64,
+    /// Ratio of the ends of the largest gain from which on it is not told.
+    pub(super) wide: f64,
+    /// Their difference in phase at crossover, rad.
+    pub(super) turn: f64,
+    /// Fewest numbers with which a loop is known: one sine tells two.
+    pub(super) enough: usize,
+    /// Probability below which residuals are not white.
+    pub(super) white: f64,
+    /// Fall of −2 ln L by a delay below zero that shows a command logged late.
+    pub(super) shifted: f64,
+}
+
+pub(super) const EVIDENCE: Evidence = Evidence {
+    reach: 10.0,
+    likely: 6.0,
+    hopeless: 60.0,
+    told: 3.0,
+    adds: 2.0,
+    contradiction: 1.5,
+    wide: 4.0,
+    turn: 0.5,
+    enough: 3,
+    white: 1e-3,
+    shifted: 10.0,
+};
+
+/// Rows at rest at the start of a record.
+pub(super) struct Rest {
+    /// Fewest rows before the first command that can show rest.
+    pub(super) rows: usize,
+    /// Most standard errors of their slope.
+    pub(super) slope: f64,
+    /// What the slope may move over these rows, as a share of the output's range: more takes a moving
+    /// plant for one at rest.
+    pub(super) share: f64,
+}
+
+pub(super) const REST: Rest = Rest {
+    rows: 8,
+    slope: 2.5,
+    share: 0.05,
+};
+
+/// Blocks of rows whose scores show how far the numbers really scatter.
+pub(super) struct Blocks {
+    /// Blocks of equal information: more see shorter errors and each sees less.
+    pub(super) count: usize,
+    /// Share of independent scores in p (m − 1): less is a wider quantile.
+    pub(super) freedom: f64,
+    /// Leverage of a block at which its score is no longer corrected fully.
+    pub(super) most_leverage: f64,
+    /// Leverage of each block up to which the jackknife holds.
+    pub(super) jackknife: f64,
+}
+
+pub(super) const BLOCKS: Blocks = Blocks {
+    count: 8,
+    freedom: 0.6,
+    most_leverage: 0.98,
+    jackknife: 0.5,
+};

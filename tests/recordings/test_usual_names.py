@@ -1,0 +1,117 @@
+"""Columns are found by their usual names, dates are read, and repeated times are placed."""
+
+import deadtime as dtm
+import numpy as np
+import pytest
+
+ROWS = 200
+
+
+def table(header, time=lambda row: f"{row}"):
+    """A CSV table under a header; its cells are the row and tenths after it."""
+    width = header.count(",") + 1
+    lines = [
+        ",".join([time(row), *(f"{row}.{column}" for column in range(1, width))])
+        for row in range(ROWS)
+    ]
+    return "\n".join([header, *lines]) + "\n"
+
+
+def read(folder, text, **options):
+    path = folder / "run.csv"
+    path.write_text(text, encoding="utf-8")
+    return dtm.read_recording(path, **({"command": "auto"} | options))
+
+
+def digit(values):
+    """Which column values were read from: the tenths of its cells."""
+    return None if values is None or np.isnan(values[3]) else round((values[3] - 3.0) * 10)
+
+
+@pytest.mark.parametrize(
+    ("header", "found"),
+    [
+        ("t,u,y", (None, 2, 1)),
+        ("Time (s),SP,PV,OP", (1, 2, 3)),
+        ("Time [s],PV,Q,OP,SP", (4, 1, 3)),
+        ("t_s,ref_m,height_m,speed,cmd_mps", (1, 2, 4)),
+        ("sec,Setpoint,Process Value,Controller Output", (1, 2, 3)),
+        ("Seconds,set-point (%),Measured [°C],MV (%)", (1, 2, 3)),
+        ("time,T,temp,PV,U", (None, 3, 4)),
+        ("t,T,y,y2,u", (None, 2, 4)),
+    ],
+)
+def test_usual_names_are_found(header, found, tmp_path):
+    run = read(tmp_path, table(header))
+    assert (digit(run.reference), digit(run.output), digit(run.command)) == found
+    assert np.array_equal(run.time, np.arange(ROWS))
+
+
+def test_what_is_named_is_taken_and_not_found_again(tmp_path):
+    run = read(tmp_path, table("t,y,u,T1,Q1"), output="T1", command="Q1")
+    assert (digit(run.output), digit(run.command)) == (3, 4)
+    run = read(tmp_path, table("time,reference,output"), command="reference")
+    assert (digit(run.reference), digit(run.command)) == (1, 1)
+    run = read(tmp_path, table("t,y,pv,u"), output="u", command="y")
+    assert (digit(run.output), digit(run.command)) == (3, 1)
+
+
+@pytest.mark.parametrize("signal", ["time", "output", "command"])
+def test_without_a_usual_name_the_columns_and_the_option_are_told(signal, tmp_path):
+    headers = {"time": "clock_ms,y,u", "output": "t,T1,u", "command": "t,y,Q1"}
+    with pytest.raises(dtm.RecordingError) as caught:
+        read(tmp_path, table(headers[signal]))
+    for word in (*headers[signal].split(","), f"{signal}=", f"--{signal}"):
+        assert word in str(caught.value)
+
+
+def test_milliseconds_are_not_taken_for_seconds(tmp_path):
+    with pytest.raises(dtm.RecordingError, match="usual name for the time"):
+        read(tmp_path, table("Time (ms),y,u"))
+
+
+def test_a_reference_or_a_command_has_to_be_there(tmp_path):
+    assert not read(tmp_path, table("t,u,y")).has_reference
+    with pytest.raises(dtm.RecordingError, match="usual name for the reference"):
+        read(tmp_path, table("t,u,y"), command=None)
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "2026-01-05 08:{:02d}:{:06.3f}",
+        "2026-01-05T08:{:02d}:{:06.3f}Z",
+        "2026/01/05 08:{:02d}:{:06.3f}+01:00",
+    ],
+)
+def test_dates_become_seconds(written, tmp_path):
+    def stamp(row):
+        return written.format(int(0.75 * row // 60), 0.75 * row % 60)
+
+    text = table("Timestamp,PV,OP", stamp)
+    run = read(tmp_path, text)
+    assert np.array_equal(run.time, 0.75 * np.arange(ROWS))
+    assert len(read(tmp_path, text, window=(10.0, 20.0))) == 13
+
+
+def test_dates_and_numbers_are_not_mixed(tmp_path):
+    text = table("Timestamp,PV,OP", lambda row: "2026-01-05 08:00:00" if row == 5 else str(row))
+    with pytest.raises(dtm.RecordingError, match=r"line 7: '2026-01-05 08:00:00' .* is a date"):
+        read(tmp_path, text)
+
+
+def test_a_repeated_time_is_placed_before_its_row(tmp_path):
+    # The first rows of a log that begins with one row before the step and one after, both at 0.
+    first = read(tmp_path, table("t,y,u", lambda row: str(max(row - 1, 0))))
+    assert np.array_equal(first.time, np.arange(ROWS) - 1.0)
+    later = read(tmp_path, table("t,y,u", lambda row: str(11 if row == 10 else row)))
+    assert later.time[9:12].tolist() == [9.0, 10.0, 11.0]
+    columns = {"t": np.maximum(np.arange(ROWS) - 1, 0), "y": first.output, "u": first.command}
+    assert np.array_equal(dtm.read_recording(columns, command="u").time, first.time)
+
+
+def test_times_that_repeat_often_or_go_back_are_refused(tmp_path):
+    with pytest.raises(dtm.RecordingError, match="line 3: the time repeats"):
+        read(tmp_path, table("t,y,u", lambda row: str(row // 2)))
+    with pytest.raises(dtm.RecordingError, match="line 12: the time goes back"):
+        read(tmp_path, table("t,y,u", lambda row: str(5 if row == 10 else row)))
