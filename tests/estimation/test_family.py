@@ -178,6 +178,8 @@ def test_a_process_in_a_loop_with_a_step_of_the_load():
     rows = table(PROCESS / "loop.csv", "Time (s)", "OP", "PV")
     found = _native.fit_family(*rows, controller=True)
     assert found.verdict in ("reliable", "indication")
+    # White noise alone takes a shorter delay than coloured noise needs.
+    assert found.reason != "delay at its limit"
     truth = made.Made(*[np.zeros(1)] * 3, (1.8,), (40.0, 1.0), 12.0, True)
     assert all(held(found, truth).values())
     assert abs(found.candidates[0].values[0] - 12.0) < 1.0
