@@ -4,6 +4,7 @@ use super::class::{Class, Numbers};
 use super::dispersion::dispersion;
 use super::loop_view::Seen;
 use super::minima::Minimum;
+use super::model::Point;
 use super::noise::{Coefficients, Noise};
 use super::quantiles::{beyond, student};
 use super::tolerances::EVIDENCE;
@@ -101,7 +102,11 @@ impl Candidate {
             parameters: model.parameters(),
             told: told(&information, scales.len()),
             at_limit: found.is_at_limit(),
-            white: whiteness(&point.whitened, model.noise.searched()),
+            white: if is_rounding(point) {
+                1.0
+            } else {
+                whiteness(&point.whitened, model.noise.searched())
+            },
             deviation: scatter(&point.residual),
             innovation: variance.sqrt(),
             residuals: vec![f64::NAN; rows.time.len()],
@@ -190,6 +195,11 @@ impl Candidate {
         let value = of(&seen);
         (value, value - reach, value + reach)
     }
+}
+
+/// Are the residuals smaller than what is taken for the rounding of the output?
+fn is_rounding(point: &Point) -> bool {
+    2.0 * dot(&point.whitened, &point.whitened) < point.squares
 }
 
 /// WᵀW/σ² in the scale of each number.

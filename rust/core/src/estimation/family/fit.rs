@@ -216,37 +216,45 @@ fn one_kind(
     let noises: Vec<Noise> = question
         .noise
         .map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
-    let mut used = rows(largest);
+    let used = rows(largest);
     refuse_if!(
         used.used.len() < FEWEST_ROWS,
         "{} rows count, those after the largest delay of {largest} s whose output is known; a fit needs \
          {FEWEST_ROWS}: give more rows, or a smaller largest delay",
         used.used.len()
     );
+    let mut room = largest;
     if start == Start::Unknown && question.largest_delay.is_none() {
         let white = Plan {
             rows: &used,
             classes: &classes,
             noises: &[Noise::White],
         };
-        let first = minima(&white, task)?;
-        let reach = within_reach(&first);
-        let longest = reach
-            .iter()
-            .fold(0.0, |most: f64, one| most.max(one.point.x[0]));
-        let room = ROOM.0 * longest + ROOM.1 * used.row;
-        if room < largest {
-            used = rows(room);
-        }
+        let longest = longest_delay(&minima(&white, task)?);
+        room = room.min(ROOM.0 * longest + ROOM.1 * used.row);
     }
-    let plan = Plan {
-        rows: &used,
-        classes: &classes,
-        noises: &noises,
-    };
-    let found = minima(&plan, task)?;
-    let silent = without_plant(&plan, task)?;
-    answer(&found, silent, question, task)
+    loop {
+        let used = rows(room);
+        let plan = Plan {
+            rows: &used,
+            classes: &classes,
+            noises: &noises,
+        };
+        let found = minima(&plan, task)?;
+        // Coloured noise may need a longer delay than the white noise of the first pass.
+        if room < largest && longest_delay(&found) >= room {
+            room = largest.min(2.0 * room);
+            continue;
+        }
+        let silent = without_plant(&plan, task)?;
+        return answer(&found, silent, question, task);
+    }
+}
+
+/// The longest delay of the minima that may be the true one, s.
+fn longest_delay(found: &[Minimum<'_>]) -> f64 {
+    let delays = within_reach(found).into_iter().map(|one| one.point.x[0]);
+    delays.fold(0.0, f64::max)
 }
 
 /// The minima that may be the true one.

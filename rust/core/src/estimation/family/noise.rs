@@ -245,3 +245,26 @@ impl<'a> Whitener<'a> {
         self.factor
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_rows_leave_the_likelihood_of_the_rest() {
+        // AR(1) over rows 0, 1, 4: the innovation after a gap of g rows has the variance
+        // (1 − φ²ᵍ)/(1 − φ²).
+        let x = [0.8, 0.0];
+        let phi = Noise::Arma11.coefficients(&x).ar[0];
+        let gaps = [1, 1, 3];
+        let values = [0.4, -0.3, 1.1];
+        let found = Whitener::new(&gaps, Noise::Arma11, &x).whiten(&values);
+        let after = |power: i32| (1.0 - phi.powi(2 * power)) / (1.0 - phi * phi);
+        let variances = [1.0 / (1.0 - phi * phi), after(1), after(3)];
+        let errors = [0.4, -0.3 - phi * 0.4, 1.1 + phi.powi(3) * 0.3];
+        let factor = variances.iter().product::<f64>().powf(1.0 / 6.0);
+        for ((found, error), variance) in found.iter().zip(errors).zip(variances) {
+            assert!((found - factor * error / variance.sqrt()).abs() < 1e-9);
+        }
+    }
+}

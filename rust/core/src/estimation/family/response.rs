@@ -230,3 +230,23 @@ pub(super) fn free_responses(rows: &Rows, class: Class, numbers: &Numbers) -> Ve
     }
     columns
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poles_that_meet_are_passed_without_a_jump() {
+        // Sum 2, product 1 ± a little: two lags, one twice, a pair.
+        let at = |product: f64| pair(2.0, product, 0.7);
+        let double = [1.7, 0.7, -0.7, 0.3].map(|part| part * exp(-0.7));
+        for off in [1e-3, 1e-6, 1e-9, 0.0, -1e-9, -1e-6, -1e-3] {
+            for (found, expected) in at(1.0 + off).iter().zip(double) {
+                assert!(
+                    (found - expected).abs() < 2.0 * f64::abs(off) + 1e-14,
+                    "{off}"
+                );
+            }
+        }
+    }
+}
