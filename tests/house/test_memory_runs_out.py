@@ -28,7 +28,8 @@ CASES = {
     ),
     "output times": ("LOOP.simulate(np.arange(10_000_000) * 1e-6)", 300, "the response needs"),
     "samples": (
-        "LOOP.replace(sample_time=1e-6).simulate([0.0, 90.0])", 100, "the response needs",
+        # The next piece of the response, or the memory that each step looks for: whichever is first.
+        "LOOP.replace(sample_time=1e-6).simulate([0.0, 90.0])", 100, "of memory, which is not",
     ),
     "a sweep": (
         "dtm.sweep(LOOP, {'Kp': np.linspace(0.1, 3, 300)}, np.linspace(0, 10, 100_000), "
