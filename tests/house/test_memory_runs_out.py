@@ -28,7 +28,7 @@ CASES = {
     ),
     "output times": ("LOOP.simulate(np.arange(10_000_000) * 1e-6)", 300, "the response needs"),
     "samples": (
-        # The next piece of the response, or the memory that each step looks for: whichever is first.
+        # The next piece of the response, or the memory that each step looks for.
         "LOOP.replace(sample_time=1e-6).simulate([0.0, 90.0])", 100, "of memory, which is not",
     ),
     "a sweep": (
