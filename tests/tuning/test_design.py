@@ -467,3 +467,11 @@ def test_a_design_has_a_summary_and_a_plot():
 def test_the_critical_gain_is_found_over_many_decades(delay):
     # s + Kp e^(-sT) loses stability at Kp T = pi/2
     assert critical_gain(LOOP.replace(delay=delay)) == pytest.approx(np.pi / 2 / delay, rel=1e-9)
+
+
+def test_a_deadbeat_loop_has_a_margin_that_it_just_reaches():
+    # Without a delay the best gain is 1/(gain sample_time), and its gain margin is 2.
+    loop = dtm.ControlLoop(dtm.Integrator(0.885), dtm.P(1.0), delay=0.0, sample_time=0.065)
+    found = dtm.design(loop, controller=dtm.PV, gain_margin=2.0)
+    assert found.loop.margin().gain_margin >= 2.0 * (1.0 - 1e-6)
+    assert found.loop.parameters["Kp"] == pytest.approx(1.0 / (0.885 * 0.065), rel=1e-3)

@@ -57,6 +57,9 @@ _FINE_MARGINS = {1: 9, 2: 3}
 #: Points of a region for each margin.
 _LEAST = 2
 
+#: Halvings of the way to gains that miss a margin: more end closer to them.
+_HALVINGS = 40
+
 #: Most boxes of a proof (bounds time).
 _BOXES = 20_000
 
@@ -110,6 +113,8 @@ def best_gains(search: Search, start: Array | None = None) -> Found:
             search = replace(search, survey=surveyed(problem, search.survey.shape, scenarios))
             gains = search.globally()
     if best is None:
+        best = _just_inside(search, required, gains)
+    if best is None:
         raise _unmet(search, required, gains)
     if best.cost >= NEVER:
         raise ValueError(
@@ -118,6 +123,32 @@ def best_gains(search: Search, start: Array | None = None) -> Found:
             "objective"
         )
     return replace(best, scenarios=tuple(scenarios))
+
+
+def _just_inside(search: Search, required: RequiredMargins, gains: Array) -> Found | None:
+    """The last gains that have the margins, on the way to gains that miss them by little.
+
+    Where the best loop is deadbeat its cost falls without bound, whatever margin it misses.
+    """
+    problem, scenarios = search.problem, search.scenarios
+    search = replace(search, required=required.scaled(1.0 + _ABOVE))
+    points = search.survey.points[search.survey.stable]
+    if not len(points) or search.short(gains) > _HOPELESS:
+        return None
+    inside, outside = points[int(np.argmin(search.shortfalls(points)))], gains
+    if search.short(inside) > 0.0:
+        return None
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        if search.short(middle) > 0.0:
+            outside = middle
+        else:
+            inside = middle
+    if _missing(required, exact_margins(problem, inside, scenarios, required)).any():
+        return None
+    everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
+    cost, worst = worst_scenario(problem, search.objective, inside, everywhere)
+    return Found(inside, tuple(scenarios), cost, worst, len(everywhere))
 
 
 def _missing(required: RequiredMargins, each: Array) -> Array:
