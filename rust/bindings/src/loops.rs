@@ -1,4 +1,6 @@
 //! Bindings of `deadtime::loops`.
+//!
+//! One class has every question that a loop answers, and its methods have to stand in one block: one file.
 
 use std::sync::OnceLock;
 

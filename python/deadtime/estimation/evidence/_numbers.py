@@ -49,45 +49,7 @@ class LoopView(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FoundPlant(ReadOnlyArrays):
-    """The plant that a recording shows, as numbers.
-
-    Attributes
-    ----------
-    verdict : {"reliable", "indication", "none"}
-        Whether the intervals are claimed to hold; whether the numbers are an indication, whose
-        intervals are not; or whether the recording determines too little.
-    reason : str
-        Why the verdict is not ``"reliable"``, in a sentence; empty where it is.
-    delay : float
-        Dead time of the likeliest plant, s.
-    plant : Plant or None
-        The likeliest plant, without its dead time; None if no plant could be fitted.
-    parameters : dict of str to float
-        The numbers of the likeliest plant, the delay among them.
-    crossover : float
-        Frequency, rad/s, at which half of `largest_gain` crosses over; NaN if no gain is largest.
-    largest_gain : float
-        Largest proportional gain of a controller that keeps the loop stable, without a hold;
-        infinite if none is largest.
-    candidates : tuple of PlantCandidate
-        All kinds of plant that were tried, the likeliest first.
-    intervals : dict of str to (float, float)
-        The 95 % intervals by name, over all kinds of plant that the recording does not rule
-        out.
-    determined, asked : int
-        How many numbers the recording determines, and how many the likeliest plant has.
-    shift : int
-        Rows by which the command was moved, because it was logged so much late (above zero) or
-        early.
-    at_rest : bool
-        Whether the plant was taken to be at rest at the first row.
-    excited : ndarray
-        Frequencies, rad/s, at which the command moves.
-    recording : Recording
-        The rows that were used, and those before them.
-    fitted, residuals : ndarray, shape (n,)
-        Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
-    """
+    """The plant that a recording shows, as numbers: the attributes of `PlantEstimate`."""
 
     verdict: Verdict
     reason: str
