@@ -16,9 +16,9 @@ def test_text_and_page(log, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", "200")
     result = run("latency", log, "--out", tmp_path / "page.html")
     assert result.returncode == 0, result.stderr
-    first, headline, *_ = result.stdout.splitlines()
+    headline, first, *_ = result.stdout.splitlines()
     assert first.startswith("flight.bin: ArduPilot Copter")
-    assert headline.startswith("roll rate, ")
+    assert headline.startswith("reliable: roll rate, ")
     assert " ms (95 %: " in headline
     assert "gyro low-pass: 11.25 ms (INS_GYRO_FILTER 20)" in result.stdout
     assert (tmp_path / "page.html").stat().st_size > 10_000
