@@ -225,7 +225,7 @@ def online(draws: Draws) -> Interval:
                 estimator.command(float(draws.times[k - 1]), float(commands[k - 1, i]))
             found.append(estimator.update(now, float(output[i])))
         low, high = np.array([one.ci for one in found]).T
-        known = np.array([one.known and one.adequate for one in found])
+        known = np.array([one.known and one.verdict == "reliable" for one in found])
         return low, high, known
 
     return interval

@@ -329,7 +329,7 @@ def thrust() -> None:
             f"{step}  {100 * (np.max(clean.output) / step - 1):.1f}  "
             f"{100 * (np.max(fitted) / step - 1):.1f}  {fit.delay:.3f}  {fit.lag:.3f}  "
             f"{fit.delay + fit.lag:.3f}  {fit.gain:.3f}  {margin.gain_margin:.3f}  "
-            f"{margin.delay_margin:.3f}  {fit.adequate}"
+            f"{margin.delay_margin:.3f}  {fit.verdict}"
         )
         late = clean.time[16:] - clean.time[16]
         color, height = f"C{number}", clean.output[16:]

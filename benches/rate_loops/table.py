@@ -38,7 +38,7 @@ class Outcome(NamedTuple):
     error: float
     bound: float
     held: bool
-    adequate: bool
+    reliable: bool
     seconds: float
 
 
@@ -61,7 +61,9 @@ def ours(log: Log, bound: float) -> Outcome:
     low, high = fit.ci(0.95, "delay+lag") if fit.calibrated else (math.nan, math.nan)
     seconds = time.process_time() - begin
     truth = log.vehicle.delay + log.vehicle.lag
-    return Outcome(fit.delay_plus_lag - truth, bound, low <= truth <= high, fit.adequate, seconds)
+    return Outcome(
+        fit.delay_plus_lag - truth, bound, low <= truth <= high, fit.verdict == "reliable", seconds
+    )
 
 
 def theirs(
@@ -110,25 +112,25 @@ def outcomes(
 
 HEADER = (
     f"{'':42}{'bias':>7}{'spread':>8}{'RMSE':>7}{'bound':>7}{'RMSE':>8}{'covered':>9}"
-    f"{'adequate':>10}{'none':>6}{'time':>7}\n"
+    f"{'reliable':>10}{'none':>6}{'time':>7}\n"
     f"{'':42}{'ms':>7}{'ms':>8}{'ms':>7}{'ms':>7}{'/bound':>8}{'%':>9}{'%':>10}{'%':>6}{'s':>7}"
 )
 
 
 def line(name: str, found: Sequence[Outcome | None]) -> str:
-    """A row of the table; errors and coverage are those of the adequate answers."""
+    """A row of the table; errors and coverage are those of the reliable answers."""
     answered = [one for one in found if one is not None]
-    adequate = [one for one in answered if one.adequate]
-    errors = 1e3 * np.array([one.error for one in adequate])
-    bounds = 1e3 * np.array([one.bound for one in adequate])
-    shares = [len(adequate) / len(found), 1.0 - len(answered) / len(found)]
+    reliable = [one for one in answered if one.reliable]
+    errors = 1e3 * np.array([one.error for one in reliable])
+    bounds = 1e3 * np.array([one.bound for one in reliable])
+    shares = [len(reliable) / len(found), 1.0 - len(answered) / len(found)]
     seconds = float(np.median([one.seconds for one in answered])) if answered else math.nan
-    if not adequate:
+    if not reliable:
         numbers = [math.nan] * 6
     else:
         rmse, bound = (float(np.sqrt(np.mean(one**2))) for one in (errors, bounds))
         spread = float(np.std(errors))
-        held = 100.0 * float(np.mean([one.held for one in adequate]))
+        held = 100.0 * float(np.mean([one.held for one in reliable]))
         numbers = [float(np.mean(errors)), spread, rmse, bound, rmse / bound, held]
     values = [*numbers, *(100.0 * share for share in shares), seconds]
     formats = ("7.2f", "8.2f", "7.2f", "7.2f", "8.2f", "9.1f", "10.0f", "6.0f", "7.2f")

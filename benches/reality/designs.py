@@ -1,6 +1,6 @@
 """Gains designed from estimates: the margin of the true loop beside the one that was demanded.
 
-For each flight with an adequate estimate a P controller is designed for the joint region of the
+For each flight with a reliable estimate a P controller is designed for the joint region of the
 estimate, with a gain margin of `DEMANDED`. The gain margin of a P loop falls as its gain grows, so
 the sharpest gain, with which the worst loop of the region has exactly the demanded margin, follows
 from the designed one. Both are tried on the true loop.
@@ -45,7 +45,7 @@ def gain_margin(loop: dtm.ControlLoop) -> float:
 
 
 def designed(name: str, number: int) -> Designed | None:
-    """One flight, its estimate, the gain, and the true loop; None where it is not adequate."""
+    """One flight, its estimate, the gain, and the true loop; None where it is not reliable."""
     condition = next(one for one in CONDITIONS if one.name == name)
     run = record(condition, number)
     given = given_loop(condition, run, condition.free)
@@ -55,7 +55,7 @@ def designed(name: str, number: int) -> Designed | None:
             fit = dtm.estimate_delay(recording_of(condition, run), given, free=condition.free)
         except (dtm.NotIdentifiableError, dtm.RecordingError):
             return None
-        if not fit.adequate:
+        if fit.verdict != "reliable":
             return None
         try:
             best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=DEMANDED)
@@ -77,7 +77,7 @@ def tried(name: str, numbers: range) -> list[Designed | None]:
 def print_designs(runs: int, processes: int, rows: int | None) -> None:
     """Design for flights of the first `rows`, or of all, and print how the true loops do."""
     print(
-        f"{'gain margin of 2.5':24}{'adequate':>9}{'no gains':>9}{'met, %':>8}{'unstable':>10}"
+        f"{'gain margin of 2.5':24}{'reliable':>9}{'no gains':>9}{'met, %':>8}{'unstable':>10}"
         f"{'sharpest: met, %':>18}{'unstable':>10}{'least':>8}{'of the gain, %':>16}"
     )
     begin = time.perf_counter()

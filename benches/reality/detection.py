@@ -1,11 +1,11 @@
 """How well faults of a recording can be detected at all.
 
 Estimates of commands that were lost, of a delay that changes and of a plant that lacks a lag should
-be called inadequate. Here the best test does that: the likelihood ratio (Neyman & Pearson 1933) by
+be called indications. Here the best test does that: the likelihood ratio (Neyman & Pearson 1933) by
 one who knows the noise and how large such faults are. Delay, gain and level, and a lag that is
 fitted, are unknown to it too. Its power is the share of recordings with the fault in which it finds
 it, where one in ten without is called faulty as well: more than that may not be, because nine in
-ten good recordings have to be adequate. No method finds more.
+ten good recordings have to be reliable. No method finds more.
 
 What is left of the rows after these numbers are fitted, in white deviations, is z: the residuals in
 the complement of their derivatives. Without a fault z is white and of variance one.

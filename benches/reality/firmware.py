@@ -6,7 +6,7 @@ and its controller of the velocity lets that overshoot. Each flight is estimated
 and an integrator, two lags and a zero after them. The sum is that of delay and lags less the zero.
 It is compared between flights whose commands waited for different times before they were sent.
 
-An estimate should be adequate where the unexplained part of the rise is below twice the noise of
+An estimate should be reliable where the unexplained part of the rise is below twice the noise of
 the quiet rows: the deviation of the residuals around their mean over `QUIET` seconds, in the first
 `RISE` seconds after each step, beside that in the last ones before the next. The wandering of the
 vehicle over longer times shows in neither.
@@ -72,7 +72,7 @@ class Estimated(NamedTuple):
     total: float
     interval: tuple[float, float]
     gain: float
-    adequate: bool
+    reliable: bool
     unexplained: float
     noise: float
     message: str
@@ -202,7 +202,7 @@ def estimated(folder: Path, flight: Flight, plant: str, own_log: bool = False) -
         fit.delay_plus_lag,
         fit.ci(0.95, "delay+lag"),
         fit.loop.parameters["gain"],
-        fit.adequate,
+        fit.verdict == "reliable",
         around_mean(0.0, RISE - QUIET),
         around_mean(HOLD - QUIET),
         fit.message,
@@ -219,7 +219,7 @@ def print_table(folder: Path, flights: Sequence[Flight], processes: int) -> None
     """Estimate all flights and print them, then what the sums rise by."""
     print(
         f"{'flight':24}{'plant':>7}{'sum':>8}{'95 % interval':>19}{'gain':>7}{'rise mm':>9}"
-        f"{'quiet mm':>9}  adequate, or why not"
+        f"{'quiet mm':>9}  reliable, or why not"
     )
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         waiting = [
@@ -242,12 +242,12 @@ def print_table(folder: Path, flights: Sequence[Flight], processes: int) -> None
 def line(one: Estimated) -> str:
     """One estimate."""
     low, high = one.interval
-    _, found, reasons = one.message.partition("not adequate: ")
+    _, found, reasons = one.message.partition("indication: ")
     reasons = reasons.rpartition(" (try")[0] if found else one.message
     return (
         f"{one.flight.name:24}{one.plant:>7}{one.total:8.3f}"
         f"{low:10.3f} –{high:7.3f}{one.gain:7.3f}{1e3 * one.unexplained:9.1f}"
-        f"{1e3 * one.noise:9.1f}  {'adequate' if one.adequate else reasons}"
+        f"{1e3 * one.noise:9.1f}  {'reliable' if one.reliable else reasons}"
     )
 
 

@@ -40,16 +40,16 @@ def compared(condition: Condition, numbers: range, unknown: bool) -> list[Compar
 
 def line(name: str, found: Sequence[Compared]) -> str:
     """A row of the table: errors of the delay over the bound, and covered shares in per cent."""
-    adequate = [one for one in found if one.ours.status == ANSWERED and one.ours.adequate]
+    reliable = [one for one in found if one.ours.status == ANSWERED and one.ours.reliable]
     least = np.array([one.oracle.bounds[0] for one in found])
     text = f"{name:24}{ratio([one.oracle.errors[0] for one in found], least):10.2f}"
     for share in np.transpose([one.oracle.held for one in found]):
         text += f"{100.0 * mean(share):7.0f}"
-    least = np.array([one.oracle.bounds[0] for one in adequate])
-    best = np.array([one.oracle.errors[0] for one in adequate])
-    ours = [one.ours.errors[0] for one in adequate]
+    least = np.array([one.oracle.bounds[0] for one in reliable])
+    best = np.array([one.oracle.errors[0] for one in reliable])
+    ours = [one.ours.errors[0] for one in reliable]
     return text + (
-        f"{100.0 * len(adequate) / len(found):12.0f}{ratio(best, least):12.2f}"
+        f"{100.0 * len(reliable) / len(found):12.0f}{ratio(best, least):12.2f}"
         f"{ratio(ours, least):8.2f}{ratio(ours, best):15.2f}"
     )
 
@@ -63,7 +63,7 @@ def print_oracle(conditions: list[Condition], runs: int, unknown: bool, processe
     """Measure the rows that have a bound, and print them."""
     batch = max(1, min(10, runs // (2 * processes)))
     pool = pool_of(processes)
-    print(f"{'errors over the bound':24}{'oracle':>10}   covers, %: {'adequate: ':>30}ours over")
+    print(f"{'errors over the bound':24}{'oracle':>10}   covers, %: {'reliable: ':>30}ours over")
     titles = "".join(f"{name:>7}" for name in ("delay", "gain", "sum"))
     print(f"{'':34}{titles}{'share, %':>12}{'oracle':>12}{'ours':>8}{'that of oracle':>15}")
     begin = time.perf_counter()

@@ -25,8 +25,8 @@ from reality.generator import Array, Run, record
 #: Of which there are intervals; the sum is that of the delay and all lags.
 QUANTITIES = ("delay", "gain", "sum")
 
-#: Demands, in per cent. Fewer adequate results than FEWEST have no coverage.
-COVERED, ADEQUATE, REFUSED, FEWEST = (93.0, 97.5), 90.0, 95.0, 20
+#: Demands, in per cent. Fewer reliable results than FEWEST have no coverage.
+COVERED, RELIABLE, REFUSED, FEWEST = (93.0, 97.5), 90.0, 95.0, 20
 
 NOT_IDENTIFIABLE, BAD_RECORDING, FAILED, ANSWERED = "not", "recording", "failed", "answered"
 
@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
     """One estimate. Errors are of delay, gain, delay + lag; bounds of delay and delay + lag."""
 
     status: str
-    adequate: bool
+    reliable: bool
     errors: tuple[float, ...]
     held: tuple[bool, ...]
     bounds: tuple[float, float]
@@ -87,7 +87,7 @@ def estimated(condition: Condition, number: int, free: tuple[str, ...]) -> Outco
     held = [
         low - 1e-9 <= true <= high + 1e-9 for (low, high), true in zip(ends, truth, strict=True)
     ]
-    return Outcome(ANSWERED, fit.adequate, errors, tuple(held), bound, seconds)
+    return Outcome(ANSWERED, fit.verdict == "reliable", errors, tuple(held), bound, seconds)
 
 
 def outcomes(condition: Condition, numbers: range, free: tuple[str, ...]) -> list[Outcome]:
@@ -102,18 +102,18 @@ def summary(condition: Condition, found: Sequence[Outcome]) -> dict[str, Any]:
     runs = len(found)
     status = Counter(one.status for one in found)
     answered = [one for one in found if one.status == ANSWERED]
-    adequate = [one for one in answered if one.adequate]
+    reliable = [one for one in answered if one.reliable]
     row: dict[str, Any] = {
         "name": condition.name,
         "runs": runs,
-        "adequate": 100.0 * len(adequate) / runs,
+        "reliable": 100.0 * len(reliable) / runs,
         "not_identifiable": 100.0 * status[NOT_IDENTIFIABLE] / runs,
         "bad_recording": 100.0 * status[BAD_RECORDING] / runs,
         "failed": 100.0 * status[FAILED] / runs,
         "milliseconds": 1e3 * float(np.median([one.seconds for one in answered] or [math.nan])),
         "messages": sorted({one.message for one in found if one.status == FAILED}),
     }
-    for group, some in (("adequate", adequate), ("all", answered)):
+    for group, some in (("reliable", reliable), ("all", answered)):
         errors = 1e3 * np.array([one.errors for one in some]).reshape(-1, 3)
         bound = 1e3 * np.array([one.bounds for one in some]).reshape(-1, 2)
         held = np.array([one.held for one in some]).reshape(-1, 3)
@@ -125,7 +125,7 @@ def summary(condition: Condition, found: Sequence[Outcome]) -> dict[str, Any]:
             rmse, limit = (math.sqrt(mean(one**2)) for one in (error, least))
             row |= {f"{group}_rmse_{name}": rmse, f"{group}_bound_{name}": limit}
             row[f"{group}_ratio_{name}"] = rmse / limit
-        few = len(some) < (FEWEST if group == "adequate" else 1)
+        few = len(some) < (FEWEST if group == "reliable" else 1)
         for name, share in zip(QUANTITIES, held.T, strict=True):
             row[f"{group}_covers_{name}"] = math.nan if few else 100.0 * mean(share)
     row["met"], row["missed"] = verdict(condition, row)
@@ -141,16 +141,16 @@ def verdict(condition: Condition, row: dict[str, Any]) -> tuple[list[str], list[
 
     A row that may be refused is, where it is, held to nothing else.
     """
-    answers = row["adequate"]
+    answers = row["reliable"]
     if condition.demand == MAY_REFUSE and 100.0 - answers - row["failed"] >= REFUSED:
-        return ["refused or inadequate"], []
+        return ["refused or not reliable"], []
     demands = {}
     if condition.demand in (ANSWER, MAY_REFUSE):
-        demands["adequate"] = answers >= ADEQUATE
+        demands["reliable"] = answers >= RELIABLE
     for name in QUANTITIES:
-        demands[name] = COVERED[0] <= row["adequate_covers_" + name] <= COVERED[1]
+        demands[name] = COVERED[0] <= row["reliable_covers_" + name] <= COVERED[1]
     if not math.isnan(row["all_bound_delay"]):
-        demands["error"] = row["adequate_ratio_delay"] <= condition.error
+        demands["error"] = row["reliable_ratio_delay"] <= condition.error
     if row["failed"]:
         demands["no failure"] = False
     return [name for name, holds in demands.items() if holds], [
@@ -160,17 +160,17 @@ def verdict(condition: Condition, row: dict[str, Any]) -> tuple[list[str], list[
 
 #: Groups of columns by title: title, key of the row, width and digits of each.
 COLUMNS = {
-    "": [("adequate", "adequate", 10, 0)],
+    "": [("reliable", "reliable", 10, 0)],
     "refused:": [("no fit", "not_identifiable", 9, 0), ("bad log", "bad_recording", 8, 0)],
     " ": [("failed", "failed", 7, 0)],
-    "adequate: delay, ms": [
-        ("bias", "adequate_bias", 9, 1),
-        ("RMSE", "adequate_rmse_delay", 7, 1),
-        ("bound", "adequate_bound_delay", 7, 1),
-        ("ratio", "adequate_ratio_delay", 7, 2),
+    "reliable: delay, ms": [
+        ("bias", "reliable_bias", 9, 1),
+        ("RMSE", "reliable_rmse_delay", 7, 1),
+        ("bound", "reliable_bound_delay", 7, 1),
+        ("ratio", "reliable_ratio_delay", 7, 2),
     ],
-    "sum, ms": [("RMSE", "adequate_rmse_sum", 9, 1), ("ratio", "adequate_ratio_sum", 7, 2)],
-    "covered, %": [(name, "adequate_covers_" + name, 7, 0) for name in QUANTITIES],
+    "sum, ms": [("RMSE", "reliable_rmse_sum", 9, 1), ("ratio", "reliable_ratio_sum", 7, 2)],
+    "covered, %": [(name, "reliable_covers_" + name, 7, 0) for name in QUANTITIES],
     "all: delay, ms": [("bias", "all_bias", 9, 1), ("RMSE", "all_rmse_delay", 7, 1)],
     " covered, %": [(name, "all_covers_" + name, 7, 0) for name in QUANTITIES],
     "  ": [("ms", "milliseconds", 8, 1)],

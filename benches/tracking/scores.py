@@ -42,7 +42,7 @@ class Tracked:
         return self.numbers[:, :, PLACES[name]]
 
     @property
-    def adequate(self) -> Array:
+    def reliable(self) -> Array:
         """Whether innovations are white and do not follow the command."""
         return (abs(self.colour) < COLOURED) & (self.unexplained < UNEXPLAINED)
 
@@ -69,13 +69,13 @@ class DriftScore:
     bound: float
     bias: float
     coverage: float
-    adequate: float
+    reliable: float
 
     def __str__(self) -> str:
         return (
             f"RMSE {1e3 * self.rmse:.1f} ms, bound {1e3 * self.bound:.1f} ms, ratio "
             f"{self.rmse / self.bound:.2f}, bias {1e3 * self.bias:+.1f} ms, coverage "
-            f"{self.coverage:.1%}, adequate {self.adequate:.1%}"
+            f"{self.coverage:.1%}, reliable {self.reliable:.1%}"
         )
 
 
@@ -103,7 +103,7 @@ def drifts(
         bound=float(np.sqrt(np.mean(bound[:, part] ** 2))),
         bias=float(np.mean(error)),
         coverage=float(np.mean(inside)),
-        adequate=float(np.mean(found.adequate)),
+        reliable=float(np.mean(found.reliable)),
     )
 
 
@@ -157,18 +157,18 @@ class CalmScore:
     alarms: int
     coverage: float
     worst: float
-    adequate: float
+    reliable: float
 
     def __str__(self) -> str:
         return (
             f"{self.alarms} false alarms in {self.hours:.3g} h, coverage {self.coverage:.1%}, "
-            f"largest error {1e3 * self.worst:.0f} ms, adequate {self.adequate:.2%}"
+            f"largest error {1e3 * self.worst:.0f} ms, reliable {self.reliable:.2%}"
         )
 
 
 def calm(hours: float, seed: int = 9) -> CalmScore:
     """A constant delay, hour by hour; the command changes all the time."""
-    alarms, coverage, worst, adequate = 0, [], [], []
+    alarms, coverage, worst, reliable = 0, [], [], []
     each = min(hours, 1.0)
     rows = int(3600.0 * each / SAMPLE)
     for hour in range(round(hours / each)):
@@ -180,9 +180,9 @@ def calm(hours: float, seed: int = 9) -> CalmScore:
         alarms += int(np.sum(found.changed))
         coverage.append(np.mean(((found.low <= 0.3) & (found.high >= 0.3))[:, part]))
         worst.append(np.max(abs(found.delay - 0.3)[:, part]))
-        adequate.append(np.mean(found.adequate))
+        reliable.append(np.mean(found.reliable))
     return CalmScore(
-        hours, alarms, float(np.mean(coverage)), float(max(worst)), float(np.mean(adequate))
+        hours, alarms, float(np.mean(coverage)), float(max(worst)), float(np.mean(reliable))
     )
 
 

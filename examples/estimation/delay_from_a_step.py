@@ -3,8 +3,8 @@ The delay from a recorded step
 ==============================
 
 A step of a height loop, simulated with noise of 5 mm, and its delay by maximum likelihood with an
-interval. ``adequate`` says whether the model explains the recording; without it the interval means
-little.
+interval. The verdict says whether the model explains the recording: of an indication the interval
+means little.
 """
 
 import deadtime as dtm
@@ -15,5 +15,5 @@ flight = dtm.Experiment.step(8.0, rest=1.04).run(truth, noise=0.005, seed=3)
 known = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.4), sample_time=0.065, limit=1.0)
 fit = dtm.estimate_delay(flight, known, free=("delay", "gain"))
 low, high = fit.ci(0.95)
-print(f"delay {fit.delay:.4f} s, 95 %: {low:.4f} to {high:.4f} s, adequate: {fit.adequate}")
+print(f"{fit.verdict}: delay {fit.delay:.4f} s, 95 %: {low:.4f} to {high:.4f} s")
 fit.plot()

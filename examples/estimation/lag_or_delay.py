@@ -2,7 +2,7 @@
 A lag that is taken for delay
 =============================
 
-The vehicle lags by 0.1 s. A model without a lag puts it into the delay and is not adequate: its
+The vehicle lags by 0.1 s. A model without a lag puts it into the delay and is an indication: its
 residuals are not white. With the lag free both come out, and their sum is known best.
 """
 
@@ -19,9 +19,10 @@ fig, ax = plt.subplots(layout="constrained")
 for free in (("delay", "gain"), ("delay", "gain", "lag")):
     fit = dtm.estimate_delay(flight, known, free=free)
     low, high = fit.ci(0.95)
-    verdict = "adequate" if fit.adequate else "not adequate"
-    print(f"free {', '.join(free)}: delay {fit.delay:.3f} s ({low:.3f} to {high:.3f}), {verdict}")
-    ax.plot(flight.time, 1e3 * fit.residuals, ".-", label=f"{', '.join(free)}: {verdict}")
+    print(
+        f"free {', '.join(free)}: delay {fit.delay:.3f} s ({low:.3f} to {high:.3f}), {fit.verdict}"
+    )
+    ax.plot(flight.time, 1e3 * fit.residuals, ".-", label=f"{', '.join(free)}: {fit.verdict}")
 ax.set(
     xlabel="time (s)",
     ylabel="residual (mm)",

@@ -43,7 +43,7 @@ def test_the_demo_shows_the_truth_beside_the_estimates(demo):
     assert "the truth" in printed
     for method in ("paper", "exact", "with limit", "waveform with lag"):
         assert method in printed
-    assert "The delay of the loop is 0.4" in printed
+    assert "Reliable: the delay of the loop is 0.4" in printed
     # the limit of the true loop under proportional control is 5.0; half of it is called safe
     assert "Kp above 2.5" in printed
     assert "inf" not in printed
@@ -111,13 +111,13 @@ def test_a_real_flight_by_both_methods():
     fit = out["estimates"]["waveform"]
     assert 0.42 <= fit["delay"] <= 0.44
     assert 0.74 <= fit["gain"] <= 0.76
-    assert fit["adequate"] is False
+    assert fit["verdict"] == "indication"
     low, high = fit["interval_95"]["delay"]
     assert high - low > 0.04  # the robust one; the naive one is 0.014 wide
     said = " ".join(out["explanation"])
     assert "differ" in said
     assert "gain is not 1" in said
-    assert "the residuals of the fit without lag are coloured" in said.lower()
+    assert "The fit without a further lag is an indication: the residuals are not white" in said
 
 
 def test_a_real_flight_without_overshoot():
@@ -127,7 +127,7 @@ def test_a_real_flight_without_overshoot():
     low, high = out["estimates"]["waveform"]["interval_95"]["delay"]
     assert high - low > 0.1
     refused = run("estimate", file, *COLUMNS, "--kp", 0.5, *FLOWN, "--method", "overshoot")
-    assert refused.returncode == 1
+    assert refused.returncode == 3
     assert "no overshoot" in refused.stderr
 
 

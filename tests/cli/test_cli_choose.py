@@ -32,7 +32,7 @@ def test_the_table_shows_the_evidence_and_the_estimate_follows(roll):
         "2 lags *",
         "BIC",
         "white",
-        "adequate",
+        "reliable",
         "delay+lag",
         "over all plants",
         "further lag below",

@@ -42,6 +42,7 @@ def test_help_and_version_load_neither_numerics_nor_drawing(argument):
         "deadtime._base.errors",
         "deadtime._cli",
         "deadtime._cli.app",
+        "deadtime._cli.exit_codes",
         "deadtime._cli.interruption",
         "deadtime._cli.readable",
     }

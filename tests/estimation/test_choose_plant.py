@@ -14,9 +14,9 @@ INTEGRATING = FLAT.replace(plant=dtm.Integrator())
 def test_two_lags_are_found_and_a_third_is_not():
     choice = choose_plant(record_attitude(0, **VEHICLE), FLAT, most_lags=3)
     assert choice.chosen == "2 lags"
-    assert choice.best.adequate
+    assert choice.best.verdict == "reliable"
     assert choice.criteria["1 lag"] > choice.criteria["2 lags"] + 100.0
-    assert not choice.estimates["1 lag"].adequate
+    assert choice.estimates["1 lag"].verdict != "reliable"
     assert sum(choice.weights.values()) == pytest.approx(1.0)
     assert choice.weights.get("1 lag", 0.0) == 0.0
     low, high = choice.ci()
@@ -73,7 +73,7 @@ def test_an_integrator_is_known_from_the_loop():
     recording = record_attitude(2, **VEHICLE, integrator=True)
     choice = choose_plant(recording, INTEGRATING, most_lags=1)
     assert "no lags" in choice.estimates
-    assert not choice.estimates["no lags"].adequate
+    assert choice.estimates["no lags"].verdict != "reliable"
     assert choice.best.loop.plant.integrator
 
 

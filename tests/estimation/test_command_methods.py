@@ -70,7 +70,7 @@ def test_a_first_order_plant_is_compensated():
     recording = dtm.Experiment.prbs(20.0, 0.5, 2 * TS).run(loop)
     fit = dtm.estimate_delay(recording, loop.replace(delay=None), method=ARXScan(fractional=True))
     assert fit.delay == pytest.approx(4 * TS, abs=1e-9)
-    assert fit.adequate
+    assert fit.verdict == "reliable"
 
 
 def test_other_plants_are_correlated_without_compensation():

@@ -48,7 +48,7 @@ def holds(fit, name, truth, level=0.99):
 
 def test_frequency_and_damping_are_within_their_intervals():
     fit = dtm.estimate_delay(recorded(0), KNOWN, free=NAMES)
-    assert fit.adequate, fit.message
+    assert fit.verdict == "reliable", fit.message
     for name, truth in (TRUTH | {"delay+lag": SUM}).items():
         assert holds(fit, name, truth), name
     assert fit.delay_plus_lag == pytest.approx(SUM, abs=1e-3)
@@ -116,7 +116,7 @@ def test_the_evidence_tells_complex_from_real_poles(how, expected):
     most = 3 if "lag" in how else 2
     choice = dtm.estimation.choose_plant(recorded(4, rows=250, **how), loop, most_lags=most)
     assert choice.chosen == expected
-    assert choice.best.adequate
+    assert choice.best.verdict == "reliable"
 
 
 @pytest.mark.parametrize("start", [0.0, 0.5])
@@ -137,7 +137,7 @@ def test_a_command_before_the_first_row_costs_no_accuracy(start, flights):
     assert np.median([fit.noise.air for fit in fits]) < 1e-3
     assert np.median([fit.stderr["time_constant"] for fit in fits]) < 0.001
     # One in twenty is doubted, and one interval in twenty misses: three of ten do so in 1 %.
-    assert sum(fit.adequate for fit in fits) >= 0.75 * flights
+    assert sum(fit.verdict == "reliable" for fit in fits) >= 0.75 * flights
     for name, value in names.items():
         assert sum(holds(fit, name, value) for fit in fits) >= 0.75 * flights, name
 

@@ -17,7 +17,7 @@ def fitted(seed, **vehicle):
     return dtm.estimate_delay(flight, KNOWN.replace(delay=None), free=FREE)
 
 
-def test_a_delay_of_zero_is_adequate():
+def test_a_delay_of_zero_is_reliable():
     fits = [fitted(seed) for seed in range(20)]
     assert any(fit.delay == 0.0 for fit in fits)
     assert sum(WORDS in fit.message for fit in fits) <= 2
@@ -28,7 +28,7 @@ def test_a_vehicle_that_is_faster_than_its_plant_is_refused(lag):
     for seed in range(5):
         fit = fitted(seed, lag=lag)
         assert fit.delay == 0.0
-        assert not fit.adequate
+        assert fit.verdict != "reliable"
         assert WORDS in fit.message
 
 

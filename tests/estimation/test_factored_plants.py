@@ -120,7 +120,7 @@ def test_the_command_of_the_loop_serves_where_none_was_logged():
     known = truth.replace(delay=None, lag_1=0.1, lag_2=0.1, sample_time=0.05)
     fit = dtm.estimate_delay(dtm.Recording(time, reference, output), known, free=FREE)
     assert fit.method == "waveform"
-    assert fit.adequate
+    assert fit.verdict == "reliable"
     low, high = fit.ci(0.95, "delay+lag")
     assert low <= 0.38 <= high
     with pytest.raises(ValueError, match="lag_1"):

@@ -57,10 +57,10 @@ def test_what_commands_wait_comes_out_of_a_flight(tmp_path):
     # From the log of the controller, which knows its own commands and the position it was told.
     without, late = (firmware.estimated(tmp_path, one, plant="limits") for one in flights)
     assert late.total - without.total == pytest.approx(wait, abs=firmware.WITHIN)
-    # What the plant lacks is far above the noise, so neither may be called adequate.
+    # What the plant lacks is far above the noise, so neither may be called reliable.
     assert late.unexplained > 2.0 * late.noise
-    assert not without.adequate
-    assert not late.adequate
+    assert without.verdict != "reliable"
+    assert late.verdict != "reliable"
     # From the DataFlash that the vehicle itself wrote.
     found = [firmware.estimated(tmp_path, one, plant="limits", own_log=True) for one in flights]
     [(waited, rise)] = rises(tmp_path, found)

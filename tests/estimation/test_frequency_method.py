@@ -88,26 +88,26 @@ def test_intervals_of_single_records_cover_with_gain_and_start_unknown():
     held = [low <= 0.36 <= high for low, high in (fit.ci() for fit in found)]
     # 142.5 of 150 expected, with a deviation of 2.7.
     assert sum(held) >= 134
-    assert sum(fit.adequate for fit in found) >= 140
+    assert sum(fit.verdict == "reliable" for fit in found) >= 140
 
 
 @pytest.mark.survey
 @pytest.mark.parametrize("free", [("delay", "gain"), ("delay", "gain", "lag")])
 def test_intervals_of_periodic_records_cover(free):
     lag = 0.06 if "lag" in free else 0.0
-    held, errors, stderrs, adequate = 0, [], [], 0
+    held, errors, stderrs, reliable = 0, [], [], 0
     runs = 60 if lag else 120
     for seed in range(runs):
         recording, known = multisine(lag, noise=0.01, seed=seed)
         fit = estimate(recording, known, free)
         low, high = fit.ci()
         held += low <= 0.36 <= high
-        adequate += fit.adequate
+        reliable += fit.verdict == "reliable"
         errors.append(fit.delay - 0.36)
         stderrs.append(fit.stderr["delay"])
     # 95 % expected, with a deviation of 2.0 or 2.8 %.
     assert held >= 0.88 * runs
-    assert adequate >= 0.88 * runs
+    assert reliable >= 0.88 * runs
     assert root_mean_square(errors) == pytest.approx(np.mean(stderrs), rel=0.25)
 
 
@@ -145,10 +145,10 @@ def test_p_values_of_the_right_model_are_neither_small_nor_large():
 def test_a_lag_missing_from_the_model_is_detected():
     recording, known = multisine(0.2, noise=0.003, periods=9)
     fit = estimate(recording, known)
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
     assert "lag" in fit.message
     assert fit.details["p_value_of_model"] < 1e-3
-    assert estimate(recording, known, ("delay", "gain", "lag")).adequate
+    assert estimate(recording, known, ("delay", "gain", "lag")).verdict == "reliable"
 
 
 def test_high_lines_can_be_excluded():

@@ -30,7 +30,7 @@ def test_the_grid_method_is_exact_for_an_exact_model(ts):
     assert fit.delay == pytest.approx(0.36, abs=1e-7)
     assert fit.gain == pytest.approx(0.8, abs=1e-7)
     assert fit.lag == pytest.approx(0.15, abs=1e-7)
-    assert fit.adequate
+    assert fit.verdict == "reliable"
 
 
 def test_the_cost_curve_is_kept_and_its_local_minima_are_named():

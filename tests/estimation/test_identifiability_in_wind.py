@@ -185,7 +185,7 @@ def test_estimates_in_wind_scatter_as_the_bound_says(name):
         free=("delay", "gain"),
     )
     tried = plan.monte_carlo(60, "output_error", processes=1)
-    # The median, because some runs are called inadequate and have the estimate of least squares;
+    # The median, because some runs are called indications and have the estimate of least squares;
     # 60 runs determine it to 15 %.
     errors = np.abs(tried.estimates["delay"] - tried.truth["delay"])
     assert 0.65 < np.median(errors) / 0.6745 / plan.stderr["delay"] < 1.5

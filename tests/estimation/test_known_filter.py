@@ -59,7 +59,7 @@ def test_filtered_noise_and_torques_are_told_from_the_vehicle(known):
     low, high = found.ci(0.95, "delay+lag")
     assert low < DELAY + LAG < high
     assert high - low < 0.01
-    assert found.adequate
+    assert found.verdict == "reliable"
 
 
 def test_noise_behind_the_filter_leaves_what_is_computed_nearly_white():

@@ -28,7 +28,7 @@ def recorded(count, quiet=0, seed=3):
 
 def test_a_long_recording_tells_delay_gain_and_lag():
     fit = dtm.estimate_delay(recorded(20_000), TRUTH.replace(delay=None), free=FREE)
-    assert fit.adequate, fit.message
+    assert fit.verdict == "reliable", fit.message
     for name, true in (("delay", 0.3), ("gain", 0.85), ("lag", 0.1), ("delay+lag", 0.4)):
         low, high = fit.ci(0.99, name)
         assert low < true < high
@@ -76,10 +76,10 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
     assert start.excited_part(short) is short
 
 
-def test_a_long_recording_whose_plant_lacks_a_lag_is_inadequate():
+def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
     known = TRUTH.replace(delay=None, lag=0.0)
     fit = dtm.estimate_delay(recorded(20_000), known)
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
     assert "a further lag" in fit.message
 
 

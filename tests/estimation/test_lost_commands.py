@@ -107,7 +107,7 @@ def test_the_reference_may_change_in_any_of_many_missing_rows():
 
 
 # In 239 commands were predicted whose errors came out a thousand times too large, and the wrong
-# sample was taken for that of the step: 346 ms for 296, adequate. In 3, 66 and 205 predictions
+# sample was taken for that of the step: 346 ms for 296, reliable. In 3, 66 and 205 predictions
 # depend on each other through a controller of high gain, and did not settle.
 @pytest.mark.parametrize("number", [0, 3, 66, 205, 239])
 def test_a_log_at_half_the_rate_of_the_controller(number):

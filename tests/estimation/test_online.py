@@ -51,7 +51,7 @@ def test_rows_lost_widen_the_interval_and_do_not_move_it():
         for t, y, u, seen in zip(time, output, command, some, strict=True)
     ]
     part = list(OnlineEstimator(LOOP, noise=NOISE).run(rows))
-    assert part[-1].adequate
+    assert part[-1].verdict == "reliable"
     assert part[-1].known
     assert part[-1].ci[0] < 0.3 < part[-1].ci[1]
     widths = [np.mean([one.ci[1] - one.ci[0] for one in found[300:]]) for found in (whole, part)]
@@ -85,7 +85,7 @@ def test_it_agrees_with_the_batch_estimate_it_begins_with():
     estimator = OnlineEstimator.from_estimate(fit, drift=0.0)
     for row in zip(run.time, run.output, run.command, strict=True):
         found = estimator.update(*row)
-    assert found.adequate == fit.adequate
+    assert found.verdict == fit.verdict
     assert abs(found.delay - fit.delay) < 2.0 * fit.stderr["delay"]
     assert abs(found.delay_plus_lag - fit.delay_plus_lag) < fit.stderr["delay+lag"]
     assert found.delay_plus_lag_ci[0] < 0.45 < found.delay_plus_lag_ci[1]
@@ -110,21 +110,21 @@ def test_commands_of_their_own_times_are_those_of_the_rows():
         (PLANT, (0.4, 0.6), "the delay may be below the range, which begins at 0.4 s"),
     ],
 )
-def test_a_wrong_model_is_not_adequate(plant, delays, words):
+def test_a_wrong_model_is_not_reliable(plant, delays, words):
     time, output, command = flown(60.0, vehicle=Vehicle(white=0.002, gust=0.01))
     quiet_noise = FlightNoise(white=0.002, air=0.01, air_time=1.0)
     found = online(
         recording(time, output, command), LOOP.replace(plant=plant), noise=quiet_noise,
         delays=delays,
     )  # fmt: skip
-    assert not found.adequate[-1]
+    assert not found.reliable[-1]
     assert words in found.last.message
 
 
 def test_louder_noise_is_said_and_widens_the_interval():
     columns = flown(120.0, vehicle=Vehicle(white=0.03, gust=0.3))
     found = online(recording(*columns), LOOP, noise=NOISE)
-    assert not found.adequate[-1]
+    assert not found.reliable[-1]
     assert "times what was expected" in found.last.message
     assert found.low[-1] < 0.3 < found.high[-1]
 
@@ -179,7 +179,7 @@ def test_rows_of_a_long_rest_are_not_kept():
         if row < rest:
             assert not found.known
             assert len(estimator._rows) < 45.0 / SAMPLE
-    assert found.adequate
+    assert found.verdict == "reliable"
     assert found.ci[0] < 0.3 < found.ci[1]
 
 
@@ -206,7 +206,7 @@ def test_a_hundred_drifts_in_wind():
     found = drifts(30)
     assert found.rmse < 1.5 * found.bound
     assert 0.92 <= found.coverage <= 0.98
-    assert found.adequate > 0.999
+    assert found.reliable > 0.999
 
 
 @pytest.mark.long

@@ -40,7 +40,7 @@ def test_the_log_of_the_vehicle_and_the_link_agree(tmp_path):
     own, link = (track.last for track in both(tmp_path, flight))
     # The limits of the vehicle are not in the plant: what finds changes has to doubt itself.
     if not (own.known and link.known):
-        assert not own.adequate or not link.adequate
+        assert own.verdict != "reliable" or link.verdict != "reliable"
         return
     # Each holds the mean of the other.
     for one, other in ((own, link), (link, own)):

@@ -88,7 +88,7 @@ def test_a_noise_free_recording_is_recovered_exactly(delay, gain, lag):
     # The model is exact, so the delay is recovered to the rounding of the clock.
     assert fit.delay == pytest.approx(delay, abs=1e-9)
     assert fit.gain == pytest.approx(gain, abs=1e-9)
-    assert fit.adequate
+    assert fit.verdict == "reliable"
     lagging, known = record_step(delay, gain, lag)
     fit = dtm.estimate_delay(lagging, known, free=("delay", "gain", "lag"))
     # Delay and lag are nearly confounded: the valley is flat, its floor known to rounding.
@@ -206,7 +206,7 @@ def test_a_continuous_command_is_not_treated_as_held(Kp, known, runs):
 def test_a_lag_missing_from_the_model_is_detected():
     flight, known = record_step(0.30, lag=0.15, noise=0.002, seed=1)
     fit = dtm.estimate_delay(flight, known)
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
     assert "free=('delay', 'gain', 'lag')" in fit.message
     # The delay includes the lag.
     assert fit.delay == pytest.approx(0.45, abs=0.03)
@@ -294,7 +294,7 @@ def test_a_real_flight_with_its_command_computed():
     fit = dtm.estimate_delay(flight, loop, method="output_error", window=(13, 25.5))
     assert fit.delay == pytest.approx(0.394, abs=1e-3)
     assert fit.gain == pytest.approx(0.705, abs=1e-3)
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
     assert fit.details["command"] == "computed from reference and output"
 
 

@@ -50,23 +50,23 @@ def holds(fit, name, level=0.99):
 
 def test_with_the_limits_the_numbers_are_within_their_intervals():
     fit = dtm.estimate_delay(recorded(2), loop_with(LIMITED), free=("delay", "gain", "lag"))
-    assert fit.adequate, fit.message
+    assert fit.verdict == "reliable", fit.message
     assert fit.stderr["delay+lag"] < 0.002
     for name in fit.stderr:
         assert holds(fit, name), name
 
 
-def test_without_the_limits_no_estimate_is_adequate():
+def test_without_the_limits_no_estimate_is_reliable():
     for seed in range(3):
         fit = dtm.estimate_delay(recorded(seed), loop_with(LINEAR), free=("delay", "gain", "lag"))
-        assert not fit.adequate
+        assert fit.verdict != "reliable"
         assert not holds(fit, "delay+lag")
 
 
 def test_a_limit_can_be_free():
     loop = loop_with(dtm.RateLimited(LINEAR, 0.7, TRUTH["rate_of_rate"]))
     fit = dtm.estimate_delay(recorded(2), loop, free=("delay", "gain", "lag", "rate"))
-    assert fit.adequate, fit.message
+    assert fit.verdict == "reliable", fit.message
     assert fit.free == ("delay", "gain", "lag", "rate")
     assert fit.cov.shape == (4, 4)
     assert fit.loop.plant.rate == pytest.approx(TRUTH["rate"], rel=0.05)

@@ -73,6 +73,6 @@ def test_the_package_answers_within_its_interval(order):
     log = record(order, 0)
     least = bound.deviation_of_sum(bound.covariance(log))
     found = table.ours(log, least)
-    assert found.adequate
+    assert found.reliable
     assert found.held
     assert abs(found.error) < 3.0 * least

@@ -239,26 +239,26 @@ def test_the_bound_has_no_value_where_the_log_is_wrong():
         assert math.isnan(bound.bounds(NAMED[name], record(NAMED[name], 0), free)[0])
 
 
-def outcome(adequate=True, held=True, error=1e-3, status=table.ANSWERED):
-    return table.Outcome(status, adequate, (error,) * 3, (held,) * 3, (1e-3, 1e-3), 1e-2)
+def outcome(reliable=True, held=True, error=1e-3, status=table.ANSWERED):
+    return table.Outcome(status, reliable, (error,) * 3, (held,) * 3, (1e-3, 1e-3), 1e-2)
 
 
 def test_demands():
     good = [outcome(held=number >= 5) for number in range(100)]
     row = table.summary(NAMED["white"], good)
     assert row["missed"] == []
-    assert row["met"] == ["adequate", "delay", "gain", "sum", "error"]
-    assert row["adequate_covers_gain"] == pytest.approx(95.0)
+    assert row["met"] == ["reliable", "delay", "gain", "sum", "error"]
+    assert row["reliable_covers_gain"] == pytest.approx(95.0)
     assert "95     95     95" in table.line(row)
 
     always = table.summary(NAMED["white"], [outcome(error=1.06e-3)] * 100)
     assert always["missed"] == ["delay", "gain", "sum", "error"]
     assert "error" in table.summary(NAMED["air 0.02"], [outcome(error=1.06e-3)] * 100)["met"]
 
-    few = table.summary(NAMED["white"], [outcome()] * 19 + [outcome(adequate=False)] * 81)
-    assert math.isnan(few["adequate_covers_delay"])
+    few = table.summary(NAMED["white"], [outcome()] * 19 + [outcome(reliable=False)] * 81)
+    assert math.isnan(few["reliable_covers_delay"])
     assert few["all_covers_delay"] == pytest.approx(100.0)
-    assert few["missed"] == ["adequate", "delay", "gain", "sum"]
+    assert few["missed"] == ["reliable", "delay", "gain", "sum"]
 
 
 def test_a_refusal_counts_where_it_is_allowed():
@@ -267,8 +267,8 @@ def test_a_refusal_counts_where_it_is_allowed():
     row = table.summary(NAMED["clock off 1 %"], refused)
     assert NAMED["clock off 1 %"].demand == MAY_REFUSE
     assert (row["not_identifiable"], row["bad_recording"]) == (60.0, 36.0)
-    assert row["met"] == ["refused or inadequate"]
-    assert "adequate" in table.summary(NAMED["air 0.02"], refused)["missed"]
+    assert row["met"] == ["refused or not reliable"]
+    assert "reliable" in table.summary(NAMED["air 0.02"], refused)["missed"]
     failed = table.summary(NAMED["clock off 1 %"], [outcome(status=table.FAILED)] * 100)
     assert "no failure" in failed["missed"]
 

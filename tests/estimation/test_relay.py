@@ -23,7 +23,7 @@ def test_the_delay_of_a_sampled_loop_is_exact(delay):
     recording, known = relay(delay, duration=24 * (delay + TS))
     fit = dtm.estimate_delay(recording, known, method="relay")
     assert fit.delay == pytest.approx(delay, abs=1e-9)
-    assert fit.adequate
+    assert fit.verdict == "reliable"
     # The wait for the next sample counts, between zero and one sample time.
     assert 0.0 <= fit.details["wait_of_hold"] <= TS + 1e-12
     assert fit.details["period"] == pytest.approx(4 * (delay + fit.details["wait_of_hold"]))

@@ -71,7 +71,7 @@ def test_coloured_misfit_is_weighted_by_the_size_of_the_step():
     large, _ = record_step(1.31, 0.0, 0, size=1.0, lag=0.3, limit=None)
     alone = dtm.estimate_delay(small, loop)
     both = dtm.estimate_delay([small, large], loop)
-    assert not both.adequate
+    assert both.verdict != "reliable"
     assert both.delay == pytest.approx(alone.delay, abs=1e-6)
 
 
@@ -136,7 +136,7 @@ def test_the_two_real_flights_are_fitted_together():
     assert (lagged.delay, lagged.lag) == pytest.approx((0.327, 0.105), abs=0.005)
     assert lagged.gain == pytest.approx(0.747, abs=0.002)
     # The misfit is coloured, so the intervals are the robust ones, wider than ± 0.003 s by far.
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
     low, high = fit.ci()
     assert high - low > 0.02
 

@@ -31,7 +31,7 @@ def test_the_interval_is_that_of_the_summed_profiles_and_narrower_than_each():
     found = three(0)
     both = shared_number(found)
     assert both.agree
-    assert both.adequate
+    assert both.verdict == "reliable"
     low, high = both.interval
     grid = np.linspace(low - 2e-4, high + 2e-4, 81)
     total = np.sum([one.profile("delay", grid)[1] ** 2 for one in found], axis=0)
@@ -76,7 +76,7 @@ def test_the_interval_holds_the_truth(sets, misses):
 def test_a_number_that_is_not_shared_is_told():
     apart = shared_number([axis(1, 0.08), axis(2, 0.08, delay=DELAY + 0.04)])
     assert not apart.agree
-    assert not apart.adequate
+    assert apart.verdict != "reliable"
     assert "contradict one another" in apart.summary()
 
 

@@ -227,4 +227,4 @@ def test_the_delay_of_a_first_order_plant_from_its_command():
     assert (
         fit.ci(0.999, "delay+time_constant")[0] <= 0.47 <= fit.ci(0.999, "delay+time_constant")[1]
     )
-    assert fit.adequate
+    assert fit.verdict == "reliable"

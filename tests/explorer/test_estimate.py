@@ -42,7 +42,7 @@ def test_it_is_that_of_python(web: WebKernels, seed: int, lag: float, air: float
             width = high - low
             assert found[name][0] == pytest.approx(value, abs=0.02 * width)
             assert found[name][1:] == pytest.approx([low, high], abs=0.05 * width)
-    assert known.adequate
+    assert known.verdict == "reliable"
     assert found["rest"][5] == 1.0
     low, high = found["delay"][1:]
     assert low - 0.01 < delay < high + 0.01
@@ -51,7 +51,7 @@ def test_it_is_that_of_python(web: WebKernels, seed: int, lag: float, air: float
 
 
 @pytest.mark.parametrize("seed", [0, 4])
-def test_a_lag_left_out_is_not_adequate(web: WebKernels, seed: int) -> None:
+def test_a_lag_left_out_is_not_reliable(web: WebKernels, seed: int) -> None:
     recording, _, _ = recorded_step(seed, 0.15, 0.0)
     assert estimate(web, recording, lag=False)["rest"][5] == 0.0
     assert estimate(web, recording, lag=True)["rest"][5] == 1.0

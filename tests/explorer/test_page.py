@@ -282,7 +282,7 @@ def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, f
 
 
 @pytest.mark.survey
-def test_a_fit_that_is_not_adequate_is_not_taken_over(page: Page, tmp_path: Path) -> None:
+def test_a_fit_that_is_not_reliable_is_not_taken_over(page: Page, tmp_path: Path) -> None:
     recording, _, _ = recorded_step(0, 0.15, 0.0)
     columns = (recording.time, recording.reference, recording.output, recording.command)
     log = tmp_path / "lagging.csv"

@@ -165,7 +165,7 @@ def limited_flight(tmp_path, seed=0):
 def test_the_limits_of_a_vehicle_are_in_the_plant_where_they_explain_the_flight(tmp_path):
     flight = limited_flight(tmp_path)
     fit, tried = fit_by_evidence([flight], 1.0, (1.0, 5.0))
-    assert [one.fit.adequate for one in tried] == [False, True]
+    assert [one.fit.verdict == "reliable" for one in tried] == [False, True]
     assert fit.delay_plus_lag == pytest.approx(0.25, abs=0.02)
     assert fit.gain == pytest.approx(1.0, abs=0.02)
     linear = for_small_commands(fit).loop

@@ -304,10 +304,10 @@ def test_a_vehicle_that_reports_no_climb_is_controlled_with_the_filter(tmp_path)
     assert found.learned.fit.delay_plus_lag == pytest.approx(0.40, abs=0.01)
 
 
-def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
+def test_an_indication_is_reported_before_its_gains_are_used_in_flight(
     tmp_path, capsys, monkeypatch
 ):
-    # Intervals of an inadequate fit do not assure a margin.
+    # Intervals of an unreliable fit do not assure a margin.
     def undesigned(fit, *, controller, **how):  # The designed gains do not matter here.
         return SimpleNamespace(loop=fit.loop.replace(controller=controller))
 
@@ -325,13 +325,13 @@ def test_an_inadequate_fit_is_reported_before_its_gains_are_used_in_flight(
     vehicle = SimulatedVehicle(noise=0.001, random=random, change_state=gusts)
     plan = FlightPlan(gains=(2.4,), settle=2.5, hold=3.5, checked_hold=2.0)
     found = fly_experiment(lambda: vehicle, plan, tmp_path, run=run, warn=warn)
-    assert found.learned.fit.adequate is False
+    assert found.learned.fit.verdict == "indication"
     assert flights == [1]
     assert "margin is not assured" in warnings[0]
     _print_study(found)
-    assert "not adequate (adequate=False)" in " ".join(capsys.readouterr().out.split())
-    fine = replace(found.learned, fit=replace(found.learned.fit, adequate=True))
-    assert "adequate" not in replace(found, learned=fine).verdict()
+    assert "The fit is an indication" in " ".join(capsys.readouterr().out.split())
+    fine = replace(found.learned, fit=replace(found.learned.fit, verdict="reliable"))
+    assert "indication" not in replace(found, learned=fine).headline()
 
 
 def test_recordings_in_which_the_vehicle_does_not_move_are_refused(tmp_path):

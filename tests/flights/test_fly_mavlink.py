@@ -57,7 +57,7 @@ def test_what_the_relay_adds_is_what_the_estimate_rises_by(tmp_path, firmware):
     for one in trips:
         assert one.median == pytest.approx(0.26, abs=0.001)
     assert far.after.overshoot < 8.0
-    # Whether the fit is adequate is not asked: rows with messages of different ages may show.
+    # Whether the fit is reliable is not asked: rows with messages of different ages may show.
     for study in (near, far):
         assert study.learned.fit.gain == pytest.approx(1.0, abs=0.02)
 

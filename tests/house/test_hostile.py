@@ -184,7 +184,7 @@ def test_fits_that_would_take_minutes_are_refused():
 
 @pytest.mark.parametrize("kind", ["noise", "wrong sign"])
 def test_outputs_that_do_not_respond_to_a_step_are_refused(kind):
-    # A gain at the bound of its search was once returned with adequate=True.
+    # A gain at the bound of its search was once returned with verdict="reliable".
     times = np.arange(150) * 0.065
     step = (times > 1.0).astype(float)
     output = {

@@ -52,7 +52,7 @@ def test_the_vehicle_is_told_from_its_own_log(found):
     value, error, (low, high) = one.sum_of()
     assert low < DELAY + LAG < high
     assert error < 2e-3
-    assert one.estimate.adequate
+    assert one.estimate.verdict == "reliable"
     low, high = one.estimate.ci(0.95, "gain")
     assert low < GAIN < high
     assert value == one.estimate.delay_plus_lag
@@ -62,12 +62,12 @@ def test_the_vehicle_is_told_from_its_own_log(found):
 def test_axes_share_a_delay(found, other):
     # Two axes of one vehicle: two logs of the same loop, with noise of their own.
     both = replace(found, loops=(*found.loops, *other.loops)).shared("rate")
-    assert both.adequate
+    assert both.verdict == "reliable"
     low, high = both.interval
     assert low < DELAY < high
     each = [one.loop("roll rate", "actuator").estimate.ci() for one in (found, other)]
     assert high - low < min(high - low for low, high in each)
-    with pytest.raises(ValueError, match="1 of the 1 loops of rate have an adequate estimate"):
+    with pytest.raises(ValueError, match="1 of the 1 loops of rate have a reliable estimate"):
         found.shared("rate")
 
 
@@ -76,7 +76,7 @@ def test_a_closed_loop_of_second_order_has_a_pair_of_complex_poles(tmp_path):
     # 1/(Kp GAIN), and a setpoint that is held by half a period less.
     log = log_of(tmp_path, seconds=SECONDS, delay=0.0, Kp=3.0, seed=5)
     one = dtm.latency(log).loop("roll rate", "setpoint")
-    assert one.estimate.adequate
+    assert one.estimate.verdict == "reliable"
     assert one.estimate.loop.plant.has_pair
     low, high = one.sum_of()[2]
     assert low < 1.0 / (3.0 * GAIN) - 0.5 / 200.0 < high
@@ -147,7 +147,7 @@ def test_the_page_in_a_browser(found, tmp_path):
     check_page(found.report(tmp_path / "page.html"))
 
 
-def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_adequate(found):
+def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_reliable(found):
     around = around_the_vehicle(found.estimated)
     one = found.loop("roll rate", "actuator")
     state = around.explorer.state
@@ -158,31 +158,31 @@ def test_a_gain_around_the_vehicle_is_shown_where_its_fit_is_adequate(found):
     for flown, margin in ((None, None), (one.cost.flown, np.nan)):
         other = replace(one, cost=replace(one.cost, flown=flown, delay_margin=margin))
         assert around_the_vehicle([other]).explorer.state["Kp"] == one.cost.well_damped
-    doubted = replace(one, estimate=replace(one.estimate, adequate=False))
+    doubted = replace(one, estimate=replace(one.estimate, verdict="indication"))
     assert around_the_vehicle([doubted, found.loop("roll rate")]) is None
 
 
-def test_north_and_east_that_contradict_each_other_are_not_adequate(found, slow):
+def test_north_and_east_that_contradict_each_other_are_not_reliable(found, slow):
     one = found.loop("roll rate", "actuator")
     alike = [replace(one, axis=axis) for axis in ("north", "east")]
-    assert all(one.estimate.adequate for one in doubted_by_others(alike))
+    assert all(one.estimate.verdict == "reliable" for one in doubted_by_others(alike))
     apart = [replace(one, axis="north"), replace(slow, axis="east")]
-    assert slow.estimate.adequate
+    assert slow.estimate.verdict == "reliable"
     for doubtful in doubted_by_others(apart):
-        assert not doubtful.estimate.adequate
+        assert doubtful.estimate.verdict != "reliable"
         assert "contradict each other" in doubtful.estimate.message
-    assert all(one.estimate.adequate for one in doubted_by_others([one, slow]))
+    assert all(one.estimate.verdict == "reliable" for one in doubted_by_others([one, slow]))
 
 
-def test_a_setpoint_that_waits_longer_than_the_actuator_takes_is_not_adequate(found, slow):
+def test_a_setpoint_that_waits_longer_than_the_actuator_takes_is_not_reliable(found, slow):
     one = found.loop("roll rate", "actuator")
     waits = replace(slow, command="setpoint")
     doubtful, actuator = doubted_by_others([waits, one])
     assert "it would wait" in doubtful.estimate.message
-    assert not doubtful.estimate.adequate
-    assert actuator.estimate.adequate
+    assert doubtful.estimate.verdict != "reliable"
+    assert actuator.estimate.verdict == "reliable"
     for others in ([replace(one, command="setpoint"), one], [waits, replace(one, loop="yaw rate")]):
-        assert all(one.estimate.adequate for one in doubted_by_others(others))
+        assert all(one.estimate.verdict == "reliable" for one in doubted_by_others(others))
 
 
 def test_the_wait_of_a_real_position_loop_is_doubted():
@@ -191,7 +191,9 @@ def test_the_wait_of_a_real_position_loop_is_doubted():
         flight_path("arducopter_2014-10-18_21-19-07.bin"), loops=["north position", "east position"]
     )
     assert "it would wait" in flight.loop("east position").estimate.message
-    assert not any(one.estimate.adequate for one in flight.estimated if one.command == "setpoint")
+    assert not any(
+        one.estimate.verdict == "reliable" for one in flight.estimated if one.command == "setpoint"
+    )
 
 
 def test_without_excitation_every_loop_is_refused_by_name(tmp_path):
@@ -258,7 +260,7 @@ def test_a_recorded_flight_is_right_or_says_that_it_is_not():
         one = found.loop(name)
         value, _, (low, high) = one.sum_of()
         assert 0.15 < value < 0.32
-        assert not one.estimate.adequate or (low < correlated and high > fitted)
+        assert one.estimate.verdict != "reliable" or (low < correlated and high > fitted)
 
 
 def test_a_command_that_moves_between_the_rows_hides_a_short_time():
@@ -266,7 +268,7 @@ def test_a_command_that_moves_between_the_rows_hides_a_short_time():
     found = dtm.latency(flight_path("ardupilot_sitl_guided_heights.bin"), loops=("roll rate",))
     one = found.loop("roll rate")
     assert one.estimate is not None
-    assert not one.estimate.adequate
+    assert one.estimate.verdict != "reliable"
     assert "moves between rows of the log by more than it shows" in one.estimate.message
 
 
@@ -368,9 +370,9 @@ def test_a_window_that_contradicts_the_estimate_makes_it_doubtful():
         found = relation_of("roll", "roll", "attitude", "setpoint", [used], others=others)
         return found.estimate
 
-    assert estimate(alike).adequate
+    assert estimate(alike).reliable
     doubted = estimate(alike, later)
-    assert not doubted.adequate
+    assert doubted.verdict != "reliable"
     why = "the window from 40.0 to 52.0 s of the log contradicts it: delay and lag are 119.8"
     assert why in doubted.message
 
@@ -385,5 +387,5 @@ def test_a_turn_that_takes_longer_makes_a_recorded_flight_doubtful():
     """Most of the flight fits 0.25 s, a window of it 0.35 s and more."""
     flight = dtm.latency(flight_path("arducopter_2014-10-18_21-19-07.bin"), loops=["roll"])
     roll = flight.loop("roll").estimate
-    assert not roll.adequate
+    assert roll.verdict != "reliable"
     assert "the window from 47.5 to 51.4 s of the log contradicts it" in roll.message

@@ -23,7 +23,7 @@ SHORT = [(kind, logger) for kind in ("rate", "height") for logger in LOGGERS[kin
 #: Rows at any times: their likelihood has no steps that repeat, and takes ten times as long.
 ANY_TIMES = {"uneven rows", "scattered stamps", "clocks drift by 100 ppm"}
 
-#: Cases that are refused, or not adequate, in most logs.
+#: Cases that are refused, or not reliable, in most logs.
 DOUBTED = {
     ("height", "commands: every second row"),
     ("height", "commands: every fifth row"),
@@ -42,15 +42,15 @@ LOGS, ALARM = int(os.environ.get("DEADTIME_LOGS", "2")), 0.01
 
 
 def answered(kind, logger, seed, part=1.0):
-    """The truth of a log and its adequate answer: value, error and interval; None without one."""
+    """The truth of a log and its reliable answer: value, error and interval; None without one."""
     flight, log = made(kind, logger, seed, part)
     one = _told(log, log.loop(flight.kind.loop), "actuator")
-    is_adequate = one.estimate is not None and one.estimate.adequate
-    return flight.delay_plus_lag, one.sum_of() if is_adequate else None
+    is_reliable = one.estimate is not None and one.estimate.verdict == "reliable"
+    return flight.delay_plus_lag, one.sum_of() if is_reliable else None
 
 
 def held_in(answers):
-    """Whether the intervals of the adequate ones among these answers hold their truth."""
+    """Whether the intervals of the reliable ones among these answers hold their truth."""
     return [told[2][0] <= truth <= told[2][1] for truth, told in answers if told is not None]
 
 
@@ -61,7 +61,7 @@ def is_as_often_as_said(held):
     return min(few, many) > ALARM
 
 
-def is_mostly_adequate(answers):
+def is_mostly_reliable(answers):
     """Three quarters of them, but for chance."""
     return stats.binom.cdf(len(held_in(answers)), len(answers), 0.75) > ALARM
 
@@ -77,7 +77,7 @@ def test_a_log_is_answered_rightly_or_doubted(kind, logger):
 @pytest.mark.long
 @pytest.mark.survey
 @pytest.mark.parametrize("kind", LOGGERS)
-def test_adequate_intervals_hold_the_truth_as_often_as_they_say(kind):
+def test_reliable_intervals_hold_the_truth_as_often_as_they_say(kind):
     seeds = range(1000, 1000 + LOGS)
     found = {
         logger: [answered(kind, logger, seed) for seed in seeds] for logger in LOGGERS[kind][1]
@@ -87,8 +87,8 @@ def test_adequate_intervals_hold_the_truth_as_often_as_they_say(kind):
     assert not wrong
     assert is_as_often_as_said([each for one in found.values() for each in held_in(one)])
     meant = {logger: one for logger, one in found.items() if (kind, logger) not in DOUBTED}
-    assert not [logger for logger, one in meant.items() if not is_mostly_adequate(one)]
-    assert is_mostly_adequate([each for one in meant.values() for each in one])
+    assert not [logger for logger, one in meant.items() if not is_mostly_reliable(one)]
+    assert is_mostly_reliable([each for one in meant.values() for each in one])
 
 
 @pytest.mark.parametrize("kind", LOGGERS)
@@ -238,5 +238,5 @@ def test_a_recording_with_commands_of_another_clock_is_doubted(rows, words):
         dtm.latency(dtm.Recording(time * (1.0 + apart), setpoint, read, sent=(time, sent))).loops[0]
         for apart in (0.0, 1e-4)
     )
-    assert same.estimate.adequate
+    assert same.estimate.verdict == "reliable"
     assert words in other.estimate.message

@@ -182,7 +182,7 @@ def test_the_time_from_the_motors_of_a_crazyflie_to_its_rate(tmp_path, axis):
     log = opened(tmp_path, crazyflie_log(columns))
     one = _told(log, log.loop(f"{axis} rate"), "actuator")
     low, high = one.sum_of()[2]
-    assert one.estimate.adequate, one.estimate.message
+    assert one.estimate.verdict == "reliable", one.estimate.message
     assert low < flight.delay_plus_lag < high
 
 

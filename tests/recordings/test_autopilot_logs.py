@@ -34,7 +34,7 @@ def test_the_roll_loop_of_a_copter(axis, late, gain):
     fit = dtm.estimate_delay(flight, INNER, free=FREE)
     assert fit.delay + fit.loop.parameters["time_constant"] == pytest.approx(late, abs=0.02)
     assert fit.gain == pytest.approx(gain, abs=0.01)
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
 
 
 def test_the_climb_loop_of_a_simulated_copter():

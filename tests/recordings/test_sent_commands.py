@@ -150,8 +150,8 @@ def flown(seed):
 
 
 def estimated(seeds, kept):
-    """Error of delay + lag, s; how many fits are adequate, hold it, tell of lost commands."""
-    errors, adequate, held, known = [], 0, 0, 0
+    """Error of delay + lag, s; how many fits are reliable, hold it, tell of lost commands."""
+    errors, reliable, held, known = [], 0, 0, 0
     for seed in range(seeds):
         loop, time, reference, output, command = flown(seed)
         rows = kept(seed, reference, command)
@@ -160,10 +160,10 @@ def estimated(seeds, kept):
         low, high = fit.ci(0.95, "delay+lag")
         late = loop.delay + loop.plant.lag
         errors.append(fit.delay_plus_lag - late)
-        adequate += fit.adequate
-        held += fit.adequate and low < late < high
+        reliable += fit.verdict == "reliable"
+        held += fit.verdict == "reliable" and low < late < high
         known += "taken for lost" in fit.message
-    return np.sqrt(np.mean(np.square(errors))), adequate, held, known
+    return np.sqrt(np.mean(np.square(errors))), reliable, held, known
 
 
 def test_commands_that_are_logged_when_they_change_hold_until_the_next():
@@ -171,11 +171,11 @@ def test_commands_that_are_logged_when_they_change_hold_until_the_next():
     def kept(seed, reference, command):
         return np.append(True, np.abs(np.diff(command)) > 1e-12)
 
-    error, adequate, held, known = estimated(20, kept)
+    error, reliable, held, known = estimated(20, kept)
     assert known == 0
     assert error < 0.001  # 0.7 ms, and 7 where those left out count as lost
-    assert adequate >= 17
-    assert held >= adequate - 4
+    assert reliable >= 17
+    assert held >= reliable - 4
 
 
 @pytest.mark.parametrize(("flights", "misses"), [(5, 1), pytest.param(12, 3, marks=NIGHTLY)])
@@ -185,8 +185,8 @@ def test_commands_that_the_log_has_lost_at_a_step_are_unknown(flights, misses):
         rows[np.flatnonzero(np.diff(reference)) + 1] = False
         return rows | (np.arange(command.size) == 0)
 
-    error, adequate, held, known = estimated(flights, kept)
+    error, reliable, held, known = estimated(flights, kept)
     assert known == flights
     assert error < 0.005  # 3.5 ms, and 8 where each is the mean of those around it
-    assert adequate >= flights - misses
-    assert held >= adequate - misses
+    assert reliable >= flights - misses
+    assert held >= reliable - misses

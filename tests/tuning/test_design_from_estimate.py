@@ -35,7 +35,7 @@ def estimate(*free):
 @pytest.fixture(scope="module")
 def fit():
     found = estimate("delay", "gain", "lag")
-    assert found.adequate
+    assert found.verdict == "reliable"
     return found
 
 
@@ -43,7 +43,7 @@ def fit():
 def test_the_points_stand_around_the_ellipsoid(free):
     """Every direction is served: the ellipsoid of the same axes lies within the points' hull."""
     fit = estimate(*free)
-    region = region_of(fit, 0.95, allow_inadequate=True)
+    region = region_of(fit, 0.95, allow_indication=True)
     points = np.array([[one[name] for name in free] for one in region.points])
     centre = np.array([region.estimate[name] for name in free])
     quantile, radius = special.ndtri(0.975), math.sqrt(special.chdtri(len(free), 0.05))
@@ -74,7 +74,7 @@ def test_times_are_not_below_zero_and_keep_their_sum():
     vehicle = TRUTH.replace(lag=0.02)
     flight = dtm.Experiment.step(8.0, rest=1.04).run(vehicle, noise=0.01, seed=1)
     fit = dtm.estimate_delay(flight, KNOWN, free=("delay", "gain", "lag"))
-    region = region_of(fit, 0.95, allow_inadequate=True)
+    region = region_of(fit, 0.95, allow_indication=True)
     low, high = region.intervals["lag"]
     assert low == 0.0 < high
     total = [one["delay"] + one["lag"] for one in region.points]
@@ -87,7 +87,7 @@ def test_times_are_not_below_zero_and_keep_their_sum():
 @pytest.mark.survey
 def test_margins_hold_in_the_whole_region(fit):
     best = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
-    assert best.region.adequate
+    assert best.region.verdict == "reliable"
     assert best.region.level == 0.95
     assert best.margins.gain_margin >= 3.0
     assert best.proved == ()
@@ -113,14 +113,14 @@ def test_a_filter_is_chosen_for_a_region(fit):
     assert choice.design.margins.gain_margin >= 2.0
 
 
-def test_an_inadequate_estimate_is_refused_by_name():
+def test_an_indication_is_refused_by_name():
     fit = estimate("delay", "gain")
-    assert not fit.adequate
+    assert fit.verdict != "reliable"
     with pytest.raises(
-        ValueError, match=r"not adequate.*the plant lacks it.*allow_inadequate=True"
+        ValueError, match=r"not reliable.*the plant lacks it.*allow_indication=True"
     ):
         dtm.design(fit, controller=dtm.P)
-    best = dtm.design(fit, controller=dtm.P, gain_margin=2.5, allow_inadequate=True)
+    best = dtm.design(fit, controller=dtm.P, gain_margin=2.5, allow_indication=True)
     assert "with which probability the true loop has these margins is not known" in best.summary()
 
 
@@ -151,7 +151,7 @@ def test_gains_for_the_worst_of_a_wide_region_are_found_far_from_those_for_its_e
     """The search ended there, and named as the nearest a loop that had what was asked."""
     flight = dtm.Experiment.step(8.0, rest=1.04).run(TRUTH, noise=0.03, seed=2)
     fit = dtm.estimate_delay(flight, KNOWN, free=("delay", "gain", "lag"))
-    best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=6.0, allow_inadequate=True)
+    best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=6.0, allow_indication=True)
     loops = [best.loop.replace(limit=None, **one) for one in best.region.points]
     least = min(one.stable_range("gain")[1] / one.parameters["gain"] for one in loops)
     # The worst has what was asked, and no more.
@@ -169,7 +169,7 @@ def test_flights_in_gusts(flights):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             fit = dtm.estimate_delay(table.recording_of(condition, run), loop, free=condition.free)
-        if not fit.adequate:
+        if fit.verdict != "reliable":
             continue
         best = dtm.design(fit, controller=SMOOTH, gain_margin=2.5, shape=(31, 31))
         vehicle = run.vehicle

@@ -12,15 +12,13 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from deadtime._base.errors import DeadtimeError
+from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.printable import one_line, printable
+from deadtime._cli.exit_codes import DEFECT, NONE
 from deadtime._cli.interruption import INTERRUPTED, ended_by_ctrl_c
 
 #: Errors that end a command with one line; any other is a defect and prints its traceback.
 FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
-
-#: Exit code after a defect: that of an error within a program, as `sysexits.h` has it.
-DEFECT = 70
 
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
@@ -91,7 +89,11 @@ def _options(
         ),
     ] = False,
 ) -> None:
-    """Control loops with a delay in them: estimate it, map the gains, design for it."""
+    """Control loops with a delay in them: estimate it, map the gains, design for it.
+
+    Exit codes: 0 an answer, reliable or an indication; 3 none, because the recording does not
+    determine it; 1 an error.
+    """
 
 
 def _not_loaded() -> None:
@@ -123,6 +125,9 @@ def run() -> None:
     except BrokenPipeError:  # the reader of the output has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
+    except NotIdentifiableError as error:
+        print(f"deadtime: none: {one_line(str(error))}", file=sys.stderr)
+        raise SystemExit(NONE) from None
     except FAILURES as error:
         message = str(error)
         if isinstance(error, OSError) and error.filename is not None:

@@ -58,7 +58,8 @@ def command(
                     name: fit.to_dict() for name, fit in found.comparison.estimates.items()
                 },
                 "gains": found.designed.gains,
-                "verdict": found.verdict(),
+                "verdict": found.verdict,
+                "headline": found.headline(),
                 "flight": file,
                 "report": page,
             },
@@ -66,7 +67,7 @@ def command(
         return
     print_table(estimates_table(found.comparison, flight.numbers))
     print_points(found.comparison.explanation())
-    print_text(f"\n{found.verdict()}", "bold")
+    print_text(f"\n{found.headline()}", "bold")
     print_text(f"\nThe flight is in {file}, the report in {page}. To go on:")
     for line in _next_commands(found.known, flight.window, file, found.fit):
         print(f"  {line}")

@@ -150,7 +150,10 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Find the plant of a recording, or the delay of a known loop, with a verdict."""
+    """Find the plant of a recording, or the delay of a known loop, with a verdict.
+
+    Exit codes: 0 reliable or an indication, 3 none, 1 an error.
+    """
     files, windows = files_and_windows(files, window)
     columns: dict[str, Any] = {
         "time": time,

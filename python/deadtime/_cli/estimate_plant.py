@@ -12,12 +12,10 @@ import typer
 
 from deadtime._base.drawing import new_figure
 from deadtime._base.validation import OpenRange
+from deadtime._cli.exit_codes import NONE
 from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.estimation import PLANTS, PlantEstimate, estimate_delay
 from deadtime.recordings import read_recording
-
-#: Exit code where the recording does not determine what was asked.
-NOT_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
     else:
         _print(fit, following)
     if fit.verdict == "none":
-        raise typer.Exit(NOT_TOLD)
+        raise typer.Exit(NONE)
 
 
 def _print(fit: PlantEstimate, following: str) -> None:

@@ -213,4 +213,4 @@ def _print_study(study: FlightStudy) -> None:
     axis = study.axis.name
     print_table(results_table(COLUMNS, study.rows(), f"Flights on {axis}", COLUMNS[:1]))
     print_table(results_table(PARTS, study.parts(), f"The delay on {axis}", PARTS[:1]))
-    print_text(study.verdict(), "bold")
+    print_text(study.headline(), "bold")

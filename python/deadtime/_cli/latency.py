@@ -10,6 +10,7 @@ import typer
 from deadtime._base.digits import between, stated
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
+from deadtime._cli.exit_codes import NONE
 from deadtime._cli.show import print_json, print_table, print_text, results, results_table
 from deadtime.logs import Latency, Log, compare_latencies, latency, loops_asked_for, open_log
 
@@ -63,6 +64,8 @@ def command(
         written = found[0].report(out)
         if not as_json:
             print_text(f"report: {written}")
+    if not any(one.estimated for one in found):
+        raise typer.Exit(NONE)
 
 
 def _told(log: Log, axes: list[str] | None, loops: list[str] | None, quiet: bool) -> Latency:
@@ -72,9 +75,9 @@ def _told(log: Log, axes: list[str] | None, loops: list[str] | None, quiet: bool
 
 
 def _print(found: Latency) -> None:
-    first, headline, *rest = found.summary().splitlines()
-    print_text(first, "bold")
+    headline, first, *rest = found.summary().splitlines()
     print_text(headline, "bold")
+    print_text(first, "bold")
     for line in rest:
         print_text(line)
 
@@ -91,9 +94,9 @@ def _print_changes(one: Latency, other: Latency) -> None:
             stated(change.before, change.before_error, "s"),
             stated(change.after, change.after_error, "s"),
             between(*change.ci, change.stderr, "s"),
-            change.verdict,
+            change.outcome,
         )
         for change in changes
     ]
-    heads = ("loop", "from", one.source, other.source, "change, 95 %", "verdict")
-    print_table(results_table(heads, rows, left=(*LEFT, "verdict")))
+    heads = ("loop", "from", one.source, other.source, "change, 95 %", "outcome")
+    print_table(results_table(heads, rows, left=(*LEFT, "outcome")))

@@ -40,8 +40,14 @@ def command(
     write_report(found, out)
     if as_json:
         print_json(
-            "report", {"verdict": found.verdict(), "report": out, "gains": found.designed.gains}
+            "report",
+            {
+                "verdict": found.verdict,
+                "headline": found.headline(),
+                "report": out,
+                "gains": found.designed.gains,
+            },
         )
         return
-    print_text(found.verdict())
+    print_text(found.headline())
     print_text(f"report: {out}")

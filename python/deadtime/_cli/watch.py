@@ -161,10 +161,9 @@ def _estimates(
 
 def _is_told(now: OnlineEstimate, last: OnlineEstimate, every: float) -> bool:
     """Whether a line is due: by time, or because of news."""
-    is_news = now.changed or now.adequate != last.adequate or now.known != last.known
+    is_news = now.changed or now.verdict != last.verdict or now.known != last.known
     return is_news or now.time - last.time >= every
 
 
 def _said(estimate: OnlineEstimate) -> str:
-    text = str(estimate) if estimate.known else f"{estimate.time:.2f} s: {estimate.message}"
-    return f"{text}; the delay has changed" if estimate.changed else text
+    return f"{estimate}; the delay has changed" if estimate.changed else str(estimate)

@@ -77,5 +77,7 @@ class WatchPage:
     def _track(self) -> str:
         with self._lock:
             found = list(self._estimates)
-        rows = [[e.time, e.delay, *e.ci, e.known, e.changed, e.adequate] for e in found]
+        rows = [
+            [e.time, e.delay, *e.ci, e.known, e.changed, e.verdict == "reliable"] for e in found
+        ]
         return json.dumps({"rows": rows, "said": str(found[-1]) if found else ""})

@@ -7,7 +7,7 @@ criterion weighs the likelihood against the number of unknowns,
 
 k the numbers of the plant, of its trim and of coloured sensor noise, n the rows (air is fitted
 beside every plant). The plant of the least BIC is taken among those whose
-model is adequate, or among all where none is.
+model is reliable, or among all where none is.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from deadtime._base.digits import between
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
@@ -39,7 +40,7 @@ LONG, SHORT, ZEROS = 3.0, 0.5, (0.3, 3.0)
 ALIKE, DAMPING = 0.7, 0.7
 
 #: Headings of the table.
-PLANT_COLUMNS = ("plant", "BIC", "white", "adequate", "delay", "lag", "sum", "95 % interval")
+PLANT_COLUMNS = ("plant", "BIC", "white", "verdict", "delay", "lag", "sum", "95 % interval")
 
 #: Points of the distribution of delay and lag together, and the least weight of a plant in it.
 PLACES, LEAST = 4001, 1e-3
@@ -72,9 +73,18 @@ class PlantChoice(ReadOnlyArrays):
         return self.estimates[self.chosen]
 
     @property
+    def verdict(self) -> Verdict:
+        """That on the plant that was taken: ``"reliable"`` or ``"indication"``."""
+        return self.best.verdict
+
+    def headline(self) -> str:
+        """The verdict, and the delay with the plant that was taken."""
+        return f"{self.best.headline()}; {self.chosen}"
+
+    @property
     def weights(self) -> dict[str, float]:
         """Probability of each plant that may be taken, if all were as probable before."""
-        likely = {name: self.criteria[name] for name in _adequate(self.estimates)}
+        likely = {name: self.criteria[name] for name in _reliable(self.estimates)}
         least = min(likely.values())
         shares = {name: math.exp(0.5 * (least - one)) for name, one in likely.items()}
         return {name: share / sum(shares.values()) for name, share in shares.items()}
@@ -112,18 +122,21 @@ class PlantChoice(ReadOnlyArrays):
         found = []
         for name in sorted(self.criteria, key=lambda name: self.criteria[name]):
             fit = self.estimates[name]
-            low, high = fit.ci(0.95, "delay+lag")
-            span = fit.recording.time[-1] - fit.recording.time[0]
+            ends = "not claimed"
+            if fit.verdict == "reliable":
+                low, high = fit.ci(0.95, "delay+lag")
+                span = fit.recording.time[-1] - fit.recording.time[0]
+                ends = f"{low:.3f} – {high:.3f}" if high - low < span else "unknown"
             found.append(
                 [
                     f"{name} *" if name == self.chosen else name,
                     f"{self.criteria[name] - least:+.1f}",
                     "yes" if fit.whiteness.white else "no",
-                    "yes" if fit.adequate else "no",
+                    fit.verdict,
                     f"{fit.delay:.3f}",
                     f"{fit.lag or 0.0:.3f}",
                     f"{fit.delay_plus_lag:.3f}",
-                    f"{low:.3f} – {high:.3f}" if high - low < span else "unknown",
+                    ends,
                 ]
             )
         return found + [[name, f"refused: {why}"] for name, why in self.refusals.items()]
@@ -131,8 +144,9 @@ class PlantChoice(ReadOnlyArrays):
     def remarks(self) -> list[str]:
         """What the table means, in sentences."""
         found = ["BIC is less that of the likeliest plant; * was taken; times in s."]
-        if not self.best.adequate:
-            found.append("No plant of the family is adequate.")
+        if self.best.verdict != "reliable":
+            found.append("No plant of the family is reliable.")
+            return found
         found.append(
             "Delay and lag together, over all plants by their weight: "
             f"{between(*self.ci(), math.nan, 's')} (95 %)."
@@ -142,6 +156,7 @@ class PlantChoice(ReadOnlyArrays):
     def to_dict(self) -> dict[str, Any]:
         """All results but the arrays, as plain values for JSON."""
         return {
+            "verdict": self.verdict,
             "chosen": self.chosen,
             "delay_plus_lag_interval_95": list(self.ci()),
             "bic": dict(self.criteria),
@@ -160,7 +175,7 @@ class PlantChoice(ReadOnlyArrays):
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
             for row in rows
         ]
-        return "\n".join([*lines, *self.remarks(), "", self.best.summary()])
+        return "\n".join([self.headline(), *lines, *self.remarks(), "", self.best.summary()])
 
 
 def choose_plant(
@@ -293,17 +308,17 @@ def with_pair(plant: FactoredPlant) -> FactoredPlant | None:
 
 
 def likeliest(estimates: Mapping[str, DelayEstimate]) -> str:
-    """Name of the likeliest plant among the adequate ones, or among all where none is."""
-    return min(_adequate(estimates), key=lambda name: bic(estimates[name]))
+    """Name of the likeliest plant among the reliable ones, or among all where none is."""
+    return min(_reliable(estimates), key=lambda name: bic(estimates[name]))
 
 
 def _lags(count: int) -> str:
     return f"{count or 'no'} {'lag' if count == 1 else 'lags'}"
 
 
-def _adequate(estimates: Mapping[str, DelayEstimate]) -> list[str]:
-    """Names of the adequate ones, or of all where none is."""
-    return [name for name, fit in estimates.items() if fit.adequate] or list(estimates)
+def _reliable(estimates: Mapping[str, DelayEstimate]) -> list[str]:
+    """Names of the reliable ones, or of all where none is."""
+    return [name for name, fit in estimates.items() if fit.verdict == "reliable"] or list(estimates)
 
 
 def _first(loop: ControlLoop, sample: float) -> FactoredPlant:

@@ -30,7 +30,7 @@ COLUMNS = (
     "sum / s",
     "off / s",
     "off / σ",
-    "adequate",
+    "verdict",
 )
 
 #: Largest relative difference of two delays that agree.
@@ -187,7 +187,9 @@ class Comparison:
         differences = self.differences()
         for name, fit in self.estimates.items():
             interval, total = "–", "–"
-            if fit.calibrated:
+            if fit.verdict != "reliable":
+                interval, total = "not claimed", f"about {fit.delay_plus_lag:.3f}"
+            elif fit.calibrated:
                 interval = "{:.3f} – {:.3f}".format(*fit.ci(0.95))
                 total = f"{fit.delay_plus_lag:.3f} ±{fit.stderr['delay+lag']:.3f}"
             rows.append(
@@ -200,7 +202,7 @@ class Comparison:
                     total,
                     f"{differences[name].seconds:+.3f}",
                     _signed(differences[name].standard_errors),
-                    "yes" if fit.adequate else "no",
+                    fit.verdict,
                 ]
             )
         rows += [[_label(name), f"refused: {why}"] for name, why in self.refusals.items()]
@@ -224,14 +226,8 @@ class Comparison:
                 f"the vehicle; the sum, {lagged.delay_plus_lag:.3f} s, is what the recording "
                 "determines well."
             )
-        _, _, why = plain.message.partition("not adequate: ")
-        if why:
-            sentences.append(f"The model without a further lag is not adequate: {why}.")
-        elif not plain.adequate:
-            sentences.append(
-                "The residuals of the fit without lag are coloured: that model only approximates "
-                "the vehicle, and its interval is the robust one."
-            )
+        if plain.verdict != "reliable":
+            sentences.append(f"The fit without a further lag is an indication: {plain.reason}.")
         return sentences
 
 

@@ -204,7 +204,7 @@ def estimate_delay(
     -----
     A ground station sees the sum of all delays on the way round the loop; from its own log,
     it cannot distinguish the part in the command from the part in the measurement. A model that
-    does not explain the recording is returned with ``adequate=False``, not refused. Several
+    does not explain the recording is returned with ``verdict="indication"``, not refused. Several
     recordings are weighted by the inverse of their noise where residuals are white, and by that of
     their excitation where they are not.
 
@@ -227,8 +227,8 @@ def estimate_delay(
     >>> recording = dtm.Recording(time, step, response.outputs)
     >>> known = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.4), sample_time=0.065)
     >>> fit = dtm.estimate_delay(recording, known, free=("delay", "gain"))
-    >>> round(fit.delay, 6), round(fit.gain, 6), fit.adequate
-    (0.4, 0.8, True)
+    >>> round(fit.delay, 6), round(fit.gain, 6), fit.verdict
+    (0.4, 0.8, 'reliable')
 
     With an option of the method:
 

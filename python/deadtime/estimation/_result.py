@@ -16,6 +16,7 @@ from deadtime._base.drawing import Axes, Figure, empty_figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import non_negative, real_array
+from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
@@ -31,6 +32,9 @@ from deadtime.loops import (
     explorer_of,
 )
 from deadtime.recordings import Recording
+
+#: What is before the reasons of an indication in its message, and what begins the advice.
+REASONS, ADVICE = "; indication: ", " (try "
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +104,9 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         Recorded minus simulated output.
     whiteness : Whiteness
         Test of the residuals.
-    adequate : bool
-        Whether the model explains the recording up to white noise. If not, the intervals are
-        the robust ones, and the model only approximates the vehicle.
+    verdict : {"reliable", "indication"}
+        Whether the intervals are claimed to hold, because the model explains the recording; or
+        whether the numbers are an indication, because it only approximates the vehicle.
     message : str
         Description of the fit and remarks on it.
     uncalibrated : str
@@ -128,7 +132,7 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
     recording: Recording
     residuals: Array
     whiteness: Whiteness
-    adequate: bool
+    verdict: Verdict
     message: str
     uncalibrated: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
@@ -236,7 +240,7 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         controller: Controller | None = None,
         ranges: Mapping[str, tuple[float, float]] | None = None,
     ) -> Explorer:
-        """Return a page with the fitted loop, and the interval of its delay if it is adequate.
+        """Return a page with the fitted loop, and the interval of its delay if it is reliable.
 
         Parameters
         ----------
@@ -255,11 +259,12 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         ValueError
             If the explorer has no such loop.
         """
-        known = self.calibrated and self.adequate and "delay" in self.free
+        reliable = self.verdict == "reliable"
+        known = self.calibrated and reliable and "delay" in self.free
         interval = self.ci() if known else None
         loop = self.loop if controller is None else self.loop.replace(controller=controller)
         page = explorer_of(loop.specification, ranges, interval)
-        return page if self.adequate else replace(page, title="A fitted loop, not adequate")
+        return page if reliable else replace(page, title="A fitted loop, an indication")
 
     def profile(self, name: str = "delay", values: ArrayLike | None = None) -> tuple[Array, Array]:
         """Profile likelihood: the increase of the cost when one quantity is held.
@@ -366,7 +371,8 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             "rms": self.rms,
             "white": self.whiteness.white,
             "residual_autocorrelation": self.whiteness.autocorrelation,
-            "adequate": self.adequate,
+            "verdict": self.verdict,
+            "reason": self.reason,
             "message": self.message,
         }
         models = [_plain(run.noise) for run in self.runs if run.noise is not None]
@@ -378,16 +384,69 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             found["no_interval_because"] = self.uncalibrated
         return found | dict(self.details)
 
+    @property
+    def reason(self) -> str:
+        """Why the verdict is not ``"reliable"``; empty where it is."""
+        if self.verdict == "reliable":
+            return ""
+        why = self.message.partition(REASONS)[2].partition(ADVICE)[0]
+        return why or (
+            "the residuals are not white (lag-1 autocorrelation "
+            f"{self.whiteness.autocorrelation:.2f})"
+        )
+
+    @property
+    def description(self) -> str:
+        """The message without what speaks against the model, and without advice."""
+        return self.message.partition(REASONS)[0].partition(ADVICE)[0]
+
+    @property
+    def advice(self) -> str:
+        """What to do next, where the verdict is not ``"reliable"`` and the method knows."""
+        return self.message.partition(ADVICE)[2].removesuffix(")")
+
+    def headline(self) -> str:
+        """The verdict and the delay; why it is not reliable where it is not."""
+        given = "delay" not in self.free
+        if self.verdict != "reliable":
+            how = "as it was given" if given else NOT_CLAIMED
+            return f"{self.verdict}: delay about {rough(self.delay, 's')}, {how}; {self.reason}"
+        if given or not self.calibrated:
+            how = "as it was given" if given else "without an interval"
+            return f"reliable: delay {stated(self.delay, math.nan, 's')}, {how}"
+        error = self.stderr["delay"]
+        ends = between(*self.ci(0.95), error, "s")
+        return f"reliable: delay {stated(self.delay, error, 's')} (95 %: {ends})"
+
+    def doubted(self, why: str) -> DelayEstimate:
+        """The estimate as an indication, for this further reason.
+
+        Parameters
+        ----------
+        why : str
+            The reason, in words that follow "indication: ".
+        """
+        known, begins, advice = self.message.partition(ADVICE)
+        message = f"{known}{'; ' if REASONS in known else REASONS}{why}{begins}{advice}"
+        return replace(self, verdict="indication", message=message)
+
     def summary(self) -> str:
-        """The result as a few lines of text."""
-        lines = [f"{self.method}: {self.message}"]
+        """The answer as a few lines of text, the verdict first."""
+        lines = [self.headline(), f"  {self.method}: {self.description}", *self.numbers()]
+        return "\n".join([*lines, f"next: try {self.advice}"] if self.advice else lines)
+
+    def numbers(self) -> list[str]:
+        """Every fitted quantity, the bound and the residuals, a line each."""
+        lines = []
         if self.others:
             rows = " + ".join(str(len(run.recording)) for run in self.runs)
             lines.append(f"  {len(self.runs)} recordings together, {rows} samples")
         width = max((len(name) for name in self.stderr), default=0) + 1
         for name, stderr in self.stderr.items():
             value, unit = self._value(name), unit_of(name)
-            if self.calibrated:
+            if self.verdict != "reliable":
+                told = claimed(self.verdict, value, stderr, unit)
+            elif self.calibrated:
                 told = f"{stated(value, stderr, unit):<18}"
                 told += f" 95 %: {between(*self.ci(0.95, name), stderr, unit)}"
             else:
@@ -405,10 +464,9 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(
             f"  residuals {self.rms:.4g} rms, {kind} (lag-1 autocorrelation "
-            f"{self.whiteness.autocorrelation:.2f}); model adequate: "
-            f"{'yes' if self.adequate else 'no'}"
+            f"{self.whiteness.autocorrelation:.2f})"
         )
-        return "\n".join(lines)
+        return lines
 
     def plot(self, ax: Sequence[Axes] | None = None) -> list[Axes]:
         """Draw the fit over the data, the residuals, and the profile of the delay.
@@ -444,8 +502,8 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
     def __repr__(self) -> str:
         error = self.stderr["delay"] if self.calibrated and "delay" in self.stderr else math.nan
         return (
-            f"<DelayEstimate {self.method}: delay {stated(self.delay, error, 's')}, "
-            f"adequate: {self.adequate}>"
+            f"<DelayEstimate {self.method}: {self.verdict}, delay "
+            f"{claimed(self.verdict, self.delay, error, 's')}>"
         )
 
 

@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from deadtime._base.digits import between, stated
+from deadtime._base.digits import between, shown
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import Verdict, claimed, verdict_if
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
@@ -49,8 +50,8 @@ class SharedNumber:
         The value of each estimate.
     p_value : float
         Probability of estimates that differ as much, or more, if they share the number.
-    adequate : bool
-        Whether all estimates are adequate and do not contradict one another.
+    verdict : {"reliable", "indication"}
+        Whether all estimates are reliable and do not contradict one another.
     """
 
     name: str
@@ -59,7 +60,7 @@ class SharedNumber:
     level: float
     estimates: tuple[float, ...]
     p_value: float
-    adequate: bool
+    verdict: Verdict
 
     @property
     def agree(self) -> bool:
@@ -73,15 +74,18 @@ class SharedNumber:
         low, high = self.interval
         error = (high - low) / (2.0 * float(special.ndtri(0.5 + 0.5 * self.level)))
         unit = unit_of(self.name)
+        ends = ""
+        if self.verdict == "reliable":
+            ends = f"{100.0 * self.level:g} %: {between(low, high, error, unit)}; "
         text = (
-            f"{self.name} of {len(self.estimates)} estimates: {stated(self.value, error, unit)} "
-            f"({100.0 * self.level:g} %: {between(low, high, error, unit)}; such differences, or "
-            f"larger: p = {self.p_value:.2g})"
+            f"{self.verdict}: {self.name} of {len(self.estimates)} estimates "
+            f"{claimed(self.verdict, self.value, error, unit)} "
+            f"({ends}such differences, or larger: p = {self.p_value:.2g})"
         )
         if not self.agree:
-            each = ", ".join(stated(one, error, unit) for one in self.estimates)
+            each = ", ".join(shown(one, error, unit) for one in self.estimates)
             return f"{text}; they contradict one another: {each}"
-        return text if self.adequate else f"{text}; not adequate, for one of them is not"
+        return text if self.verdict == "reliable" else f"{text}; one of them is an indication"
 
     def to_dict(self) -> dict[str, Any]:
         """The number as plain values for JSON."""
@@ -177,7 +181,9 @@ def shared_number(
         level=level,
         estimates=tuple(values),
         p_value=p_value,
-        adequate=p_value >= SIGNIFICANCE and all(one.adequate for one in estimates),
+        verdict=verdict_if(
+            p_value >= SIGNIFICANCE and all(one.verdict == "reliable" for one in estimates)
+        ),
     )
 
 

@@ -93,7 +93,7 @@ class AdaptiveControl(ScheduledControl):
         self._tell(time)
         known = self._estimator.update(time, output)
         low, high = known.ci
-        choice = self._follower.update(time, low, high, known.known and known.adequate)
+        choice = self._follower.update(time, low, high, known.verdict == "reliable")
         self.choices.append(ChosenSet(time, low, high, choice.number, choice.covered))
         command = super().command(reference, output, rate)
         command *= self._schedule.sets[choice.number].factor

@@ -119,7 +119,7 @@ def fly_axes(
         called once before the design and once after it.
     warn : callable
         Called with a warning before the designed gains are flown, if the fit on which they are
-        based is not adequate.
+        based is an indication.
 
     Returns
     -------

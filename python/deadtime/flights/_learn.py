@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.verdicts import Verdict
 from deadtime.estimation import DelayEstimate, estimate_delay
 from deadtime.flights._plan import FlightPlan
 from deadtime.flights._plants import (
@@ -62,9 +63,9 @@ class Learned:
         return tuple(found)
 
     @property
-    def adequate(self) -> bool:
-        """Whether the fit explains the flights, and their times can be relied on."""
-        return self.fit.adequate and not self.irregular
+    def verdict(self) -> Verdict:
+        """That on the fit, and an indication where the times of the flights are not regular."""
+        return "indication" if self.irregular else self.fit.verdict
 
     @property
     def whole_delay(self) -> float:
@@ -80,20 +81,17 @@ class Learned:
         found = []
         if self.irregular:
             found.append(
-                f"The times of the flights are not reliable ({'; '.join(self.irregular)}), so the "
-                "estimate is not adequate (adequate=False): repeat the experiment on a computer "
-                "with less other work."
+                f"The times of the flights are not regular ({'; '.join(self.irregular)}), so the "
+                "estimate is an indication: repeat the experiment on a computer with less other "
+                "work."
             )
-        if not self.fit.adequate:
-            _, _, reasons = self.fit.message.partition("not adequate: ")
-            why = reasons.rpartition(" (try")[0]
+        if self.fit.verdict != "reliable":
             found.append(
-                "The fit is not adequate (adequate=False): its residuals are more than noise of "
-                "the sensor, for example wind, or the vehicle is no such plant"
-                f"{f' ({why})' if why else ''}. Its intervals are an indication and may be too "
-                "narrow; the gains were designed for them, so their margin is not assured. Fly "
-                "such gains only with space around the vehicle, and repeat the experiment without "
-                "wind."
+                "The fit is an indication: its residuals are more than noise of the sensor, for "
+                f"example wind, or the vehicle is no such plant ({self.fit.reason}). The gains "
+                "were designed for its intervals, which may be too narrow, so their margin is not "
+                "assured. Fly such gains only with space around the vehicle, and repeat the "
+                "experiment without wind."
             )
         return found
 
@@ -147,7 +145,7 @@ def learn(
             objective="settling_time",
             gain_margin=plan.gain_margin,
             amplitude=plan.step,
-            allow_inadequate=True,
+            allow_indication=True,
         )
         for controller in (template, P(1.0))
     )

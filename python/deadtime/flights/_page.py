@@ -63,11 +63,11 @@ def render(
 def _verdict(studies: Sequence[FlightStudy]) -> str:
     """The outcomes; of several axes the warnings are in their sections."""
     if len(studies) == 1:
-        return studies[0].verdict()
+        return studies[0].headline()
     sentences = [study.outcome() for study in studies]
-    doubtful = [study.axis.name for study in studies if not study.learned.adequate]
+    doubtful = [study.axis.name for study in studies if study.learned.verdict != "reliable"]
     if doubtful:
-        sentences.append(f"Not adequate: the estimates of {', '.join(doubtful)}; see below.")
+        sentences.append(f"Indications: the estimates of {', '.join(doubtful)}; see below.")
     return " ".join(sentences)
 
 
@@ -126,7 +126,7 @@ def _fitted(study: FlightStudy) -> str:
         f"{stated(fit.gain or 0.0, fit.stderr['gain'])}); "
         + (
             "they are no more than noise of the sensor and of the air."
-            if fit.adequate
+            if fit.verdict == "reliable"
             else "they are more than noise, so the intervals are an indication only."
         )
     )

@@ -5,7 +5,7 @@ the limits of acceleration and jerk within which the vehicle follows its command
 parameters where it tells them, else with a limit of acceleration that is fitted; and, to the sides
 and behind known limits, two lags and a zero, because the controller of a horizontal velocity
 overshoots. If none explains them, the closest of those with the fewest numbers is taken, and its
-estimate is not adequate.
+estimate is an indication.
 """
 
 from __future__ import annotations
@@ -59,8 +59,7 @@ class TriedPlant:
         """How the fit came out, in thousandths of the unit of the output."""
         if self.fit is None:
             return f"{self.words}: {self.refused}"
-        verdict = "adequate" if self.fit.adequate else "not adequate"
-        return f"{self.words}: {verdict}, residuals of {1e3 * self.fit.rms:.1f} {unit}"
+        return f"{self.words}: {self.fit.verdict}, residuals of {1e3 * self.fit.rms:.1f} {unit}"
 
 
 def candidates(axis: Axis, shaping: Shaping | None) -> Iterator[tuple[str, Plant, tuple[str, ...]]]:
@@ -135,12 +134,12 @@ def fit_by_evidence(
             continue
         fit = fit.with_error_beside(left_open)
         tried.append(TriedPlant(words, fit))
-        if fit.adequate:
+        if fit.verdict == "reliable":
             break
     found = [one.fit for one in tried if one.fit is not None]
     if not found:
         raise NotIdentifiableError(tried[0].refused)
-    if found[-1].adequate:
+    if found[-1].verdict == "reliable":
         return found[-1], tuple(tried)
     # More numbers leave smaller residuals in any case.
     fewest = min(len(fit.free) for fit in found)

@@ -112,7 +112,7 @@ def fly_and_report(
     >>> from deadtime.flights import FlightPlan, FlownVehicle, fly_and_report
     >>> found = fly_and_report(FlownVehicle.emulated(), [FlightPlan()], Path("flight"))
     ... # doctest: +SKIP
-    >>> print(found.studies[0].verdict(), found.page)  # doctest: +SKIP
+    >>> print(found.studies[0].headline(), found.page)  # doctest: +SKIP
     """
     check_pages()
     if any(folder.glob("flight-*.csv")):

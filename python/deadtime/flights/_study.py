@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from deadtime._base.digits import between, stated
+from deadtime._base.digits import between
+from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed
 from deadtime.estimation import DelayEstimate
 from deadtime.flights._learn import Learned
 from deadtime.flights._plan import FlightPlan
@@ -65,33 +66,43 @@ class FlightStudy:
         """All flights, in order of time."""
         return (*self.learned.flights, *self.checked)
 
-    def verdict(self) -> str:
-        """The outcome in a few sentences, with the warnings."""
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the intervals of the estimate are claimed to hold: that of `learned`."""
+        return self.learned.verdict
+
+    def headline(self) -> str:
+        """The outcome in a few sentences, the verdict first, with the warnings."""
         return " ".join([self.outcome(), *self.learned.warnings()])
 
     def outcome(self) -> str:
-        """The outcome in a few sentences."""
+        """The outcome in a few sentences, the verdict first."""
         fit = self.learned.fit
-        ends = fit.ci(0.95, "delay+lag")
-        whole = fit.stderr["delay+lag"]
-        parts = [f"a delay of {stated(fit.delay, fit.stderr['delay'], 's')}"]
+
+        def said(name: str, unit: str = "s") -> str:
+            return claimed(self.verdict, fit._value(name), fit.stderr[name], unit)
+
+        ends = NOT_CLAIMED
+        if self.verdict == "reliable":
+            low, high = fit.ci(0.95, "delay+lag")
+            ends = f"{between(low, high, fit.stderr['delay+lag'], 's')} with 95 % confidence"
+        parts = [f"a dead time of {said('delay')}"]
         if "lag" in fit.stderr:
-            parts.append(f"a lag of {stated(fit.lag or 0.0, fit.stderr['lag'], 's')}")
+            parts.append(f"a lag of {said('lag')}")
         beside = ""
         if isinstance(fit.loop.plant, RateLimited):
             beside = " beside the limits within which the vehicle follows a command"
             if slow := lag_of_limits(fit):
                 beside += f", which are a further lag of {slow:g} s for small ones"
         sentences = [
-            f"The delay of the loop on {self.axis.name}, lag included, is "
-            f"{stated(fit.delay_plus_lag, whole, 's')}, {between(*ends, whole, 's')} with 95 % "
-            f"confidence{beside}: {' and '.join(parts)}, at a gain of "
-            f"{stated(fit.gain or 0.0, fit.stderr['gain'])}."
+            f"{self.verdict.capitalize()}: the delay of the loop on {self.axis.name}, lag "
+            f"included, is {said('delay+lag')}, {ends}{beside}: {' and '.join(parts)}, at a gain "
+            f"of {said('gain', '')}."
         ]
         split = self.learned.split
         if split is not None:
-            link = stated(split.transport.delay, split.transport.stderr["delay"], "s")
-            own = stated(split.vehicle_delay, split.vehicle.stderr[split.late], "s")
+            link = _claimed_part(split.transport, "delay")
+            own = _claimed_part(split.vehicle, split.late)
             sentences.append(
                 f"According to the vehicle's reports, {link} of it is the link and {own} the "
                 "vehicle."
@@ -140,8 +151,8 @@ class FlightStudy:
         learned = self.learned
         split, small = learned.split, self.axis.thousandth
         return {
-            "verdict": self.verdict(),
-            "adequate": learned.adequate,
+            "verdict": self.verdict,
+            "headline": self.headline(),
             "irregular": list(learned.irregular),
             "plants": [one.line(small) for one in learned.tried],
             "fit": learned.fit.to_dict(),
@@ -174,8 +185,14 @@ class FlightStudy:
 
 
 def _part(fit: DelayEstimate, name: str, words: str) -> tuple[str, str, str]:
-    value, error = fit._value(name), fit.stderr[name]
-    return words, stated(value, error, "s"), between(*fit.ci(0.95, name), error, "s")
+    ends = NOT_CLAIMED
+    if fit.verdict == "reliable":
+        ends = between(*fit.ci(0.95, name), fit.stderr[name], "s")
+    return words, _claimed_part(fit, name), ends
+
+
+def _claimed_part(fit: DelayEstimate, name: str) -> str:
+    return claimed(fit.verdict, fit._value(name), fit.stderr[name], "s")
 
 
 def _did(flight: FlownSteps) -> str:

@@ -132,7 +132,7 @@ class InternetRun:
         if fit is None:
             return "refused"
         words = stated(1e3 * fit.delay, 1e3 * fit.stderr.get("delay", math.nan))
-        return words if fit.adequate and "±" in words else in_ms(fit.delay)
+        return words if fit.verdict == "reliable" and "±" in words else in_ms(fit.delay)
 
     def budget(self) -> dict[str, float]:
         """The parts of the mean age, s.

@@ -27,7 +27,7 @@ def render(study: Study) -> str:
         "reports/page.html",
         title=f"The delay in {study.recording.source or 'a recorded loop'}",
         described=_described(study),
-        verdict=study.verdict(),
+        verdict=study.headline(),
         heads=COLUMNS,
         rows=rows,
         kinds=kinds,

@@ -8,6 +8,7 @@ import numpy as np
 
 from deadtime._base.progress import Stages, stage_report
 from deadtime._base.validation import OpenRange
+from deadtime._base.verdicts import NOT_CLAIMED, Verdict, rough
 from deadtime.estimation import Comparison, DelayEstimate, compare_methods
 from deadtime.experiments import Experiment, Noise
 from deadtime.loops import PAPER_FILTER, PV, Controller, ControlLoop, Integrator, P, kit_plant
@@ -137,8 +138,13 @@ class Study:
         """Proportional gain with a gain margin of 2."""
         return SAFE_SHARE * self.held_limit
 
-    def verdict(self) -> str:
-        """The outcome in a few sentences."""
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the interval of the delay is claimed to hold: that of `fit`."""
+        return self.fit.verdict
+
+    def headline(self) -> str:
+        """The outcome in a few sentences, the verdict first."""
         fit = self.fit
         name = "delay+lag" if "lag" in fit.free else "delay"
         late = fit.delay_plus_lag if "lag" in fit.free else fit.delay
@@ -146,8 +152,11 @@ class Study:
         parts = " (delay and lag together)" if "lag" in fit.free else ""
         gains = ", ".join(f"{key} = {value:.3g}" for key, value in self.designed.gains.items())
         sentences = [
-            f"The delay of the loop is {late:.2f} s{parts}, between {low:.3f} and {high:.3f} s "
-            "with 95 % confidence.",
+            f"Reliable: the delay of the loop is {late:.2f} s{parts}, between {low:.3f} and "
+            f"{high:.3f} s with 95 % confidence."
+            if self.verdict == "reliable"
+            else f"Indication: the delay of the loop is about {rough(late, 's')}{parts}, "
+            f"{NOT_CLAIMED}; {fit.reason}.",
             f"Under proportional control Kp above {self.safe_gain():.2f} is unsafe (less than a "
             f"factor of 2 from instability at {self.held_limit:.2f}"
             + (

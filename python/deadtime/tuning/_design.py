@@ -31,7 +31,7 @@ def design(
     shape: Sequence[int] | None = None,
     amplitude: float = 1.0,
     level: float = 0.95,
-    allow_inadequate: bool = False,
+    allow_indication: bool = False,
     threads: int | None = None,
 ) -> Design:
     """Find the gains that are best in the worst case, within margins.
@@ -76,8 +76,8 @@ def design(
     level : float
         Probability of the region of an estimate. The true loop has the margins of the design at
         least as probably, where the model of the estimate is right.
-    allow_inadequate : bool
-        Design also for an estimate whose model is not adequate. Its region has no known
+    allow_indication : bool
+        Design also for an estimate that is an indication. Its region has no known
         probability, so neither have the margins.
     threads : int, optional
         Number of threads; all cores if not given.
@@ -91,7 +91,7 @@ def design(
     ValueError
         When the delay is not known, no gains in the ranges are stable, or none of them meet the
         margins; the message says what was searched, or which margins are possible. When an
-        estimate is not adequate, or has no intervals.
+        estimate is an indication, or has no intervals.
     TypeError
         When `loop` is neither a `ControlLoop` nor a plant, or `fixed` or `ranges` no mapping.
 
@@ -123,7 +123,7 @@ def design(
     goal = objective_named(objective)
     required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)
     problem = pose(
-        loop, template, delay, gain, fixed, ranges, amplitude, threads, level, allow_inadequate
+        loop, template, delay, gain, fixed, ranges, amplitude, threads, level, allow_indication
     )
     if filter != "auto":
         return made(problem, goal, required, shape)

@@ -78,7 +78,7 @@ def design_filter(
     shape: Sequence[int] | None = None,
     amplitude: float = 1.0,
     level: float = 0.95,
-    allow_inadequate: bool = False,
+    allow_indication: bool = False,
     threads: int | None = None,
 ) -> FilterChoice:
     """Choose the corner of the derivative's filter, and the gains with it.
@@ -105,7 +105,7 @@ def design_filter(
         times the fastest corner.
     delay, gain, objective, fixed, gain_margin, phase_margin, delay_margin, ranges, shape
         As in `design`.
-    amplitude, level, allow_inadequate, threads
+    amplitude, level, allow_indication, threads
         As in `design`.
 
     Returns
@@ -138,7 +138,7 @@ def design_filter(
         amplitude,
         threads,
         level,
-        allow_inadequate,
+        allow_indication,
     )
     goal = objective_named(objective)
     required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)

@@ -119,7 +119,7 @@ def pose(
     amplitude: float,
     threads: int | None,
     level: float = 0.95,
-    allow_inadequate: bool = False,
+    allow_indication: bool = False,
 ) -> Problem:
     """Check these arguments of `design`, and state its problem."""
     region = None
@@ -129,7 +129,7 @@ def pose(
                 "delay and gain are in the region of the estimate: leave delay= and gain= out, or "
                 "give the loop of the estimate, fit.loop"
             )
-        region = region_of(loop, level, allow_inadequate)
+        region = region_of(loop, level, allow_indication)
         loop = loop.loop
     if not isinstance(loop, ControlLoop):
         loop, delay = _around(loop, template, delay)

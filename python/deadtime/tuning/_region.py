@@ -25,6 +25,7 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import Range
+from deadtime._base.verdicts import Verdict
 from deadtime.estimation import DelayEstimate
 
 #: Numbers of the plant that a design can take as not known.
@@ -47,8 +48,8 @@ class ConfidenceRegion(ReadOnlyArrays):
     ----------
     level : float
         Probability that it holds the true numbers, if the model of the estimate is right.
-    adequate : bool
-        Whether the model of the estimate is adequate; if not, the probability is not known.
+    verdict : {"reliable", "indication"}
+        That on the estimate: of an indication the probability is not known.
     estimate : dict of str to float
         The centre: the estimated numbers.
     extremes, points : tuple of dict of str to float
@@ -56,7 +57,7 @@ class ConfidenceRegion(ReadOnlyArrays):
     """
 
     level: float
-    adequate: bool
+    verdict: Verdict
     estimate: dict[str, float]
     extremes: tuple[dict[str, float], ...]
     points: tuple[dict[str, float], ...]
@@ -70,17 +71,17 @@ class ConfidenceRegion(ReadOnlyArrays):
         }
 
 
-def region_of(fit: DelayEstimate, level: float, allow_inadequate: bool) -> ConfidenceRegion:
+def region_of(fit: DelayEstimate, level: float, allow_indication: bool) -> ConfidenceRegion:
     """The joint region of an estimate, refused where its level would say nothing."""
     from scipy import special
 
     if not fit.calibrated:
         raise ValueError(f"the estimate has no region: {fit.uncalibrated}")
-    if not fit.adequate and not allow_inadequate:
+    if fit.verdict != "reliable" and not allow_indication:
         raise ValueError(
-            "the model of the estimate is not adequate, so that the margins of a design on it are "
-            f"not known ({fit.message}): fit a model that is adequate, or take "
-            "allow_inadequate=True for gains without known margins"
+            "the estimate is an indication, so that the margins of a design on it are not known "
+            f"({fit.reason}): fit a model that is reliable, or take allow_indication=True for "
+            "gains without known margins"
         )
     names = [name for name in fit.free if name in NUMBERS]
     known = {name: fit.loop.parameters[name] for name in ("delay", *names)}
@@ -102,7 +103,7 @@ def region_of(fit: DelayEstimate, level: float, allow_inadequate: bool) -> Confi
     around = _directions(len(names)) @ spread.T / _INSIDE[len(names)]
     region = ConfidenceRegion(
         level=level,
-        adequate=fit.adequate,
+        verdict=fit.verdict,
         estimate=known,
         extremes=tuple(scenario(sign * radius * one) for one in tangents for sign in (-1.0, 1.0)),
         points=(known, *(scenario(radius * one) for one in around)),

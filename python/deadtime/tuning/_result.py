@@ -107,7 +107,7 @@ class Design(ReadOnlyArrays, Pictured):
         Where the filter's corner was chosen, how.
     region : ConfidenceRegion or None
         The region of the estimate it was designed for. The margins are the least over it, so that
-        the true loop has them with the probability `region.level` where `region.adequate`.
+        the true loop has them with the probability `region.level` where its verdict is reliable.
     """
 
     loop: ControlLoop
@@ -228,11 +228,11 @@ def _in_words(region: ConfidenceRegion) -> str:
 
 def _probability(region: ConfidenceRegion) -> str:
     """With which probability the true loop has the least margins."""
-    if region.adequate:
+    if region.verdict == "reliable":
         return f"the true loop has these margins with a probability of {100.0 * region.level:g} %"
     return (
-        "the model of the estimate is not adequate: with which probability the true loop has these "
-        "margins is not known"
+        "the estimate is an indication: with which probability the true loop has these margins is "
+        "not known"
     )
 
 

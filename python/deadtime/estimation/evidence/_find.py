@@ -10,9 +10,9 @@ import numpy as np
 
 import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
+from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
-from deadtime.estimation.evidence._numbers import Verdict
 from deadtime.estimation.evidence._question import Between, Question, question_of
 from deadtime.estimation.evidence._words import CLEAR, reason_of
 from deadtime.loops import Controller

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +13,11 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import one_dimensional
+from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import PlantCandidate
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording
-
-#: What an answer claims.
-Verdict: TypeAlias = Literal["reliable", "indication", "none"]
 
 
 @dataclass(frozen=True, eq=False)

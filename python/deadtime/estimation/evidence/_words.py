@@ -10,6 +10,7 @@ from typing import Any
 from deadtime._base.digits import between, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange
+from deadtime._base.verdicts import rough
 from deadtime.estimation.evidence._numbers import FoundPlant
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller
@@ -37,9 +38,6 @@ NUMBERS = (
     ("delay_at_crossover", "equivalent delay there", "s"),
     ("gain_at_crossover", "gain there", ""),
 )
-
-#: Numbers that are shown rounded where no interval says how exact they are: an error of this share.
-ROUGH = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def headline_of(fit: FoundPlant) -> str:
         return f"none: {fit.reason}"
     plant = fit.best.in_words()
     if fit.verdict == "indication":
-        return f"indication: dead time about {_rough(fit.delay, 's')}, {plant}; {fit.reason}"
+        return f"indication: dead time about {rough(fit.delay, 's')}, {plant}; {fit.reason}"
     ends = _ends(fit.ci(), "s")
     return f"reliable: dead time {_value(fit, 'delay', 's')} (95 %: {ends}), {plant}"
 
@@ -141,7 +139,7 @@ def _numbers(fit: FoundPlant) -> list[str]:
             ends = _ends(fit.intervals[name], unit)
             lines.append(f"{words:<24} {_value(fit, name, unit):<14} 95 %: {ends}")
         else:
-            lines.append(f"{words:<24} about {_rough(value, unit)}")
+            lines.append(f"{words:<24} about {rough(value, unit)}")
     if math.isfinite(fit.crossover_in_loop):
         lines.append(
             f"with its controller the loop crosses over at {fit.crossover_in_loop:.3g} rad/s"
@@ -162,7 +160,7 @@ def _seen(fit: FoundPlant) -> list[str]:
     view = fit.at(fit.excited)
     return [
         f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 %), "
-        f"or that and half periods of {_rough(math.pi / omega, 's')}"
+        f"or that and half periods of {rough(math.pi / omega, 's')}"
         for omega, gain, delay in zip(
             fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
         )
@@ -262,7 +260,3 @@ def _value(fit: FoundPlant, name: str, unit: str) -> str:
 def _ends(ends: Iterable[float], unit: str = "") -> str:
     low, high = map(float, ends)
     return between(low, high, 0.25 * (high - low), unit)
-
-
-def _rough(value: float, unit: str) -> str:
-    return shown(value, ROUGH * abs(value), unit)

@@ -19,7 +19,8 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
+from deadtime._base.verdicts import Verdict, verdict_if
+from deadtime.estimation._result import ADVICE, REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import (
     ROUNDING,
     check_distinguishable,
@@ -46,7 +47,7 @@ from deadtime.recordings import Recording
 FEW = 12
 
 #: What a message says of residuals that are not white.
-COLOURED = "; the residuals are not white"
+COLOURED = f"{REASONS}the residuals are not white"
 
 #: A delay or lag is set to zero where this raises the cost by less than this share.
 VANISHING = 1e-6
@@ -141,7 +142,7 @@ def concluded(
     errors, plain = standard_errors(names, spread), standard_errors(names, white)
     freedom = residuals.size - len(loose)
     reason = _why_profile(values, residuals.size, count)
-    adequate = whiteness.white or exact
+    reliable = whiteness.white or exact
     runs = tuple(
         FittedRun(part.recording, _with(part.loop, values), piece / weight)
         for part, piece, weight in zip(fitted, pieces, model.weights, strict=True)
@@ -156,8 +157,8 @@ def concluded(
         recording=runs[0].recording,
         residuals=runs[0].residuals,
         whiteness=whiteness,
-        adequate=adequate,
-        message=_message(message, held, reason, adequate, advice(names, runs[0].loop)),
+        verdict=verdict_if(reliable),
+        message=_message(message, held, reason, reliable, advice(names, runs[0].loop)),
         details={**details, **{name: values[name] for name in ("start",) if name in values}},
         others=runs[1:],
         _profile=Profile(
@@ -218,14 +219,14 @@ def _widening(
 
 
 def advice(names: Sequence[str], loop: ControlLoop) -> str:
-    """Advice for a model that is not adequate."""
+    """Advice for an estimate that is an indication."""
     slow = [name for name in ("lag", "time_constant") if name in loop.parameters]
     if slow and slow[0] not in names:
-        return f" (try free=('delay', 'gain', '{slow[0]}'))"
-    return " (try a window around one step, a smaller step, or another plant)"
+        return f"{ADVICE}free=('delay', 'gain', '{slow[0]}'))"
+    return f"{ADVICE}a window around one step, a smaller step, or another plant)"
 
 
-def _message(done: str, held: list[str], reason: str, adequate: bool, advice: str) -> str:
+def _message(done: str, held: list[str], reason: str, reliable: bool, advice: str) -> str:
     text = done
     if held:
         text += (
@@ -234,7 +235,7 @@ def _message(done: str, held: list[str], reason: str, adequate: bool, advice: st
         )
     if reason:
         text += f"; {reason}, so intervals are those of the profile likelihood"
-    if not adequate:
+    if not reliable:
         text += (
             f"{COLOURED}, so the model only approximates the vehicle and "
             f"the intervals are robust ones{advice}"
@@ -304,19 +305,19 @@ def estimate_with_residuals(
     uncalibrated: str,
     details: Mapping[str, Any],
     crb: CramerRaoBound | None = None,
-    adequate: bool | None = None,
+    verdict: Verdict | None = None,
     profile: Profile | None = None,
 ) -> DelayEstimate:
     """The result for these `values` of a method that has its own residuals.
 
-    By default it is adequate where they are white or rounding.
+    By default it is reliable where they are white or rounding.
     """
     names = tuple(values)
     if cov is None:
         cov = np.full((len(names), len(names)), np.nan)
     whiteness = whiteness_of(residuals, len(names))
-    if adequate is None:
-        adequate = whiteness.white or is_rounding(residuals, recording)
+    if verdict is None:
+        verdict = verdict_if(whiteness.white or is_rounding(residuals, recording))
     return DelayEstimate(
         method=method,
         loop=loop.replace(**values),
@@ -327,7 +328,7 @@ def estimate_with_residuals(
         recording=recording,
         residuals=residuals,
         whiteness=whiteness,
-        adequate=adequate,
+        verdict=verdict,
         message=message,
         uncalibrated=uncalibrated,
         details=details,

@@ -10,8 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime._base.verdicts import verdict_if
 from deadtime.estimation._native import PlantNumbers, RowNoise
-from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
+from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
 from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._free_numbers import NumbersProfile
@@ -156,7 +157,7 @@ def concluded_flight(
         recording=fitted[0].recording,
         residuals=fitted[0].residuals,
         whiteness=adequacy.whiteness,
-        adequate=not adequacy.reasons,
+        verdict=verdict_if(not adequacy.reasons),
         message=_message(
             message, names, held, noise[0], left_out, scatter, adequacy, runs[0], unseen
         ),
@@ -238,8 +239,8 @@ def without_the_plant(plain: DelayEstimate, adequacy: Adequacy) -> DelayEstimate
     squares weighs all alike, and finds the plant that comes closest to the recording.
     """
     text = plain.message.split(COLOURED)[0]
-    text += f"; not adequate: {'; '.join(adequacy.reasons)}"
-    return replace(plain, adequate=False, message=text + advice(plain.free, plain.loop))
+    text += f"{REASONS}{'; '.join(adequacy.reasons)}"
+    return replace(plain, verdict="indication", message=text + advice(plain.free, plain.loop))
 
 
 def _message(
@@ -261,5 +262,5 @@ def _message(
     if held:
         text += f"; the {' and '.join(held)} came out at zero, its bound"
     if adequacy.reasons:
-        return text + f"; not adequate: {'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
+        return f"{text}{REASONS}{'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
     return f"{text}; {unseen_in_words(unseen)} have been seen"

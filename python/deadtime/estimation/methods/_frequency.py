@@ -29,7 +29,8 @@ import numpy as np
 from deadtime._base.arrays import Array, Mask
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
-from deadtime.estimation._result import DelayEstimate
+from deadtime._base.verdicts import verdict_if
+from deadtime.estimation._result import ADVICE, REASONS, DelayEstimate
 from deadtime.estimation.data._checks import (
     ROUNDING,
     check_distinguishable,
@@ -128,7 +129,7 @@ class Frequency(Method):
         residuals = _residuals(data, response, found)
         whiteness = whiteness_of(residuals, len(names))
         white = p_value > SIGNIFICANCE if lines.known_noise else whiteness.white
-        adequate = white or is_rounding(residuals, data)
+        reliable = white or is_rounding(residuals, data)
         return estimate_with_residuals(
             "frequency",
             loop,
@@ -136,8 +137,8 @@ class Frequency(Method):
             values,
             cov,
             residuals,
-            adequate=adequate,
-            message=_message(names, lines, source, adequate),
+            verdict=verdict_if(reliable),
+            message=_message(names, lines, source, reliable),
             uncalibrated=_why_uncalibrated(loop),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
             profile=Profile(
@@ -248,7 +249,7 @@ def _why_uncalibrated(loop: ControlLoop) -> str:
     )
 
 
-def _message(names: tuple[str, ...], lines: Lines, source: str, adequate: bool) -> str:
+def _message(names: tuple[str, ...], lines: Lines, source: str, reliable: bool) -> str:
     text = f"maximum likelihood over {', '.join(names)} at the lines {lines.describe}"
     if source != "logged":
         text += f", the command {source}"
@@ -256,8 +257,10 @@ def _message(names: tuple[str, ...], lines: Lines, source: str, adequate: bool) 
         text += (
             "; delay and lag have similar effects, so intervals are those of the profile likelihood"
         )
-    if not adequate:
-        text += "; the residuals exceed the noise, so the model only approximates the vehicle"
+    if not reliable:
+        text += (
+            f"{REASONS}the residuals exceed the noise, so the model only approximates the vehicle"
+        )
         if "lag" not in names:
-            text += " (try free=('delay', 'gain', 'lag'))"
+            text += f"{ADVICE}free=('delay', 'gain', 'lag'))"
     return text

@@ -42,7 +42,7 @@ from deadtime.estimation.data._simulated import SimulatedRecording, shortest_tim
 from deadtime.estimation.fit._directions import Directions, all_directions
 from deadtime.estimation.fit._least_squares import Ends, minimise
 from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
-from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
+from deadtime.estimation.methods._conclusion import COLOURED, estimate_with_residuals, is_rounding
 from deadtime.estimation.methods._method import Method, Run, check_initial_output
 from deadtime.estimation.methods._waveform import SimulatedModel
 from deadtime.experiments import FlightNoise
@@ -112,11 +112,11 @@ class Grid(Method):
         loose = [i for i, name in enumerate(problem.labels) if name != "lag" or not at_zero[i]]
         check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
         whiteness = whiteness_of(residuals, len(names))
-        adequate = whiteness.white or is_rounding(residuals, data)
+        reliable = whiteness.white or is_rounding(residuals, data)
         size, count = len(problem.labels), len(names)
         white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
         spread = white
-        if not adequate:
+        if not reliable:
             spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
         errors = standard_errors(names, spread)
         values = problem.values(point)
@@ -131,7 +131,7 @@ class Grid(Method):
             spread[:count, :count],
             residuals,
             crb=CramerRaoBound(problem.labels, FlightNoise(noise), standard_errors(names, white)),
-            message=_message(names, grid, adequate),
+            message=_message(names, grid, reliable),
             uncalibrated=(
                 "the grid method fits the response to the reference, without the noise that the "
                 "controller acts on: the curvature of the cost gives "
@@ -282,14 +282,14 @@ class _Problem(SimulatedModel):
         return minimise(self, point, space, TOLERANCE, EVALUATIONS).point
 
 
-def _message(names: tuple[str, ...], grid: Array, adequate: bool) -> str:
+def _message(names: tuple[str, ...], grid: Array, reliable: bool) -> str:
     others = [name for name in names if name != "delay"]
     text = f"least cost over {grid.size} delays from {grid[0]:.3g} to {grid[-1]:.3g} s"
     if others:
         text += f", {' and '.join(others)} at their best values for each"
-    if not adequate:
+    if not reliable:
         text += (
-            "; the residuals are not white, so the loop only approximates the vehicle and "
+            f"{COLOURED}, so the loop only approximates the vehicle and "
             "the standard errors are robust ones"
         )
     return text

@@ -303,7 +303,7 @@ def _estimated(
         adequacy,
     )
     intervals_tell = common == names and type(profile) is LikelihoodProfile and not is_long(rows)
-    if intervals_tell and found.adequate and rounding_is_all(profile.fit):
+    if intervals_tell and found.verdict == "reliable" and rounding_is_all(profile.fit):
         repeated = [np.empty(0, int) if one is None else one.repeated for one in checks]
         return read_as_intervals(found, models, rows, repeated)
     return found

@@ -110,7 +110,7 @@ class Waveform(Method):
             innovations = self._by_innovations(runs, free)
         except NotIdentifiableError:  # the command cannot be computed, or does not determine `free`
             return simulated
-        if simulated.adequate and not innovations.adequate:
+        if simulated.verdict == "reliable" and innovations.verdict != "reliable":
             return simulated
         likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
         return simulated if likelier > LIKELIHOOD_RATIO else innovations

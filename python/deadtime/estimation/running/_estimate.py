@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
-from deadtime._base.digits import between, stated
+from deadtime._base.digits import between
+from deadtime._base.verdicts import Verdict, claimed, verdict_if
 
 #: From how many deviations the product of neighbouring innovations shows that they are not white.
 #: The test is repeated all the time, so that its level is about one in a hundred thousand.
@@ -85,10 +86,11 @@ class OnlineEstimate:
         Whether a change of the delay, a jump and not a drift, was found at this row.
     known : bool
         Whether there is an estimate: the interval is narrower than half the range of delays.
-    adequate : bool
-        Whether the rows of the last half minute agree with the model.
+    verdict : {"reliable", "indication", "none"}
+        Whether the rows of the last half minute agree with the model; ``"none"`` while there is no
+        estimate.
     message : str
-        Why there is no estimate yet, or why it is not adequate.
+        Why there is no estimate yet, or why it is not reliable.
     """
 
     time: float
@@ -103,7 +105,7 @@ class OnlineEstimate:
     informed: bool
     changed: bool
     known: bool
-    adequate: bool
+    verdict: Verdict
     message: str
 
     def to_dict(self) -> dict[str, Any]:
@@ -114,8 +116,11 @@ class OnlineEstimate:
         }
 
     def __str__(self) -> str:
-        told = f"{self.time:.2f} s: delay {stated(self.delay, self.stderr, 's')}"
-        told += f", 95 %: {between(*self.ci, self.stderr, 's')}"
+        told = f"{self.time:.2f} s: {self.verdict}"
+        if self.known:
+            told += f": delay {claimed(self.verdict, self.delay, self.stderr, 's')}"
+        if self.verdict == "reliable":
+            told += f", 95 %: {between(*self.ci, self.stderr, 's')}"
         return f"{told}; {self.message}" if self.message else told
 
 
@@ -144,7 +149,7 @@ def estimate_of(
     numbers = BankNumbers(*values)
     known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
     against = [*doubts, *reasons_against(numbers, white, range_)]
-    message = "; ".join(f"not adequate: {reason}" for reason in against)
+    message = "; ".join(f"not reliable: {reason}" for reason in against)
     if not known:
         waits = (
             "the command has not yet changed enough"
@@ -165,7 +170,7 @@ def estimate_of(
         informed=numbers.gate > 0.5,
         changed=bool(numbers.changed),
         known=known,
-        adequate=not against,
+        verdict=verdict_if(not against) if known else "none",
         message=message,
     )
 
@@ -193,6 +198,6 @@ def not_yet(
         informed=False,
         changed=False,
         known=False,
-        adequate=True,
+        verdict="none",
         message=f"no estimate yet: {reason}",
     )

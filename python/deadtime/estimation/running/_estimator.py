@@ -11,6 +11,7 @@ import numpy as np
 
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, non_negative, positive
+from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import OnlineBank
 from deadtime.estimation._result import DelayEstimate
@@ -133,7 +134,7 @@ class OnlineEstimator:
     >>> estimator = OnlineEstimator(loop, noise=0.005)
     >>> for row in zip(flight.time, flight.output, flight.command):
     ...     now = estimator.update(*row)
-    >>> now.adequate, bool(now.ci[0] < 0.3 < now.ci[1])
+    >>> now.verdict, bool(now.ci[0] < 0.3 < now.ci[1])
     (True, True)
     """
 
@@ -226,7 +227,7 @@ class OnlineEstimator:
             ]
             found._settings = found._settings._replace(layers=layers)
         found._settings = found._settings._replace(freedom=_freedom_of(fit))
-        if not fit.adequate:
+        if fit.verdict != "reliable":
             found._doubts = (f"the fit it began with was not ({fit.message})",)
         found._begin(fitted if noise is None else _flight_noise(noise))
         return found
@@ -317,9 +318,10 @@ class OnlineEstimator:
         if len(self._changes) < RESTLESS:
             return found
         count = len(self._changes)
-        reason = f"not adequate: {count} changes in a minute: the plant lacks something"
+        reason = f"not reliable: {count} changes in a minute: the plant lacks something"
         message = f"{found.message}; {reason}" if found.message else reason
-        return replace(found, adequate=False, message=message)
+        verdict: Verdict = "indication" if found.known else "none"
+        return replace(found, verdict=verdict, message=message)
 
     def _begin(self, noise: FlightNoise) -> None:
         self._bank = OnlineBank(self._settings.under(noise))
@@ -348,7 +350,7 @@ class OnlineEstimator:
                 if not settings.at_rest:
                     self._forget(time - LAST)
             else:
-                if fit.adequate or time - self._rows[0][0] >= LAST:
+                if fit.verdict == "reliable" or time - self._rows[0][0] >= LAST:
                     return self._replay(fit)
                 self._reason = fit.message
         return not_yet(time, self.delays, lags, settings.gain, self._reason)
@@ -376,7 +378,7 @@ class OnlineEstimator:
         """Begin with the noise of a fit, and give the bank what was kept."""
         noise = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
         self._settings = self._settings._replace(freedom=_freedom_of(fit))
-        if not fit.adequate:
+        if fit.verdict != "reliable":
             self._doubts = (f"the first {LAST:.0f} s did not fit ({fit.message})",)
         self._begin(noise)
         assert self._bank is not None

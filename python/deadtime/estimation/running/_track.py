@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
-from deadtime._base.digits import between, stated
+from deadtime._base.digits import between
 from deadtime._base.drawing import Axes, new_figure
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.verdicts import claimed
 from deadtime.estimation.running._estimate import OnlineEstimate
 from deadtime.estimation.running._estimator import OnlineEstimator
 from deadtime.loops import ControlLoop
@@ -21,7 +22,7 @@ from deadtime.recordings import Recording
 
 #: What a track takes over from its estimates.
 NUMBERS = ("time", "delay", "lag", "delay_plus_lag", "gain")
-MARKS = ("known", "informed", "changed", "adequate")
+MARKS = ("known", "informed", "changed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +39,10 @@ class DelayTrack(ReadOnlyArrays):
         Posterior means, s.
     gain : ndarray, shape (n,)
         Posterior mean.
-    known, informed, changed, adequate : ndarray of bool, shape (n,)
+    known, informed, changed : ndarray of bool, shape (n,)
         As of `OnlineEstimate`.
+    reliable : ndarray of bool, shape (n,)
+        Whether the verdict is ``"reliable"``.
     last : OnlineEstimate
         That of the last row.
     """
@@ -54,7 +57,7 @@ class DelayTrack(ReadOnlyArrays):
     known: Mask
     informed: Mask
     changed: Mask
-    adequate: Mask
+    reliable: Mask
     last: OnlineEstimate
 
     @classmethod
@@ -84,6 +87,7 @@ class DelayTrack(ReadOnlyArrays):
             for names, kind in ((NUMBERS, float), (MARKS, bool))
             for name in names
         }
+        columns["reliable"] = np.array([one.verdict == "reliable" for one in estimates])
         return cls(low=ends[:, 0], high=ends[:, 1], last=estimates[-1], **columns)
 
     def __len__(self) -> int:
@@ -97,20 +101,21 @@ class DelayTrack(ReadOnlyArrays):
     def summary(self) -> str:
         """The track as a few lines of text."""
         last, known = self.last, self.known
-        lines = [f"delay over {self.time[-1] - self.time[0]:.1f} s, {len(self)} rows"]
+        span = self.time[-1] - self.time[0]
+        lines = [f"{last.verdict} at the end; delay over {span:.1f} s, {len(self)} rows"]
         if np.any(known):
             first = float(self.time[known][0])
             lines.append(f"  known from {first:.2f} s on, in {np.mean(known):.0%} of the rows")
             low, high = float(np.min(self.delay[known])), float(np.max(self.delay[known]))
             lines.append(f"  between {low:.3f} and {high:.3f} s")
-        lines.append(
-            f"  at the end {stated(last.delay, last.stderr, 's')}, "
-            f"interval {between(*last.ci, last.stderr, 's')}"
-        )
+        if last.known:
+            value = claimed(last.verdict, last.delay, last.stderr, "s")
+            ends = f", interval {between(*last.ci, last.stderr, 's')}"
+            lines.append(f"  at the end {value}{ends if last.verdict == 'reliable' else ''}")
         found = ", ".join(f"{time:.2f} s" for time in self.changes)
         lines.append(f"  changes found: {found or 'none'}")
         lines.append(f"  informed in {np.mean(self.informed):.0%} of the rows")
-        lines.append(f"  model adequate in {np.mean(self.adequate):.0%} of the rows")
+        lines.append(f"  reliable in {np.mean(self.reliable):.0%} of the rows")
         if last.message:
             lines.append(f"  {last.message}")
         return "\n".join(lines)
@@ -138,9 +143,9 @@ class DelayTrack(ReadOnlyArrays):
         ax.plot(self.time, shown, label="delay")
         for place, time in enumerate(self.changes):
             ax.axvline(time, color="0.4", linestyle=":", label=None if place else "change found")
-        doubted = np.where(self.known & ~self.adequate, self.delay, np.nan)
+        doubted = np.where(self.known & ~self.reliable, self.delay, np.nan)
         if np.any(np.isfinite(doubted)):
-            ax.plot(self.time, doubted, ".", label="not adequate")
+            ax.plot(self.time, doubted, ".", label="indication")
         ax.set_xlabel("time (s)")
         ax.set_ylabel("delay (s)")
         ax.legend()

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from deadtime._base.digits import stated
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed
 from deadtime.logs._log import Log
 from deadtime.logs.latencies._filters import FilterDelay
 from deadtime.logs.latencies._relation import LoopLatency
@@ -27,8 +27,8 @@ class Stage:
         Its standard error, s; zero for what is computed.
     source : str
         The parameter it is computed from, or the loop it was estimated in.
-    adequate : bool
-        Whether the estimate it comes from is adequate; true for what is computed.
+    verdict : {"reliable", "indication"}
+        That on the estimate it comes from; ``"reliable"`` for what is computed.
     part : bool
         Whether it is a part of the stage before.
     """
@@ -37,14 +37,18 @@ class Stage:
     time: float
     stderr: float
     source: str
-    adequate: bool = True
+    verdict: Verdict = "reliable"
     part: bool = False
 
     def line(self) -> str:
         """The stage in one line."""
-        doubt = "" if self.adequate else "; NOT ADEQUATE"
         indent = "  " if self.part else ""
-        return f"{indent}{self.name}: {stated(self.time, self.stderr, 's')} ({self.source}){doubt}"
+        return f"{indent}{self.name}: {self.shown()} ({self.source})"
+
+    def shown(self) -> str:
+        """The time, with its error where that is claimed to hold."""
+        time = claimed(self.verdict, self.time, self.stderr, "s")
+        return time if self.verdict == "reliable" else f"{time}, {NOT_CLAIMED}"
 
     def to_dict(self) -> dict[str, Any]:
         """The stage as plain values for JSON."""
@@ -79,7 +83,7 @@ def stages_of(
         stages.append(
             Stage(
                 "motors, airframe and the rest", rest, whole.stderr,
-                "what is left", whole.adequate and rest >= 0.0, part=True,
+                "what is left", whole.verdict if rest >= 0.0 else "indication", part=True,
             )
         )  # fmt: skip
     return tuple(stages)
@@ -93,4 +97,4 @@ def _measured(one: LoopLatency, name: str) -> Stage:
     if len(one.windows) > 1:
         more = len(one.windows) - 1
         where += f" and {more} more window{'s' if more > 1 else ''}"
-    return Stage(name, value, error, where, one.estimate.adequate)
+    return Stage(name, value, error, where, one.estimate.verdict)

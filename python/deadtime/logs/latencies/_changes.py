@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import Verdict, verdict_if
 from deadtime.logs.latencies._elsewhere import TWO_SIDED
 from deadtime.logs.latencies._latency import Latency
 
@@ -28,8 +29,8 @@ class LatencyChange:
         Their standard errors, s.
     p_value : float
         Probability of such a difference, or a larger one, if nothing had changed.
-    adequate : bool
-        Whether both estimates are adequate; if not, the probability is not known.
+    verdict : {"reliable", "indication"}
+        Whether both estimates are reliable; if not, the probability is not known.
     """
 
     loop: str
@@ -39,7 +40,7 @@ class LatencyChange:
     after: float
     after_error: float
     p_value: float
-    adequate: bool
+    verdict: Verdict
 
     @property
     def change(self) -> float:
@@ -58,10 +59,10 @@ class LatencyChange:
         return self.change - reach, self.change + reach
 
     @property
-    def verdict(self) -> str:
+    def outcome(self) -> str:
         """Whether the difference is real, in words."""
-        if not self.adequate:
-            return "not known: an estimate is not adequate"
+        if self.verdict != "reliable":
+            return "not known: an estimate is an indication"
         if self.p_value >= REAL:
             return f"no difference is seen (p = {self.p_value:.2g})"
         way = "longer" if self.change > 0.0 else "shorter"
@@ -69,7 +70,7 @@ class LatencyChange:
 
     def to_dict(self) -> dict[str, Any]:
         """The change as plain values for JSON."""
-        own = {"change": self.change, "interval_95": self.ci, "verdict": self.verdict}
+        own = {"change": self.change, "interval_95": self.ci, "outcome": self.outcome}
         return plain_fields({**vars(self), **own})
 
 
@@ -113,13 +114,14 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
             second, second_error, _ = other.sum_of()
             spread = math.hypot(first_error, second_error)
             z = abs(second - first) / spread if spread > 0.0 else math.inf
-            adequate = all(
-                fit.estimate is not None and fit.estimate.adequate for fit in (one, other)
+            reliable = all(
+                fit.estimate is not None and fit.estimate.verdict == "reliable"
+                for fit in (one, other)
             )
             found.append(
                 LatencyChange(
                     one.loop, one.command, first, first_error, second, second_error,
-                    float(2.0 * special.ndtr(-z)), adequate,
+                    float(2.0 * special.ndtr(-z)), verdict_if(reliable),
                 )
             )  # fmt: skip
     return tuple(found)

@@ -14,21 +14,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from deadtime._base.digits import between, stated
-from deadtime.logs.latencies._relation import LoopLatency, doubted
+from deadtime.logs.latencies._relation import LoopLatency
 
 #: Axes that are alike, and the factor by which intervals may lie apart: roll and pitch differ.
 ALIKE, APART = ("north", "east"), 2.0
 
 
 def doubted_by_others(loops: list[LoopLatency]) -> list[LoopLatency]:
-    """The times as ones that are not adequate, where others contradict them."""
-    told = [one for one in loops if one.estimate is not None and one.estimate.adequate]
+    """The times as ones that are not reliable, where others contradict them."""
+    told = [one for one in loops if one.estimate is not None and one.estimate.verdict == "reliable"]
     found = []
     for one in loops:
         estimate = one.estimate
-        if estimate is not None and estimate.adequate:
+        if estimate is not None and estimate.verdict == "reliable":
             for why in (*_by_axes(one, told), *_by_actuator(one, told)):
-                estimate = doubted(estimate, why)
+                estimate = estimate.doubted(why)
         found.append(replace(one, estimate=estimate))
     return found
 

@@ -25,14 +25,14 @@ TWO_SIDED = 1.96
 def contradiction(fit: DelayEstimate, others: Sequence[Recording], method: OutputError) -> str:
     """Which of the other windows contradicts an estimate, and by how much; empty if none does.
 
-    The plant is that of the estimate. A window that is no adequate estimate by itself says nothing.
+    The plant is that of the estimate. A window that is no reliable estimate by itself says nothing.
     """
     for one in others:
         try:
             other = estimate_delay(one, fit.loop, method=method, free=fit.free)
         except DeadtimeError:
             continue
-        if other.adequate and _are_apart(*sorted((fit, other), key=_sum_of)):
+        if other.verdict == "reliable" and _are_apart(*sorted((fit, other), key=_sum_of)):
             low, high = other.ci(0.95, "delay+lag")
             value = stated(_sum_of(other), (high - low) / (2.0 * TWO_SIDED), "s")
             start, stop = one.time[0], one.time[-1]

@@ -109,20 +109,20 @@ class Latency(ReadOnlyArrays, Pictured):
         Returns
         -------
         SharedNumber
-            Of the adequate estimates, each with its own gain, lag and noise. The vertical axis is
+            Of the reliable estimates, each with its own gain, lag and noise. The vertical axis is
             one of them; ``axes=`` of `latency` chooses.
 
         Raises
         ------
         ValueError
-            When fewer than two of these loops have an adequate estimate.
+            When fewer than two of these loops have a reliable estimate.
         """
         asked = [one for one in self.loops if (one.kind, one.command) == (kind, command)]
         fits = [one.estimate for one in asked if one.estimate is not None]
-        told = [fit for fit in fits if fit.adequate]
+        told = [fit for fit in fits if fit.verdict == "reliable"]
         if len(told) < 2:
             raise ValueError(
-                f"{len(told)} of the {len(asked)} loops of {kind} have an adequate estimate from "
+                f"{len(told)} of the {len(asked)} loops of {kind} have a reliable estimate from "
                 f"the {command}: a shared number needs two"
             )
         return shared_number(told, name)
@@ -131,12 +131,12 @@ class Latency(ReadOnlyArrays, Pictured):
         """The shortest answer: the fastest loop of the vehicle that is told, in one line."""
         told = sorted(self.estimated, key=_order)
         if not told:
-            return f"{self.source}: no loop in it tells how long it takes to respond"
+            return f"none: no loop of {self.source} tells how long it takes to respond"
         return told[0].headline()
 
     def summary(self) -> str:
         """All loops, their budget and what it costs, in lines of text."""
-        lines = [f"{self.source}: {self.vehicle}", self.headline(), ""]
+        lines = [self.headline(), f"{self.source}: {self.vehicle}", ""]
         for one in self.estimated:
             lines += self._lines(one)
         refused = [one for one in self.loops if one.estimate is None]
@@ -215,11 +215,11 @@ class Latency(ReadOnlyArrays, Pictured):
 
 
 def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
-    """Adequate estimates first, inner loops before outer ones, then the vehicle alone."""
+    """Reliable estimates first, inner loops before outer ones, then the vehicle alone."""
     kinds = ("rate", "attitude", "velocity", "position", "")
     assert one.estimate is not None
     kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
-    return (not one.estimate.adequate, kind, one.command == "setpoint", one.promise)
+    return (one.estimate.verdict != "reliable", kind, one.command == "setpoint", one.promise)
 
 
 def latency(
@@ -257,15 +257,15 @@ def latency(
     Notes
     -----
     Of each loop the windows are ranked by the Cramér-Rao bound of delay and lag together that they
-    promise. The best is fitted by gain, delay and one lag, or two lags where one is not adequate;
+    promise. The best is fitted by gain, delay and one lag, or two lags where one is an indication;
     where that is, together with up to two others. From the setpoint, two lags that come out alike
-    give way to a pair of complex poles if that is adequate, as of a rate loop that is closed by a
+    give way to a pair of complex poles if that is reliable, as of a rate loop that is closed by a
     proportional controller. From the setpoint the plant follows its command;
     from what the controller commands it integrates.
 
     Where command and response are stamped by clocks that drift apart, by more than a tenth of the
-    interval over the log, the estimate is not adequate. The time of each window over the log tells
-    that, and stamps that are regular. Nor is an estimate adequate if one of the two next best
+    interval over the log, the estimate is an indication. The time of each window over the log tells
+    that, and stamps that are regular. Nor is an estimate reliable if one of the two next best
     windows, fitted by itself, contradicts it, nor those of north and east whose intervals lie apart
     by more than a factor of two.
 

@@ -27,12 +27,14 @@ class Around:
 
 
 def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
-    """The loop with the gain flown, or else the well damped one; None where no fit is adequate.
+    """The loop with the gain flown, or else the well damped one; None where no fit is reliable.
 
     Of several vehicles, such as that of the rate and that of the angle, the one whose gain is
     known, and then the one that is told best.
     """
-    told = [one for one in estimated if one.cost and one.estimate and one.estimate.adequate]
+    told = [
+        one for one in estimated if one.cost and one.estimate and one.estimate.verdict == "reliable"
+    ]
     if not told:
         return None
     one = min(told, key=lambda one: (_flown(one) is None, one.promise))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from deadtime._base.digits import between, stated
+from deadtime._base.digits import between
+from deadtime._base.verdicts import NOT_CLAIMED, claimed
 from deadtime.logs.latencies._budget import Stage
 from deadtime.logs.latencies._plots import plot_fit
 from deadtime.logs.latencies._relation import LoopLatency
@@ -15,9 +16,9 @@ def row_of(one: LoopLatency) -> tuple[str, ...]:
     """A loop in the table of times."""
     value, error, (low, high) = one.sum_of()
     assert one.estimate is not None
-    adequate = "yes" if one.estimate.adequate else "no"
-    times = (stated(value, error, "s"), between(low, high, error, "s"))
-    return (one.loop, one.command, *times, adequate)
+    verdict = one.estimate.verdict
+    ends = between(low, high, error, "s") if verdict == "reliable" else NOT_CLAIMED
+    return (one.loop, one.command, verdict, claimed(verdict, value, error, "s"), ends)
 
 
 def budget_of(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:
@@ -26,9 +27,7 @@ def budget_of(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:
     for name, some in stages.items():
         for stage in some if len(some) > 1 else ():
             shown = f"— {stage.name}" if stage.part else stage.name
-            doubt = "" if stage.adequate else " (not adequate)"
-            time = f"{stated(stage.time, stage.stderr, 's')}{doubt}"
-            rows.append((name, shown, time, stage.source))
+            rows.append((name, shown, stage.shown(), stage.source))
     return rows
 
 

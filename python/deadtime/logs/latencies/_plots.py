@@ -24,13 +24,14 @@ def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     for place, (one, (value, _, (low, high))) in enumerate(zip(told, sums, strict=True)):
         fit = one.estimate
         assert fit is not None
-        look = {"alpha": 1.0 if fit.adequate else 0.35, "height": 0.6}
+        look = {"alpha": 1.0 if fit.verdict == "reliable" else 0.35, "height": 0.6}
         delay = fit.delay / factor
         ax.barh(place, delay, color=COLOURS[0], **look)
         ax.barh(place, value / factor - delay, left=delay, color=COLOURS[1], **look)
         ax.plot([low / factor, high / factor], [place, place], color="0.15", lw=1.4, marker="|")
     ax.set_yticks(range(len(told)))
-    doubts = ["" if one.estimate and one.estimate.adequate else " (not adequate)" for one in told]
+    fits = [one.estimate for one in told]
+    doubts = ["" if fit and fit.verdict == "reliable" else " (indication)" for fit in fits]
     ax.set_yticklabels(
         [f"{one.loop}, {one.command}{d}" for one, d in zip(told, doubts, strict=True)]
     )

@@ -12,6 +12,7 @@ from deadtime._base.digits import between, stated
 from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import NOT_CLAIMED, claimed
 from deadtime.estimation import (
     DelayEstimate,
     OutputError,
@@ -34,9 +35,6 @@ SECOND = 0.3
 #: Difference of BIC at which commands hold, or move, between rows, and what it may be worth
 #: otherwise, as a share of the 95 % interval.
 CLEARLY, WORTH = 6.0, 0.25
-
-#: What is before the reasons in the message of an estimate.
-NOT_ADEQUATE = "; not adequate: "
 
 #: What an estimate says whose plant has too few lags, and one whose windows differ.
 LACKING, CONTRADICT = "a further lag of", "the recordings contradict one another"
@@ -100,13 +98,13 @@ class LoopLatency(ReadOnlyArrays):
     def headline(self) -> str:
         """The time in one line."""
         if self.estimate is None:
-            return f"{self.name}: refused, {self.refusal}"
+            return f"none: {self.name}, {self.refusal}"
         value, error, (low, high) = self.sum_of()
-        doubt = "" if self.estimate.adequate else "; NOT ADEQUATE"
-        return (
-            f"{self.name}: {stated(value, error, 's')} "
-            f"(95 %: {between(low, high, error, 's')}){doubt}"
-        )
+        verdict = self.estimate.verdict
+        known = f"{verdict}: {self.name} {claimed(verdict, value, error, 's')}"
+        if verdict != "reliable":
+            return f"{known}, {NOT_CLAIMED}"
+        return f"{known} (95 %: {between(low, high, error, 's')})"
 
     def to_dict(self) -> dict[str, Any]:
         """The time as plain values for JSON.
@@ -138,7 +136,7 @@ def relation_of(
     """Fit the plant of a loop to its windows, or say why that tells nothing.
 
     Where it is not known whether commands hold or move between rows, `held` gives a window with
-    commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not adequate,
+    commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not reliable,
     nor one whose interval is narrow against `unsure`, s, by which commands may hold longer or less,
     nor one that `others` contradict.
     """
@@ -160,15 +158,13 @@ def relation_of(
     if why := _no_answer(fit, told[0]):
         return refused(why)
     if fit.delay_plus_lag < hidden:
-        fit = doubted(
-            fit,
+        fit = fit.doubted(
             f"the {command} moves between rows of the log by more than it shows, which hides times "
             f"below {stated(hidden, 0.0, 's')}",
         )
     low, high = fit.ci(0.95, "delay+lag")
     if unsure > WORTH * (high - low):
-        fit = doubted(
-            fit,
+        fit = fit.doubted(
             "the log does not tell when commands changed between its rows, or how long each holds, "
             f"which is worth {stated(unsure, 0.0, 's')} more or less",
         )
@@ -180,14 +176,14 @@ def relation_of(
 def doubted_by_clocks(
     found: LoopLatency, seen: list[Window], command: Stamped, response: Stamped
 ) -> LoopLatency:
-    """The time as one that is not adequate, where both signals are stamped by clocks of their own.
+    """The time as an indication, where both signals are stamped by clocks of their own.
 
     `seen` are all windows that tell something, `command` and `response` names and stamps, s.
     """
     if found.estimate is None:
         return found
     why = why_two_clocks(found.estimate, seen, command, response)
-    return replace(found, estimate=doubted(found.estimate, why)) if why else found
+    return replace(found, estimate=found.estimate.doubted(why)) if why else found
 
 
 def _ends_of(windows: list[Window]) -> tuple[tuple[float, float], ...]:
@@ -241,17 +237,17 @@ def _fitted(
 
     def richer(parts: list[Recording], fit: DelayEstimate) -> DelayEstimate:
         """The fit, or that with two lags, or a pair of poles, where one lag is not enough."""
-        if fit.adequate or LACKING not in fit.message:
+        if fit.verdict == "reliable" or LACKING not in fit.message:
             return fit
         found = {"1 lag": fit}
         try:
             found["2 lags"] = more = tried(parts, lagging(first, SECOND * first))
             # A loop that is closed around a lag is of second order, and mostly oscillates.
-            if not (integrates or more.adequate) and LACKING in more.message:
+            if not (integrates or more.verdict == "reliable") and LACKING in more.message:
                 pair = with_pair(cast(FactoredPlant, more.loop.plant))
                 complex_poles = None if pair is None else tried(parts, pair)
                 # Noise takes the place of what a pair lacks, which least squares tells better.
-                if complex_poles is not None and complex_poles.adequate:
+                if complex_poles is not None and complex_poles.verdict == "reliable":
                     return complex_poles
         except NotIdentifiableError:
             pass
@@ -268,27 +264,20 @@ def _fitted(
             fit = still
             parts, beside = ([held(one) for one in some] for some in (windows, others))
     if doubt:
-        return doubted(fit, doubt)
+        return fit.doubted(doubt)
     fit = richer(parts[:1], fit)
     # What the plant lacks in one window it lacks in all together.
-    if len(parts) > 1 and fit.adequate:
+    if len(parts) > 1 and fit.verdict == "reliable":
         try:
             together = tried(parts, cast(FactoredPlant, fit.loop.plant))
         except NotIdentifiableError:
             return fit
-        reasons = together.message.partition(" (try ")[0].split("; ")
+        reasons = together.reason.split("; ")
         apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
-        fit = doubted(fit, "; ".join(apart)) if apart else richer(parts, together)
-    if fit.adequate and (why := contradiction(fit, beside, METHOD)):
-        return doubted(fit, why)
+        fit = fit.doubted("; ".join(apart)) if apart else richer(parts, together)
+    if fit.verdict == "reliable" and (why := contradiction(fit, beside, METHOD)):
+        return fit.doubted(why)
     return fit
-
-
-def doubted(fit: DelayEstimate, why: str) -> DelayEstimate:
-    """The estimate as one that is not adequate, for this reason."""
-    known = NOT_ADEQUATE in fit.message
-    message = f"{fit.message}{'; ' if known else NOT_ADEQUATE}{why}"
-    return replace(fit, adequate=False, message=message)
 
 
 def _either(moving: DelayEstimate, still: DelayEstimate) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from deadtime._base.digits import stated
+from deadtime._base.verdicts import claimed
 from deadtime.estimation import DelayEstimate, unit_of
 from deadtime.logs.latencies._relation import LoopLatency
 
@@ -20,14 +21,8 @@ def numbers_of(fit: DelayEstimate) -> list[str]:
             low, high = fit.ci(0.95, name)
             error = (high - low) / 3.92
         shown = "lag" if single and name == "lag_1" else name.replace("_", " ")
-        found.append(f"{shown} {stated(value, error, unit_of(name))}")
+        found.append(f"{shown} {claimed(fit.verdict, value, error, unit_of(name))}")
     return found
-
-
-def why_inadequate(fit: DelayEstimate) -> str:
-    """The reasons why the model of an estimate is not adequate."""
-    _, _, why = fit.message.partition("; not adequate: ")
-    return why.partition(" (try ")[0] or "the residuals are not white"
 
 
 def said_of(one: LoopLatency) -> list[str]:
@@ -35,8 +30,8 @@ def said_of(one: LoopLatency) -> list[str]:
     fit = one.estimate
     assert fit is not None
     said = [one.headline(), ", ".join(numbers_of(fit))]
-    if not fit.adequate:
-        said.append(f"not adequate: {why_inadequate(fit)}")
+    if fit.verdict != "reliable":
+        said.append(f"not reliable: {fit.reason}")
     if one.cost is not None:
         said.append(cost_in_words(one))
     return said
@@ -46,11 +41,13 @@ def cost_in_words(one: LoopLatency) -> str:
     """What delay and lag cost in gain, in a sentence."""
     cost = one.cost
     assert cost is not None
+    assert one.estimate is not None
+    verdict = one.estimate.verdict
     half = 0.25 * (cost.largest_ci[1] - cost.largest_ci[0])
     damped = 0.25 * (cost.well_damped_ci[1] - cost.well_damped_ci[0])
     text = (
-        f"a proportional gain is stable up to {stated(cost.largest, half)} and well damped "
-        f"(Ms 1.7) up to {stated(cost.well_damped, damped)}"
+        f"a proportional gain is stable up to {claimed(verdict, cost.largest, half)} and well "
+        f"damped (Ms 1.7) up to {claimed(verdict, cost.well_damped, damped)}"
     )
     if cost.flown is not None:
         text += f"; {cost.flown:.3g} is flown"

@@ -74,7 +74,7 @@ async function loadKernels(base64) {
       for (const numbers of [rows.time, rows.output, rows.time, commands]) request.push(...list(numbers));
       const answer = call("estimate", request);
       const part = (i) => ({ value: answer[3 * i], low: answer[3 * i + 1], high: answer[3 * i + 2] });
-      const [noise, air, trim, white, further, adequate] = answer.subarray(12, 18);
+      const [noise, air, trim, white, further, reliable] = answer.subarray(12, 18);
       return {
         delay: part(0),
         lag: part(1),
@@ -85,7 +85,7 @@ async function loadKernels(base64) {
         trim: trim === 1,
         white,
         further,
-        adequate: adequate === 1,
+        reliable: reliable === 1,
         fitted: answer.subarray(18),
       };
     },

@@ -129,7 +129,7 @@ class RecordingView {
       this.show(rows, found);
       this.found = found;
       // A fit that does not explain the recording leaves the loop of the page as it was.
-      if (!found.adequate || !(found.gain.value > 0)) return;
+      if (!found.reliable || !(found.gain.value > 0)) return;
       const { delay, gain, lag } = found;
       const interval = [delay.low, delay.high];
       this.take({ delay: delay.value, gain: gain.value, lag: lag.value, interval });
@@ -140,9 +140,11 @@ class RecordingView {
 
   show(rows, found) {
     const said = ({ value, low, high }, unit) =>
-      `${shown(value, 3)}${unit}, between ${shown(low, 3)} and ${shown(high, 3)}${unit}`;
-    const lines = [`${this.name}, ${rows.time.length} rows. With 95 % confidence:`];
-    lines.push(`delay ${said(found.delay, " s")}`);
+      found.reliable
+        ? `${shown(value, 3)}${unit}, between ${shown(low, 3)} and ${shown(high, 3)}${unit}`
+        : `about ${shown(value, 2)}${unit}, not claimed to hold`;
+    const lines = [found.reliable ? "Reliable, with 95 % confidence:" : "Indication:"];
+    lines.push(`${this.name}, ${rows.time.length} rows`, `delay ${said(found.delay, " s")}`);
     if (found.lag.value > 0) {
       lines.push(`lag ${said(found.lag, " s")}`, `delay and lag together ${said(found.sum, " s")}`);
     }
@@ -150,9 +152,9 @@ class RecordingView {
     const beside = [found.air && "moving air", found.trim && "a constant input"].filter(Boolean);
     lines.push(`noise ${shown(found.noise, 2)}${beside.length ? `, beside ${beside.join(" and ")}` : ""}`);
     lines.push(
-      found.adequate
+      found.reliable
         ? "The model explains the recording."
-        : "The model does not explain the recording, so the intervals are an indication only: " +
+        : "The model does not explain the recording: " +
             (found.white < 0.01 ? "what is left is not white noise" : "the plant lacks a lag") +
             ". The loop of this page stays as it was.",
     );
