@@ -130,12 +130,12 @@ def test_a_right_model_holds_where_rows_tell_less_than_the_distance_of_the_filte
         assert found.last.stderr < 0.002
         assert found.adequate.all()
         assert not found.changed.any()
-        inside = (found.ci[:, 0] <= delay) & (delay <= found.ci[:, 1])
+        inside = (found.low <= delay) & (delay <= found.high)
         assert np.mean(inside[found.known]) > 0.9
 
 
 def test_a_wrong_lag_is_no_change_of_the_delay():
-    columns = flown(600.0, vehicle=Vehicle(white=0.002, gust=0.0))
+    columns = flown(200.0, vehicle=Vehicle(white=0.002, gust=0.0))
     wrong = LOOP.replace(plant=dtm.Integrator(VEHICLE.gain, lag=0.05))
     found = online(recording(*columns), wrong, noise=FlightNoise(white=0.002))
     assert np.count_nonzero(found.changed) <= 3

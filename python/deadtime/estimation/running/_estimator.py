@@ -43,8 +43,8 @@ FEWEST = 40
 #: So many changes within so many seconds are not those of a delay.
 RESTLESS, MINUTE = 3, 60.0
 
-#: After so many seconds in doubt, a change is one of what the plant lacks. A jump of the delay itself
-#: is found sooner; a longer time reports more changes that are none.
+#: After so many seconds in doubt, a change is one of what the plant lacks. A jump of the delay
+#: itself is found sooner; a longer time reports more changes that are none.
 IN_DOUBT = 2.0
 
 #: The range of delays by default, s, and how far it goes beyond a fitted one.
