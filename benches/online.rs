@@ -16,6 +16,7 @@ fn running(alarm: f64, jitter: f64) -> Result<(Box<dyn Online>, u32), Error> {
         plant: Plant::new(&[1.0], &[1.0, 0.0])?,
         own_lag: 0.0,
         delays: (0..CELLS).map(|i| 0.1 + 0.01 * f64::from(i)).collect(),
+        follow: true,
         layers: vec![Lags {
             lags: vec![0.15],
             zero: 0.0,

@@ -121,6 +121,27 @@ def test_a_wrong_model_is_not_reliable(plant, delays, words):
     assert words in found.last.message
 
 
+def test_a_right_model_holds_where_rows_tell_less_than_the_distance_of_the_filters():
+    # 50 delays over 0.6 s are 12 ms apart; these rows tell 1 ms.
+    vehicle = Vehicle(white=0.002, gust=0.0)
+    for seed, delay in ((1, 0.3021), (2, 0.2285), (3, 0.1757)):
+        columns = flown(100.0, delay, vehicle, seed)
+        found = online(recording(*columns), LOOP, noise=FlightNoise(white=vehicle.white))
+        assert found.last.stderr < 0.002
+        assert found.reliable[found.known].all()
+        assert not found.changed.any()
+        inside = (found.low <= delay) & (delay <= found.high)
+        assert np.mean(inside[found.known]) > 0.9
+
+
+def test_a_wrong_lag_is_no_change_of_the_delay():
+    columns = flown(200.0, vehicle=Vehicle(white=0.002, gust=0.0))
+    wrong = LOOP.replace(plant=dtm.Integrator(VEHICLE.gain, lag=0.05))
+    found = online(recording(*columns), wrong, noise=FlightNoise(white=0.002))
+    assert np.count_nonzero(found.changed) <= 3
+    assert np.mean(found.reliable) < 0.05
+
+
 def test_louder_noise_is_said_and_widens_the_interval():
     columns = flown(120.0, vehicle=Vehicle(white=0.03, gust=0.3))
     found = online(recording(*columns), LOOP, noise=NOISE)

@@ -26,6 +26,7 @@ def settings(**changed):
         "air_behind_lags": True,
         "own_lag": 0.0,
         "delays": DELAYS,
+        "follow": False,
         "layers": [([0.15], 0.0, [0.0] * count)],
         "disturbances": [
             Disturbance(True, AIR_TIME, AIR / WHITE),

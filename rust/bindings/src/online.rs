@@ -20,6 +20,7 @@ struct GivenSettings {
     air_behind_lags: bool,
     own_lag: f64,
     delays: Vec<f64>,
+    follow: bool,
     layers: Vec<(Vec<f64>, f64, Vec<f64>)>,
     disturbances: Vec<GivenDisturbance>,
     gain: (f64, f64),
@@ -44,6 +45,7 @@ impl GivenSettings {
             plant: plant.with_air_behind_lags(self.air_behind_lags),
             own_lag: self.own_lag,
             delays: self.delays,
+            follow: self.follow,
             layers: layers
                 .map(|(lags, zero, log_prior)| Lags {
                     lags,

@@ -22,6 +22,7 @@ from deadtime.estimation.running._settings import (
     BankSettings,
     alarm_of,
     coarser,
+    is_range,
     lag_sets,
     plant_model,
     points_of_range,
@@ -42,6 +43,10 @@ FEWEST = 40
 
 #: So many changes within so many seconds are not those of a delay.
 RESTLESS, MINUTE = 3, 60.0
+
+#: After so many seconds in doubt, a change is one of what the plant lacks. A jump of the delay
+#: itself is found sooner; a longer time reports more changes that are none.
+IN_DOUBT = 2.0
 
 #: The range of delays by default, s, and how far it goes beyond a fitted one.
 RANGE, BEYOND = (0.0, 0.6), 2.0
@@ -166,6 +171,7 @@ class OnlineEstimator:
             air_behind_lags=model.air_behind_lags,
             own_lag=model.own_lag,
             delays=points.tolist(),
+            follow=is_range(delays),
             layers=[(one, model.zero, [0.0] * points.size) for one in lag_sets(model, self._lags)],
             gain=(float(known or 1.0), 0.5 * size) if gain is None else gain,
             memory=positive("memory", memory),
@@ -181,6 +187,7 @@ class OnlineEstimator:
         self._doubts: tuple[str, ...] = ()
         self._bank: OnlineBank | None = None
         self._changes: list[float] = []
+        self._doubted_since = math.inf
         self._noise: FlightNoise | None = None
         self._rows: list[tuple[float, float | None]] = []
         self._commands: list[tuple[float, float]] = []
@@ -315,13 +322,20 @@ class OnlineEstimator:
         if found.changed:
             self._changes.append(found.time)
         self._changes = [time for time in self._changes if time > found.time - MINUTE]
-        if len(self._changes) < RESTLESS:
-            return found
-        count = len(self._changes)
-        reason = f"not reliable: {count} changes in a minute: the plant lacks something"
-        message = f"{found.message}; {reason}" if found.message else reason
-        verdict: Verdict = "indication" if found.known else "none"
-        return replace(found, verdict=verdict, message=message)
+        is_restless = len(self._changes) >= RESTLESS
+        if is_restless:
+            count = len(self._changes)
+            reason = f"not reliable: {count} changes in a minute: the plant lacks something"
+            message = f"{found.message}; {reason}" if found.message else reason
+            verdict: Verdict = "indication" if found.known else "none"
+            found = replace(found, verdict=verdict, message=message)
+        in_doubt = is_restless or found.time - self._doubted_since > IN_DOUBT
+        # The kernel forgets its doubts at a change: they begin again after the next rows.
+        if found.verdict == "indication":
+            self._doubted_since = min(self._doubted_since, found.time)
+        elif not found.changed:
+            self._doubted_since = math.inf
+        return replace(found, changed=found.changed and not in_doubt)
 
     def _begin(self, noise: FlightNoise) -> None:
         self._bank = OnlineBank(self._settings.under(noise))

@@ -44,6 +44,7 @@ class BankSettings(NamedTuple):
     air_behind_lags: bool
     own_lag: float
     delays: list[float]
+    follow: bool
     layers: list[tuple[list[float], float, list[float]]]
     gain: tuple[float, float]
     memory: float
@@ -70,9 +71,14 @@ class BankSettings(NamedTuple):
         )
 
 
+def is_range(given: Any) -> bool:
+    """Whether these are (low, high) or (low, high, n), not the points themselves."""
+    return not isinstance(given, np.ndarray) and len(given) <= 3
+
+
 def points_of_range(name: str, given: Any, number: int) -> Array:
     """The points of (low, high) or (low, high, n), or those given."""
-    if isinstance(given, np.ndarray) or len(given) > 3:
+    if not is_range(given):
         return np.asarray(given, dtype=float)
     if len(given) == 3:
         number = int(given[2])

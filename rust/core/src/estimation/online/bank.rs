@@ -10,6 +10,7 @@ use super::history::{History, Jump};
 use super::judge::{AGES, Judge, Scale};
 use super::layer::Layer;
 use super::posterior::known;
+use super::refine::Focus;
 use super::row_by_row::Online;
 use super::settings::Settings;
 use crate::Error;
@@ -33,6 +34,13 @@ const WINDOW: f64 = 30.0;
 /// Weight below which a cell has no say whether a row is an outlier.
 const NO_SAY: f64 = 1e-6;
 
+/// Weight below which a cell rests until its neighbours or a change of the delay give it a new one.
+/// Larger ones might forget what the rows still allow; smaller ones cost time.
+const RESTS: f64 = 1e-60;
+
+/// A delay within so many posterior deviations of the mean is no change of it: the walk leads there.
+const AWAY: f64 = 3.0;
+
 /// Longest memory of the judge, s.
 const MOST_MEMORY: f64 = 30.0;
 
@@ -55,6 +63,11 @@ pub(super) struct Bank<const N: usize> {
     logs: Vec<f64>,
     jumps: Vec<Jump>,
     history: History,
+    /// Those of the settings and those between them.
+    delays: Vec<f64>,
+    focus: Focus,
+    /// Largest distance of delays of the second bank, s.
+    apart: f64,
     scale: Scale,
     judge: Judge,
     now: Option<f64>,
@@ -65,6 +78,7 @@ pub(super) struct Bank<const N: usize> {
     rate: f64,
     outliers: u32,
     evidence: f64,
+    last_change: Option<f64>,
 }
 
 impl<const N: usize> Bank<N> {
@@ -87,6 +101,9 @@ impl<const N: usize> Bank<N> {
             (first..count).step_by(every).collect(),
             sets,
         );
+        let pairs = changed.places.windows(2);
+        let distances = pairs.map(|pair| settings.delays[pair[1]] - settings.delays[pair[0]]);
+        let apart = distances.fold(0.0, f64::max);
         let longest = settings.delays[count - 1];
         let lag = layers.iter().map(|layer| layer.total).fold(0.0, f64::max);
         let history = History::new(&settings.delays, 2.0 * longest + AFTER_LAGS * lag + 1.0);
@@ -109,6 +126,9 @@ impl<const N: usize> Bank<N> {
             main,
             changed,
             history,
+            delays: settings.delays.clone(),
+            focus: Focus::NONE,
+            apart,
             settings,
             now: None,
             used: None,
@@ -117,12 +137,13 @@ impl<const N: usize> Bank<N> {
             rate: 0.0,
             outliers: 0,
             evidence: 0.0,
+            last_change: None,
         })
     }
 
     /// What the input does in every set of lags and delay up to `time`.
     fn arrive(&mut self, time: f64, length: f64) {
-        let count = self.settings.delays.len();
+        let count = self.delays.len();
         for delay in 0..count {
             let (before, input) = self.history.arrive(delay, time, length, &mut self.jumps);
             for (set, layer) in self.layers.iter().enumerate() {
@@ -233,7 +254,7 @@ impl<const N: usize> Bank<N> {
         }
         self.arrive(time, length);
         let wander = (self.settings.gain_walk).powi(2) * length * gate / white;
-        let delays = self.settings.delays.len();
+        let delays = self.delays.len();
         let steps: Vec<Propagation<N>> = self
             .layers
             .iter_mut()
@@ -247,7 +268,8 @@ impl<const N: usize> Bank<N> {
             .collect();
         for bank in [&mut self.main, &mut self.changed] {
             let indices: Vec<(usize, usize)> = bank.indices(delays).collect();
-            for (cell, (set, column)) in bank.cells.iter_mut().zip(indices) {
+            let cells = bank.cells.iter_mut().zip(&bank.weights).zip(indices);
+            for ((cell, _), (set, column)) in cells.filter(|((_, weight), _)| **weight > 0.0) {
                 cell.go(&steps[set], &self.columns[column], self.gain);
                 cell.cov[self.gain][self.gain] += wander;
             }
@@ -256,7 +278,7 @@ impl<const N: usize> Bank<N> {
 
     /// Take an output in. Has the delay changed?
     fn see(&mut self, time: f64, output: f64) -> bool {
-        let delays = self.settings.delays.len();
+        let delays = self.delays.len();
         let variance = self.scale.variance();
         self.looks.clear();
         self.logs.clear();
@@ -264,12 +286,17 @@ impl<const N: usize> Bank<N> {
         let mut least = f64::INFINITY;
         for (number, bank) in [&self.main, &self.changed].into_iter().enumerate() {
             for (i, (_, column)) in bank.indices(delays).enumerate() {
+                if bank.weights[i] == 0.0 {
+                    self.looks.push(Look::NONE);
+                    self.logs.push(f64::NEG_INFINITY);
+                    continue;
+                }
                 let look = bank.cells[i].look(&self.columns[column], output);
                 let log = self.scale.log_density(look.innovation, look.variance);
-                if bank.weights[i] > 0.0 && number == 0 {
+                if number == 0 {
                     top = top.max(log);
                 }
-                if bank.weights[i] > NO_SAY || (number == 1 && bank.weights[i] > 0.0) {
+                if bank.weights[i] > NO_SAY || number == 1 {
                     least = least.min(look.innovation.powi(2) / look.variance);
                 }
                 self.looks.push(look);
@@ -288,6 +315,9 @@ impl<const N: usize> Bank<N> {
         let mut total = 0.0;
         for (weight, log) in self.main.weights.iter_mut().zip(&self.logs) {
             *weight *= (log - top).exp();
+            if *weight < RESTS {
+                *weight = 0.0;
+            }
             total += *weight;
         }
         self.evidence += top + total.ln();
@@ -303,12 +333,20 @@ impl<const N: usize> Bank<N> {
             self.rate = fade * self.rate + (1.0 - fade) * known / length;
         }
         self.scale.hear(square, length);
-        for (cell, look) in self.main.cells.iter_mut().zip(&self.looks) {
-            cell.take(look);
+        let own = self.main.cells.iter_mut().zip(&self.main.weights);
+        for ((cell, weight), look) in own.zip(&self.looks) {
+            if *weight > 0.0 {
+                cell.take(look);
+            }
         }
         let mut sum = 0.0;
+        let (mean, deviation) = self.posterior();
         for i in 0..self.changed.cells.len() {
-            if self.changed.weights[i] > 0.0 {
+            let place = self.changed.places[i % self.changed.places.len()];
+            let away = (self.delays[place] - mean).abs();
+            if away < f64::max(0.5 * self.apart, AWAY * deviation) {
+                self.changed.weights[i] = 0.0;
+            } else if self.changed.weights[i] > 0.0 {
                 let ratio = (self.logs[split + i] - top).min(500.0).exp() / total;
                 self.changed.weights[i] = (self.changed.weights[i] * ratio).min(1e200);
                 self.changed.cells[i].take(&self.looks[split + i]);
@@ -321,12 +359,34 @@ impl<const N: usize> Bank<N> {
         change(
             &mut self.main,
             &mut self.changed,
-            &self.settings.delays,
+            &self.delays,
             sum,
             variance,
         );
-        self.judge.forget();
+        self.forget_doubts(time);
+        self.last_change = Some(time);
         true
+    }
+
+    /// Begin to judge anew, unless the delay has changed of late: a second change so soon is rather one
+    /// of what the plant lacks.
+    fn forget_doubts(&mut self, time: f64) {
+        let memory = self.settings.memory.min(MOST_MEMORY);
+        if self.last_change.is_none_or(|last| time - last > memory) {
+            self.judge.forget();
+        }
+    }
+
+    /// Mean and deviation of the delays by their weights.
+    fn posterior(&self) -> (f64, f64) {
+        let (mut mean, mut square) = (0.0, 0.0);
+        for weights in self.main.weights.chunks_exact(self.delays.len()) {
+            for (weight, delay) in weights.iter().zip(&self.delays) {
+                mean += weight * delay;
+                square += weight * delay * delay;
+            }
+        }
+        (mean, (square - mean * mean).max(0.0).sqrt())
     }
 
     /// Tell the judge how this row was predicted by all cells together.
@@ -351,12 +411,35 @@ impl<const N: usize> Bank<N> {
         self.judge.hear(mean / deviation, length, &changes);
     }
 
+    /// Put cells where the posterior needs them after the row at `time`.
+    fn follow(&mut self, time: f64, answer: &Answer) {
+        let asked = self.focus.follow(answer.delay.mean, answer.delay.deviation);
+        let Some(focus) = asked.filter(|_| self.settings.follow) else {
+            return;
+        };
+        self.focus = focus;
+        let delays = focus.delays(&self.settings.delays);
+        if delays == self.delays {
+            return;
+        }
+        if delays.len() > self.delays.len() {
+            // What cells that were too far apart have left says nothing about the plant.
+            self.forget_doubts(time);
+        }
+        self.main.follow(&self.delays, &delays);
+        self.changed.renumber(&self.delays, &delays);
+        self.history.follow(&delays, time);
+        let none = self.columns[0];
+        self.columns.resize(self.layers.len() * delays.len(), none);
+        self.delays = delays;
+    }
+
     fn answer(&self, time: f64, changed: bool) -> Answer {
         let totals: Vec<f64> = self.layers.iter().map(|layer| layer.total).collect();
         let weights = &self.main.weights;
-        let count = self.settings.delays.len();
+        let count = self.delays.len();
         let tail = 0.5 * (1.0 - self.settings.level);
-        let (delay, together) = known(&self.settings.delays, &totals, weights, tail);
+        let (delay, together) = known(&self.delays, &totals, weights, tail);
         let variance = self.scale.variance();
         let (mut gain, mut square, mut lag) = (0.0, 0.0, 0.0);
         let (mut lowest, mut highest) = (0.0, 0.0);
@@ -427,7 +510,9 @@ impl<const N: usize> Online for Bank<N> {
             self.go(time, before.map_or(0.0, |before| time - before));
             output.is_some_and(|output| self.see(time, output))
         };
+        let answer = self.answer(time, changed);
+        self.follow(time, &answer);
         self.history.tidy(time);
-        Ok(self.answer(time, changed))
+        Ok(answer)
     }
 }

@@ -38,6 +38,16 @@ pub(super) struct Look<const N: usize> {
     shared: [f64; N],
 }
 
+impl<const N: usize> Look<N> {
+    /// Of a cell that rests.
+    pub(super) const NONE: Self = Self {
+        innovation: 0.0,
+        variance: 1.0,
+        slope: 0.0,
+        shared: [0.0; N],
+    };
+}
+
 impl<const N: usize> Cell<N> {
     /// Go to the next row. `gain` is the place of the gain among the states.
     #[inline(always)]

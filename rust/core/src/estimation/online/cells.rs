@@ -1,6 +1,7 @@
 //! The filters of a bank and their weights.
 
 use super::cell::Cell;
+use super::refine::moved;
 use super::walk::Walk;
 
 /// Cells by set of lags and delay, and their weights.
@@ -25,6 +26,28 @@ impl<const N: usize> Cells<N> {
             weights: vec![0.0; layers * places.len()],
             walk: Walk::new(&own),
             places,
+        }
+    }
+
+    /// Go over to other delays.
+    pub(super) fn follow(&mut self, from: &[f64], to: &[f64]) {
+        let count = self.places.len();
+        let groups = self.cells.chunks(count).zip(self.weights.chunks(count));
+        let (cells, weights): (Vec<_>, Vec<_>) = groups
+            .map(|(cells, weights)| moved(from, cells, weights, to))
+            .unzip();
+        *self = Self {
+            cells: cells.concat(),
+            weights: weights.concat(),
+            places: (0..to.len()).collect(),
+            walk: Walk::new(to),
+        };
+    }
+
+    /// The same delays at their places among others.
+    pub(super) fn renumber(&mut self, from: &[f64], to: &[f64]) {
+        for place in &mut self.places {
+            *place = to.partition_point(|one| *one < from[*place]);
         }
     }
 

@@ -99,6 +99,18 @@ impl History {
         (before, input)
     }
 
+    /// Go over to other delays after the row at `now`.
+    pub(super) fn follow(&mut self, delays: &[f64], now: f64) {
+        let arrived = |late: &f64| {
+            let here = self
+                .sent
+                .partition_point(|(sent, _)| now - (sent + late) >= 0.0);
+            self.dropped + here
+        };
+        self.arrived = delays.iter().map(arrived).collect();
+        self.delays = delays.to_vec();
+    }
+
     /// Drop what no delay needs any more.
     pub(super) fn tidy(&mut self, now: f64) {
         let least = self.arrived.iter().copied().min().unwrap_or(0);

@@ -6,7 +6,8 @@
 //! in every cell. So the delay may walk from cell to cell (`walk`), and jump: a second bank holds
 //! the states if it has jumped, and its weights are the sum over the times of the jump and the new
 //! delays of the likelihood ratio (`Settings::alarm`). Both need information about the delay (`Bank`
-//! gates them): while no command changes nothing is forgotten.
+//! gates them): while no command changes nothing is forgotten. Cells are closer together where the
+//! posterior is narrow (`refine`).
 
 mod answer;
 mod bank;
@@ -18,6 +19,7 @@ mod history;
 mod judge;
 mod layer;
 mod posterior;
+mod refine;
 mod response;
 mod row_by_row;
 mod settings;

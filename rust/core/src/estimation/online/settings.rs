@@ -25,6 +25,8 @@ pub struct Settings {
     pub own_lag: f64,
     /// Delays of the cells, s, increasing.
     pub delays: Vec<f64>,
+    /// Are there cells between them where rows tell the delay to less than their distance?
+    pub follow: bool,
     /// Sets of lags.
     pub layers: Vec<Lags>,
     /// Air and coloured noise, in deviations of the white noise.
