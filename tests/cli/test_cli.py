@@ -89,7 +89,7 @@ def test_a_narrow_terminal_leaves_out_no_digits(demo, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     folder, _ = demo
     file = folder / "demo" / "flight.csv"
-    narrow = run("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN).stdout
+    narrow = run("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN, "--method", "all").stdout
     assert "…" not in narrow
     assert "waveform with lag" in narrow
 
@@ -106,7 +106,7 @@ def test_the_three_commands_that_the_demo_ends_with_run(demo):
 
 def test_a_real_flight_by_both_methods():
     file = flight_path("ardrone2_height_step_2_4_0_25.csv")
-    out = found("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN)
+    out = found("estimate", file, *COLUMNS, "--kp", 2.4, *FLOWN, "--method", "all")
     assert out["estimates"]["dominant"]["delay"] == pytest.approx(0.339, abs=0.01)
     fit = out["estimates"]["waveform"]
     assert 0.42 <= fit["delay"] <= 0.44
@@ -122,7 +122,7 @@ def test_a_real_flight_by_both_methods():
 
 def test_a_real_flight_without_overshoot():
     file = flight_path("ardrone2_height_step_0_5_1_0.csv")
-    out = found("estimate", file, *COLUMNS, "--kp", 0.5, *FLOWN)
+    out = found("estimate", file, *COLUMNS, "--kp", 0.5, *FLOWN, "--method", "all")
     assert "no overshoot" in out["refusals"]["dominant"]
     low, high = out["estimates"]["waveform"]["interval_95"]["delay"]
     assert high - low > 0.1

@@ -89,7 +89,7 @@ def test_options_reach_the_methods_that_have_them(files):
 
 def test_a_logged_command_is_used_and_compared(files, tmp_path):
     picture = tmp_path / "all.png"
-    step = ["estimate", files["quick"], "--kp", 2, *FLOWN]
+    step = ["estimate", files["quick"], "--kp", 2, *FLOWN, "--method", "all"]
     out = found(*step, *LOGGED, "--plot", picture)
     assert {"waveform", "output_error", "decrement"} <= out["estimates"].keys()
     assert out["estimates"]["output_error"]["delay"] == pytest.approx(0.36, abs=0.005)

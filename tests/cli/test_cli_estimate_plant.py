@@ -6,7 +6,7 @@ import shlex
 import numpy as np
 import pytest
 from command_line import found, one_clear_line, run
-from flights import process_path
+from flights import flight_path, process_path
 from made_processes import DEAD, GAIN, SLOW, bump, first_order, loop_with_load, moves, sine, write
 
 VERDICTS = ("reliable", "indication", "none")
@@ -114,13 +114,16 @@ def test_a_named_plant_is_fitted_and_a_better_one_is_told(files):
     ("options", "words"),
     [
         (["--ki", 1], "--ki is for a loop whose controller is named"),
-        (["--method", "gcc"], "--method is for a loop"),
-        (["--check"], "--check is for a loop"),
+        (["--method", "gcc"], "--method: this is for a loop whose controller is known"),
+        (["--check"], "--check: this is for a loop whose controller is known"),
         (["--plant", "1/(s+1)"], "--plant 1/(s+1): without --kp it is one of 'delay', 'lag'"),
         (["--output", "T1"], "no column 'T1' for the output: it has"),
         (["--window", 10, 12], "holds 3 samples"),
         (["--largest-delay", -1], "-1"),
-        (["--kp", 1, "--at-rest"], "--at-rest is for a recording without a named controller"),
+        (
+            ["--kp", 1, "--method", "gcc", "--at-rest"],
+            "--at-rest is for a plant that the recording shows: leave it or --method out",
+        ),
     ],
 )
 def test_an_error_is_a_line_with_the_value(options, words, files):
@@ -208,3 +211,19 @@ def test_the_recorded_loop_with_a_load_step_holds_the_dead_time_after_its_advice
         told = found(*shlex.split(told["next"])[1:])
         low, high = told["interval_95"]["delay"]
         assert low < 12.0 < high
+
+
+def test_the_recorded_heights_are_answered_with_the_gain_alone(tmp_path):
+    for name, gain in (
+        ("ardrone2_height_step_2_4_0_25", 2.4),
+        ("ardrone2_height_step_0_5_1_0", 0.5),
+    ):
+        file = flight_path(f"{name}.csv")
+        told = found(
+            "estimate", f"{file}@13:25.5", "--time", "t_s", "--reference", "ref_m", "--output",
+            "height_m", "--kp", gain, "--sample-time", 0.065, "--limit", 1, cwd=tmp_path,
+        )  # fmt: skip
+        assert told["verdict"] == "reliable"
+        assert told["candidates"][0]["name"] == "integrator, two lags, zero"
+        assert told["noise_std"] < 0.0065
+        assert told["next"].startswith("deadtime design")

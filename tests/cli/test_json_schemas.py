@@ -67,8 +67,8 @@ CONTINUOUS = ("estimate", "step.csv", "--kp", 2.4)
         ("check", (*STEP, "--check")),
         ("log", ("inspect", "flight.bin")),
         ("log-loop", ("inspect", "flight.bin", "--loop", "roll")),
-        ("latency", ("latency", "flight.bin", "--loop", "roll rate")),
-        ("latency-change", ("latency", "flight.bin", "flight.bin", "--loop", "roll rate")),
+        ("latency", ("latency", "flight.bin", "--loop", "roll")),
+        ("latency-change", ("latency", "flight.bin", "flight.bin", "--loop", "roll")),
         ("reproduction", ("reproduce", "--only", "figure9")),
     ],
 )

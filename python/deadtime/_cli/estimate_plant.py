@@ -1,32 +1,42 @@
-"""``deadtime estimate`` without a controller: the plant that a recording shows."""
+"""``deadtime estimate`` without a named plant: the one that a recording shows."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from deadtime._base.drawing import new_figure
+from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import OpenRange
+from deadtime._cli.checks import grave_findings, print_grave_findings
+from deadtime._cli.estimate_loop import NamedLoop
 from deadtime._cli.exit_codes import NONE
 from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.estimation import PLANTS, PlantEstimate, estimate_delay
-from deadtime.recordings import read_recording
+from deadtime.loops import P
+from deadtime.recordings import Recording, read_recording
+
+#: Rows are the samples of a controller where times between them differ by less than this share.
+#: Larger: commands are computed at rows that are no samples; smaller: clocks that differ by a part
+#: in a thousand would count.
+SAMPLES = 0.05
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What the command line says of a recording without a controller."""
+    """What the command line says of a recording whose plant is not named."""
 
     file: Path
     columns: Mapping[str, Any]
     window: OpenRange | None
     known: Mapping[str, Any]
     plot: Path | None
+    loop: NamedLoop
 
     def again(self, more: Mapping[str, Any] | None = None, plot: str | None = None) -> str:
         """The command that asks this, with more options."""
@@ -35,8 +45,12 @@ class Asked:
         ends = ":".join("" if end is None else f"{end:.10g}" for end in window or ())
         words: list[object] = ["deadtime", "estimate", f"{self.file}@{ends}" if ends else self.file]
         for name, column in self.columns.items():
-            if column is not None and column != "auto":
+            if column is not None:
                 words += [f"--{name}", column]
+        for name, gain in self.loop.gains.items():
+            words += _option(name, None if gain is None else gain[0])
+        for name in ("sample_time", "limit"):
+            words += _option(name, getattr(self.loop, name))
         for name, value in options.items():
             words += _option(name, value)
         if plot is not None:
@@ -54,29 +68,84 @@ def _option(name: str, value: Any) -> list[object]:
     return [f"--{name.replace('_', '-')}", f"{value:g}" if isinstance(value, float) else value]
 
 
+def is_answered(loop: NamedLoop) -> bool:
+    """Whether the recording is to show the plant: none is named, and the commands are known."""
+    if len(loop.files) > 1 or set(loop.named) - {"--plant"}:
+        return False
+    if loop.gains["kp"] is None:
+        return True
+    if loop.plant is not None and loop.plant not in PLANTS:
+        return False
+    if loop.columns["command"] is not None:
+        return True
+    recording = read_recording(loop.files[0], **loop.columns)
+    controller = replace(loop, plant=None).loops()[0].controller
+    return isinstance(controller, P) and _at_samples(recording, loop.sample_time)
+
+
+def _at_samples(recording: Recording, sample_time: float | None) -> bool:
+    """Whether the command of a row is the one that its controller computed."""
+    if sample_time is None:
+        return True
+    return abs(recording.sample_time - sample_time) < SAMPLES * sample_time
+
+
 def estimate_plant(asked: Asked, as_json: bool) -> None:
     """Print the verdict, the plant, its numbers, what came second and what to do next."""
-    plant = asked.known.get("plant")
+    plant, loop = asked.known.get("plant"), asked.loop
+    has_loop = loop.gains["kp"] is not None
     if plant is not None and plant not in PLANTS:
         raise ValueError(
             f"--plant {plant}: without --kp it is one of {', '.join(map(repr, PLANTS))}; a formula "
             "needs --kp"
         )
-    recording = read_recording(asked.file, **asked.columns)
+    columns = dict(asked.columns)
+    findings: list[dict[str, Any]] = []
+    known = dict(asked.known)
+    if has_loop:
+        named = replace(loop, plant=None).loops()[0]
+        known |= {"controller": named.controller, "limit": loop.limit}
+        recording = read_recording(asked.file, **columns)
+        findings = grave_findings([asked.file], loop.checks([recording], [named]))
+        for finding in findings:
+            if finding["severity"] == "refused":
+                raise NotIdentifiableError(finding["message"])
+    else:
+        _refuse_loop(loop)
+        recording = read_recording(
+            asked.file, **{**columns, "command": columns["command"] or "auto"}
+        )
     with stages(1, quiet=as_json) as begin:
         begin("comparing plants")
-        fit = estimate_delay(recording, window=asked.window, **asked.known)
+        fit = estimate_delay(recording, window=asked.window, **known)
     if asked.plot is not None:
         figure, axes = new_figure(7.0, 4.6, rows=2)
         fit.plot(axes)
         save_figure(figure, asked.plot)
     following = next_command(fit, asked)
     if as_json:
-        print_json("plant-estimate", fit.to_dict() | {"next": following})
+        told = fit.to_dict() | {"next": following}
+        print_json("plant-estimate", told | {"findings": findings} if has_loop else told)
     else:
         _print(fit, following)
+        print_grave_findings(findings)
+        if has_loop:
+            print_text(
+                f"methods beside each other: {asked.again({'method': 'all'})}", wrapped=False
+            )
     if fit.verdict == "none":
         raise typer.Exit(NONE)
+
+
+def _refuse_loop(loop: NamedLoop) -> None:
+    """Refuse what says something of a controller whose gain is not given."""
+    given = {**loop.gains, "filter": loop.corner, "sample_time": loop.sample_time}
+    for name, value in {**given, "limit": loop.limit}.items():
+        if value is not None:
+            raise ValueError(
+                f"--{name.replace('_', '-')} is for a loop whose controller is named: give --kp, "
+                "or leave it"
+            )
 
 
 def _print(fit: PlantEstimate, following: str) -> None:
