@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = np.column_stack([time, moved, command])
     np.savetxt(place / "moved.csv", table, delimiter=",", header="time,output,command", comments="")
     (place / "flight.bin").write_bytes(copter().data)
-    (place / "flown.bin").write_bytes(flown_copter(seconds=6.0).data)
+    (place / "flown.bin").write_bytes(flown_copter(seconds=3.0, rate=100).data)
     return place
 
 

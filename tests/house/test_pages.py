@@ -21,6 +21,8 @@ PAGES = [
     "guide/emulator.md",
     # A design for intervals takes as long as all other pages together.
     pytest.param("guide/from-recording-to-gains.md", marks=pytest.mark.survey),
+    pytest.param("guide/a-plant-that-you-name.md", marks=pytest.mark.survey),
+    "guide/recordings-and-checks.md",
     "guide/internet-loop.md",
     "guide/large-maps.md",
     "guide/planning-an-experiment.md",
