@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +26,10 @@ class HasDelayMargin(Protocol):
     """A stable loop that bears some further delay."""
 
     def _delay_margin(self) -> float: ...
+
+
+#: Ranges of real and imaginary parts, checked.
+RIGHT_HALF_PLANE = (0.0, math.inf), (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,7 +111,7 @@ class Crossings(ReadOnlyArrays):
             return -2
         try:
             member: QuasiPolynomial = self.family.at(**{self.parameter: middle})
-            return member.count(re=(0.0, None))
+            return member._native.count(*RIGHT_HALF_PLANE, "error")
         except DeadtimeError:
             return -2
 

@@ -271,8 +271,8 @@ class Fundamental:
                 (model.K, model.L, command),
                 (model.C, model.D, output),
             ):
-                bound[:, part] = np.abs(np.tensordot(row, x, axes=1))
-                bound[:, part] += np.tensordot(np.abs(row), drift, axes=1)
+                bound[:, part] = np.abs(np.einsum("i,ijk->jk", row, x))
+                bound[:, part] += np.einsum("i,ijk->jk", np.abs(row), drift)
                 bound[:, part] += abs(direct) * acts
         return state, command, output
 
