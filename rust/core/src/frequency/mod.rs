@@ -4,8 +4,9 @@
 //! frequency made of them, `squares` the difference of two moduli; `zeros` finds all their zeros up
 //! to the frequencies of `bounds`. From these are `margins` of a loop, and of an `equation` in which
 //! one number varies the `crossings`, those of `delays` and `multiples` of one, and stable `ranges`.
-//! Of loops with a hold `gain_crossovers` has those, `circle` counts poles by them, `held_range` follows one
-//! number, `further_delay` the delay, `held` has the margins, and `held_gain` values and phases. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
+//! Of loops with a hold `gain_crossovers` has those, `circle` counts poles by them, `held_gain_range` has
+//! the stable gains, `held_range` follows another number, `further_delay` the delay, `held` has the margins,
+//! and `held_gain` values and phases. `chains` says where roots may come from infinity. `ratio` has values of loop gains, `argument`
 //! their phases; `polynomial` finds roots of small polynomials.
 
 mod argument;
@@ -19,6 +20,7 @@ mod further_delay;
 mod gain_crossovers;
 mod held;
 mod held_gain;
+mod held_gain_range;
 mod held_range;
 mod margins;
 mod multiples;
@@ -38,7 +40,8 @@ pub use delays::{delay_margin, delay_range};
 pub use further_delay::{further_delay, held_delay_range};
 pub use held::{held_margins, held_margins_of_stable};
 pub use held_gain::{held_gain, held_phase};
-pub use held_range::{Number, gain_range_held, held_range};
+pub use held_gain_range::gain_range_held;
+pub use held_range::{Number, held_range};
 pub use margins::{Margins, margins, margins_of_ratio, margins_of_stable};
 pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};
