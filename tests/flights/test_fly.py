@@ -275,7 +275,7 @@ def test_the_paper_s_experiment_is_reproduced(tmp_path):
     ends = between(*fit.ci(0.95, "delay+lag"), fit.stderr["delay+lag"], "s")
     assert (
         f"{stated(fit.delay_plus_lag, fit.stderr['delay+lag'], 's')}, {ends} with"
-        in found.verdict()
+        in found.headline()
     )
     best, after = found.checked
     assert isinstance(after.controller, dtm.PV)

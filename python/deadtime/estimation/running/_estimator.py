@@ -135,7 +135,7 @@ class OnlineEstimator:
     >>> for row in zip(flight.time, flight.output, flight.command):
     ...     now = estimator.update(*row)
     >>> now.verdict, bool(now.ci[0] < 0.3 < now.ci[1])
-    (True, True)
+    ('reliable', True)
     """
 
     def __init__(
