@@ -217,7 +217,7 @@ def test_a_longer_delay_is_seen_as_a_real_change(found, other, tmp_path):
     changes = dtm.logs.compare_latencies(found, other)
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.0 < one.ci[1]
-    assert one.to_dict()["verdict"].startswith("no difference is seen")
+    assert one.to_dict()["outcome"].startswith("no difference is seen")
 
 
 def test_only_what_is_asked_for(tmp_path):
