@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import get_args
@@ -15,7 +15,8 @@ from deadtime._base.validation import OpenRange
 from deadtime.estimation._estimate import METHODS, checked_run
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
-from deadtime.estimation.methods._method import paired_runs
+from deadtime.estimation.evidence._rival import beside_rivals
+from deadtime.estimation.methods._method import Run, paired_runs
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -350,4 +351,11 @@ def compare_methods(
                 refusals[name] = str(error).rstrip(".")
     if not any(name in estimates for name in fits):
         raise NotIdentifiableError(refusals["waveform"])
-    return Comparison(estimates, refusals)
+    found = Comparison(estimates, refusals)
+    name = next(name for name, one in estimates.items() if one is found.best)
+    method = METHODS[found.best.method]()
+
+    def again(run: Run, free: Sequence[str]) -> DelayEstimate:
+        return method.estimate([run], free)
+
+    return Comparison(estimates | {name: beside_rivals(found.best, runs[0], again)}, refusals)

@@ -11,6 +11,7 @@ from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import estimate_by_evidence
 from deadtime.estimation.evidence._question import Between
+from deadtime.estimation.evidence._rival import beside_rivals
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
@@ -204,7 +205,8 @@ def estimate_delay(
     -----
     A ground station sees the sum of all delays on the way round the loop; from its own log,
     it cannot distinguish the part in the command from the part in the measurement. A model that
-    does not explain the recording is returned with ``verdict="indication"``, not refused. Several
+    does not explain the recording is returned with ``verdict="indication"``, not refused, and so is
+    one whose plant is clearly behind another that explains the recording. Several
     recordings are weighted by the inverse of their noise where residuals are white, and by that of
     their excitation where they are not.
 
@@ -285,7 +287,10 @@ def estimate_delay(
         )
     if chosen.joint:
         runs = [_sampled_as_seen(run) for run in runs]
-    return chosen.estimate(runs, free)
+    found = chosen.estimate(runs, free)
+    if len(runs) > 1 or not (isinstance(chosen, (OutputError, Waveform)) and chosen.rivals):
+        return found
+    return beside_rivals(found, runs[0], lambda run, names: chosen.estimate([run], names))
 
 
 #: Findings that the methods refuse themselves, or that some of them can do without.

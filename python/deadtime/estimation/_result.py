@@ -434,16 +434,20 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         ends = between(*self.ci(0.95), error, "s")
         return f"reliable: delay {stated(self.delay, error, 's')} (95 %: {ends})"
 
-    def doubted(self, why: str) -> DelayEstimate:
+    def doubted(self, why: str, advice: str = "") -> DelayEstimate:
         """The estimate as an indication, for this further reason.
 
         Parameters
         ----------
         why : str
             The reason, in words that follow "indication: ".
+        advice : str
+            What to try, in place of what was advised before.
         """
-        known, begins, advice = self.message.partition(ADVICE)
-        message = f"{known}{'; ' if REASONS in known else REASONS}{why}{begins}{advice}"
+        known, begins, advised = self.message.partition(ADVICE)
+        if advice:
+            begins, advised = ADVICE, f"{advice})"
+        message = f"{known}{'; ' if REASONS in known else REASONS}{why}{begins}{advised}"
         return replace(self, verdict="indication", message=message)
 
     def summary(self) -> str:
