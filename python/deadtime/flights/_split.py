@@ -64,6 +64,21 @@ class DelaySplit:
         """Delay and time constant of the vehicle together, s."""
         return self.vehicle.delay + self.vehicle.loop.parameters["time_constant"]
 
+    def adds_up(self, whole: DelayEstimate, together: float) -> bool:
+        """Whether both parts take what the loop does, within the 95 % intervals of all three.
+
+        Parameters
+        ----------
+        whole : DelayEstimate
+            That from command and output, with ``delay+lag``.
+        together : float
+            Delay and lags of the loop for small commands by it, s.
+        """
+        parts = self.transport.delay + self.vehicle_delay
+        asked = ((self.transport, "delay"), (self.vehicle, self.late), (whole, "delay+lag"))
+        widths = [0.5 * float(np.ptp(fit.ci(0.95, name))) for fit, name in asked]
+        return abs(parts - together) <= float(np.linalg.norm(widths))
+
 
 def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
     """Estimate both parts from the messages of one flight or several.

@@ -64,6 +64,10 @@ def beside_rivals(fit: DelayEstimate, run: Run, again: Again) -> DelayEstimate:
         f"{rival.in_words()}, explains the recording clearly better, by {lead:.3g} in BIC; its "
         f"dead time is {rough(rival.delay, 's')} ({ends})"
     )
+    plant = fit.loop.plant
+    if best.plant == kind_of(plant, list(plant.parameters)):
+        free = ("delay", *(name for name in plant.parameters if name in ("lag", *best.names)))
+        return fit.doubted(why, f"free={free!r}")
     return fit.doubted(why, f"the call without the plant, {_call(question)}")
 
 
