@@ -384,6 +384,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
                 if self.calibrated
                 else None
             ),
+            **{name: getattr(self, name) for name in FELT[:2] + FELT[-1:]},
             "rms": self.rms,
             "white": self.whiteness.white,
             "residual_autocorrelation": self.whiteness.autocorrelation,
