@@ -20,6 +20,7 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.digits import between
 from deadtime._base.errors import DeadtimeError
+from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._criterion import bic
 from deadtime.estimation._result import DelayEstimate
@@ -29,6 +30,7 @@ from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.evidence._words import CLEAR
 from deadtime.estimation.methods._method import Run
 from deadtime.loops import FactoredPlant, FirstOrder, Integrator, P, Plant
+from deadtime.recordings import Recording
 
 #: Most rows that plants are compared on; of more, as many in which the command changes most. More:
 #: a rival that shows nowhere else is found, and each estimate takes longer.
@@ -90,14 +92,14 @@ def kind_of(plant: Plant, free: Sequence[str]) -> str | None:
 
 def _question(run: Run) -> Question | None:
     """What is asked of the family; None where the command of each row is not known."""
-    recording, loop = run.recording, run.loop
-    computed = recording.command is None
-    if recording.sent is not None or not loop.plant.is_linear:
+    loop = run.loop
+    computed = run.recording.command is None
+    if run.recording.sent is not None or not loop.plant.is_linear:
         return None
     if computed and not isinstance(loop.controller, P):
         return None
     controller, limit = (loop.controller, loop.limit) if computed else (None, None)
-    window = _most_excited(run)
+    recording, window = _most_excited(run)
     try:
         return question_of(
             recording, window, None, None, None, "undecided", None, controller, limit
@@ -106,17 +108,23 @@ def _question(run: Run) -> Question | None:
         return None
 
 
-def _most_excited(run: Run) -> tuple[float | None, float | None]:
-    """The window, or the `MOST_ROWS` of it in which the command, or the reference, changes most."""
+def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
+    """The window, or the `MOST_ROWS` of it in which the command, or the reference, changes most.
+
+    As many rows before it are kept: their commands act in it.
+    """
     rows = run.recording.rows(*run.window)
     if rows.stop - rows.start <= MOST_ROWS:
-        return run.window
+        return run.recording, run.window
     command = run.recording.command
-    moves = np.abs(np.diff(run.recording.reference if command is None else command))[rows]
+    moves = np.abs(np.diff(run.recording.reference if command is None else command))
+    moves = moves[rows.start : rows.stop - 1]
     total = np.concatenate([[0.0], np.cumsum(moves)])
-    first = rows.start + int(np.argmax(total[MOST_ROWS:] - total[:-MOST_ROWS]))
+    within = MOST_ROWS - 1
+    first = rows.start + int(np.argmax(total[within:] - total[:-within]))
     time = run.recording.time
-    return float(time[first]), float(time[first + MOST_ROWS - 1])
+    window = float(time[first]), float(time[first + MOST_ROWS - 1])
+    return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window
 
 
 def _behind(found: native.FamilyFit, kind: str) -> float:

@@ -25,7 +25,9 @@ SHORTEST, LONGEST, LAGS = 2.0, 0.3, 4
 
 def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
     """Whether the command behind lags and delays explains what a fit leaves, beyond chance."""
+    rows = question.recording.time[question.earlier :]
     known = np.isfinite(fit.residuals)
+    known &= (fit.recording.time >= rows[0]) & (fit.recording.time <= rows[-1])
     time, residuals = fit.recording.time[known], fit.residuals[known]
     command = question.command
     response = HeldResponse(question.recording.time, command - command[0])
