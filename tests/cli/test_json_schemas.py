@@ -10,7 +10,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from command_line import found
-from made_logs import copter
+from made_logs import copter, flown_copter
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/reference/json.md"
 
@@ -42,6 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = np.column_stack([time, moved, command])
     np.savetxt(place / "moved.csv", table, delimiter=",", header="time,output,command", comments="")
     (place / "flight.bin").write_bytes(copter().data)
+    (place / "flown.bin").write_bytes(flown_copter(seconds=4.0).data)
     return place
 
 
@@ -67,8 +68,8 @@ CONTINUOUS = ("estimate", "step.csv", "--kp", 2.4)
         ("check", (*STEP, "--check")),
         ("log", ("inspect", "flight.bin")),
         ("log-loop", ("inspect", "flight.bin", "--loop", "roll")),
-        ("latency", ("latency", "flight.bin", "--loop", "roll rate")),
-        ("latency-change", ("latency", "flight.bin", "flight.bin", "--loop", "roll rate")),
+        ("latency", ("latency", "flown.bin", "--loop", "roll rate")),
+        ("latency-change", ("latency", "flown.bin", "flown.bin", "--loop", "roll rate")),
         ("reproduction", ("reproduce", "--only", "figure9")),
     ],
 )

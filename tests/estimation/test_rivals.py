@@ -93,6 +93,14 @@ def test_right_plants_keep_their_verdicts_in_any_noise():
     assert sum(alone != beside for alone, beside in drawn) <= 1
 
 
+def test_few_rows_have_no_rivals():
+    """The family needs twenty rows that count: fewer were an error of its own."""
+    loop = dtm.ControlLoop(dtm.Integrator(0.9), dtm.P(2.0), delay=0.3, sample_time=0.065)
+    run = dtm.Experiment.step(1.0, rest=0.2).run(loop, 0.002, 1)
+    fit = dtm.estimate_delay(run, loop.replace(delay=None))
+    assert fit.verdict in ("reliable", "indication")
+
+
 @pytest.mark.parametrize(
     ("plant", "free", "kind"),
     [

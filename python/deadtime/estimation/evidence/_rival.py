@@ -48,13 +48,14 @@ def beside_rivals(fit: DelayEstimate, run: Run, again: Again) -> DelayEstimate:
     doubted = fit.verdict == "indication"
     if not (doubted or may_have_rivals(fit, question)):
         return fit
-    found = question.answer()
-    if found.verdict == "none" or not found.candidates:
+    found = _answer(question)
+    if found is None:
         return fit
     best = found.candidates[0]
     lead = _behind(found, kind) - best.bic
     if lead > CLEAR:
-        lead = min(lead, _behind(question.of(kind).answer(), kind) - best.bic)
+        named = _answer(question.of(kind))
+        lead = min(lead, math.inf if named is None else _behind(named, kind) - best.bic)
     if not lead > CLEAR or not (doubted or _is_outside(fit, found)):
         return fit
     rival = candidate_of(best, best.bic)
@@ -125,6 +126,15 @@ def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
     time = run.recording.time
     window = float(time[first]), float(time[first + MOST_ROWS - 1])
     return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window
+
+
+def _answer(question: Question) -> native.FamilyFit | None:
+    """The family on these rows; None where they are too few, or determine no plant."""
+    try:
+        found = question.answer()
+    except ValueError:
+        return None
+    return found if found.verdict != "none" and found.candidates else None
 
 
 def _behind(found: native.FamilyFit, kind: str) -> float:
