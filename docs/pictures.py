@@ -213,7 +213,7 @@ def flying() -> None:
         figure, axes = new_figure(7.5, 4.2, rows=2)
         plot_telemetry(axes, told, found.before)
         figure.savefig(IMAGES / "flying-telemetry.png", dpi=90)
-    print(found.verdict())
+    print(found.headline())
 
 
 def internet_loop() -> None:

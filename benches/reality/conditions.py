@@ -8,7 +8,7 @@ from dataclasses import dataclass
 SAMPLE = 0.065
 LIMIT = 1.0
 
-#: What is demanded of adequacy: most results are reliable; or most are refused or not reliable
+#: What is demanded of verdicts: most results are reliable; or most are refused or not reliable
 #: instead, where the log does not hold what an estimate needs; or nothing.
 ANSWER, MAY_REFUSE, NOTHING = "answer", "may refuse", "nothing"
 

@@ -272,10 +272,18 @@ def test_the_paper_s_experiment_is_reproduced(tmp_path):
     assert 0.0 < high - low < 0.03
     assert learned.split.transport.delay == pytest.approx(0.26, abs=0.006)
     assert learned.split.vehicle_delay == pytest.approx(0.142, abs=0.015)
+    # Link and vehicle take what the loop does, and one number alone is called the delay.
+    assert learned.adds_up
+    assert sum("delay" in words for words, *_ in found.parts()) == 1
+    transport = learned.split.transport
+    longer = replace(transport, loop=transport.loop.replace(delay=0.30))
+    odd = replace(learned, split=replace(learned.split, transport=longer))
+    assert (learned.verdict, odd.verdict) == ("reliable", "indication")
+    assert "do not add up" in odd.warnings()[0]
     ends = between(*fit.ci(0.95, "delay+lag"), fit.stderr["delay+lag"], "s")
     assert (
         f"{stated(fit.delay_plus_lag, fit.stderr['delay+lag'], 's')}, {ends} with"
-        in found.verdict()
+        in found.headline()
     )
     best, after = found.checked
     assert isinstance(after.controller, dtm.PV)

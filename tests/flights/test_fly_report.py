@@ -36,7 +36,7 @@ def test_flights_numbers_and_page_are_in_the_folder(tmp_path):
         {},
         None,
     )
-    assert study.verdict().split(".")[0] in found.page.read_text(encoding="utf-8")
+    assert study.headline().split(".")[0] in found.page.read_text(encoding="utf-8")
     # A second experiment would mix its flights with those of the first.
     with pytest.raises(ValueError, match="holds recordings already: name another folder"):
         fly_and_report(flown(vehicle), [PLAN], tmp_path)

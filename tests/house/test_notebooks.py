@@ -43,7 +43,7 @@ PICTURED = {
     "ControlLoop": (lambda: LOOP, "PV(Kp=1.8"),
     "DelayEstimate": (
         lambda: dtm.estimate_delay(*record_step(rest=1.0), free=("delay",)),
-        "model reliable",
+        "reliable: delay",
     ),
     "Design": (
         lambda: dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5)),

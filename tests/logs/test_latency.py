@@ -202,7 +202,7 @@ def test_without_excitation_every_loop_is_refused_by_name(tmp_path):
     for one in still.loops:
         assert one.refusal
         assert f"{one.name}: {one.refusal}" in still.summary()
-    assert "no loop in it tells" in still.headline()
+    assert "no loop of flight.bin tells" in still.headline()
     assert still._repr_html_() is None
     with pytest.raises(ValueError, match="no loop tells how long"):
         still.plot()
@@ -213,11 +213,11 @@ def test_a_longer_delay_is_seen_as_a_real_change(found, other, tmp_path):
     changes = dtm.logs.compare_latencies(found, later)
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.010 < one.ci[1]
-    assert one.verdict.startswith("really longer")
+    assert one.outcome.startswith("really longer")
     changes = dtm.logs.compare_latencies(found, other)
     one = next(one for one in changes if one.command == "actuator")
     assert one.ci[0] < 0.0 < one.ci[1]
-    assert one.to_dict()["verdict"].startswith("no difference is seen")
+    assert one.to_dict()["outcome"].startswith("no difference is seen")
 
 
 def test_only_what_is_asked_for(tmp_path):
@@ -370,7 +370,7 @@ def test_a_window_that_contradicts_the_estimate_makes_it_doubtful():
         found = relation_of("roll", "roll", "attitude", "setpoint", [used], others=others)
         return found.estimate
 
-    assert estimate(alike).reliable
+    assert estimate(alike).verdict == "reliable"
     doubted = estimate(alike, later)
     assert doubted.verdict != "reliable"
     why = "the window from 40.0 to 52.0 s of the log contradicts it: delay and lag are 119.8"

@@ -267,15 +267,21 @@ def test_a_command_that_is_one_row_late_or_early_is_told():
         assert effect in codes[f"command_{law}"].effect
 
 
-@pytest.mark.parametrize(("law", "effect"), [("late", -TS), ("early", TS)])
-def test_the_effect_of_a_late_command_is_that_on_an_estimate(law, effect):
-    flight = flown(noise=0.0)
+@pytest.mark.parametrize("law", ["late", "early"])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_a_late_or_early_command_is_moved_and_said(law, noise):
+    """The delay came out one row, 65 ms, too short or too long, and was called right."""
+    flight = flown(noise=noise)
     if law == "late":
         flight = changed(rows(flight, slice(1, None)), command=flight.command[:-1])
     else:
         flight = changed(rows(flight, slice(None, -1)), command=flight.command[1:])
     fit = dtm.estimate_delay(flight, KNOWN, method=OutputError())
-    assert fit.delay - LOOP.delay == pytest.approx(effect, abs=0.005)
+    assert fit.delay == pytest.approx(LOOP.delay, abs=0.005)
+    low, high = fit.ci()
+    assert noise == 0.0 or low < LOOP.delay < high
+    assert f"the command was logged one row {law}" in fit.message
+    assert "moved by 65 ms" in fit.summary()
 
 
 def test_noise_of_the_recording_alone_leaves_the_law_approximate():

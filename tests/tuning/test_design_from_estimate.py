@@ -116,9 +116,7 @@ def test_a_filter_is_chosen_for_a_region(fit):
 def test_an_indication_is_refused_by_name():
     fit = estimate("delay", "gain")
     assert fit.verdict != "reliable"
-    with pytest.raises(
-        ValueError, match=r"not reliable.*the plant lacks it.*allow_indication=True"
-    ):
+    with pytest.raises(ValueError, match=r"indication.*the plant lacks it.*allow_indication=True"):
         dtm.design(fit, controller=dtm.P)
     best = dtm.design(fit, controller=dtm.P, gain_margin=2.5, allow_indication=True)
     assert "with which probability the true loop has these margins is not known" in best.summary()

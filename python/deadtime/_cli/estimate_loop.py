@@ -227,6 +227,7 @@ def _show_all(
         print_json(
             "comparison",
             {
+                "verdict": comparison.best.verdict,
                 "estimates": {name: fit.to_dict() for name, fit in comparison.estimates.items()},
                 "refusals": comparison.refusals,
                 "differences": {

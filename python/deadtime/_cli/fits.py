@@ -10,6 +10,11 @@ from deadtime.estimation import DelayEstimate, unseen_in_words
 #: How a message advises to fit more.
 _FREE = re.compile(r"free=\(([^)]*)\)")
 
+#: How a message advises to estimate without a plant, where the command was logged.
+_NO_PLANT = re.compile(
+    r"the call without the plant, dtm\.estimate_delay\(recording(, window=\([^)]*\))?\)$"
+)
+
 
 def print_headline(fit: DelayEstimate) -> None:
     """Print verdict and delay, and what the tests of the model leave open or what to do next."""
@@ -33,4 +38,5 @@ def print_details(fit: DelayEstimate) -> None:
 
 def _as_option(text: str) -> str:
     """Advice in the words of the command line."""
+    text = _NO_PLANT.sub("the same command without --kp and --plant", text)
     return _FREE.sub(lambda found: f"--free {found[1].replace(' ', '').replace(chr(39), '')}", text)

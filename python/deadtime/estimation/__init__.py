@@ -16,7 +16,6 @@ while the loop runs. Each method is a class that holds its options.
 from deadtime.estimation._choose import (
     PLANT_COLUMNS as PLANT_COLUMNS,
     PlantChoice,
-    bic as bic,
     choose_plant,
     likeliest as likeliest,
     with_pair as with_pair,
@@ -28,6 +27,7 @@ from deadtime.estimation._compare import (
     compare_methods,
     truth_row as truth_row,
 )
+from deadtime.estimation._criterion import bic as bic
 from deadtime.estimation._estimate import (
     JOINT as JOINT,
     METHODS as METHODS,

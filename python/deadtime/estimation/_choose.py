@@ -23,10 +23,12 @@ from deadtime._base.digits import between
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation._estimate import estimate_delay
+from deadtime.estimation._criterion import bic
+from deadtime.estimation._estimate import estimate_delay, method_of
 from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.methods._method import Loops, Method, Recordings, Windows, paired_runs
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.estimation.methods._waveform import Waveform
 from deadtime.loops import ControlLoop, FactoredPlant
 
 #: Most lags that are tried.
@@ -246,6 +248,10 @@ def choose_plant(
     if most_lags < 1:
         raise ValueError(f"most_lags={most_lags}: give at least one")
     runs = paired_runs(recording, loop, window)
+    # The plants of this family are the rivals of one another.
+    chosen = method_of(method, (run.recording for run in runs))
+    if isinstance(chosen, (OutputError, Waveform)):
+        chosen = replace(chosen, rivals=False)
     loops = [run.loop for run in runs]
     if not all(one.plant.is_rational for one in loops):
         raise ValueError(
@@ -269,7 +275,7 @@ def choose_plant(
                 known = [one.replace(plant=started) for one in loops]
                 try:
                     fits.append(
-                        estimate_delay(recording, known, method=method, free=free, window=window)
+                        estimate_delay(recording, known, method=chosen, free=free, window=window)
                     )
                 except NotIdentifiableError as error:
                     refusals[label] = str(error)
@@ -327,19 +333,3 @@ def _first(loop: ControlLoop, sample: float) -> FactoredPlant:
     integrator = bool(den[-1] == 0.0)
     lags = () if integrator else (LONG * sample,)
     return FactoredPlant(lags, loop.parameters.get("gain", 1.0), integrator=integrator)
-
-
-def bic(fit: DelayEstimate) -> float:
-    """Schwarz's criterion of the fit, from the plain likelihood."""
-    rows = sum(run.residuals.size for run in fit.runs)
-    unknown = len(fit.free)
-    if not isinstance(fit._profile, LikelihoodProfile):  # least squares: white noise
-        square = np.concatenate([run.residuals for run in fit.runs]) ** 2
-        least = max(float(np.mean(square)), np.finfo(float).tiny)
-        return rows * math.log(least) + unknown * math.log(rows)
-    fitted, total = fit._profile.fit, 0.0
-    for part, one, noise in zip(fitted.parts, fitted.runs, fitted.numbers.noise, strict=True):
-        count = int(np.sum(one.used))
-        total += count * math.log(part.variance * part.freedom / count) + part.log_det
-        unknown += fitted.trim + 2 * (noise.sensor > 0.0)
-    return total + unknown * math.log(rows)

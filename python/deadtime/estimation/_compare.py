@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import get_args
@@ -13,9 +13,11 @@ import numpy as np
 from deadtime._base.errors import NotIdentifiableError, RecordingError
 from deadtime._base.validation import OpenRange
 from deadtime.estimation._estimate import METHODS, checked_run
+from deadtime.estimation._findings import bound
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
-from deadtime.estimation.methods._method import paired_runs
+from deadtime.estimation.evidence._rival import beside_rivals
+from deadtime.estimation.methods._method import Run, paired_runs
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -345,9 +347,17 @@ def compare_methods(
             frees[f"{fit} with lag"] = named
         for name, free in frees.items():
             try:
-                estimates[name] = METHODS[fit]().estimate(runs, free)
+                found = METHODS[fit]().estimate(runs, free)
+                estimates[name] = bound(found, runs, of_loop=fit == "waveform")
             except NotIdentifiableError as error:
                 refusals[name] = str(error).rstrip(".")
     if not any(name in estimates for name in fits):
         raise NotIdentifiableError(refusals["waveform"])
-    return Comparison(estimates, refusals)
+    best = Comparison(estimates, refusals).best
+    name = next(name for name, one in estimates.items() if one is best)
+    method = METHODS[best.method]()
+
+    def again(run: Run, free: Sequence[str]) -> DelayEstimate:
+        return method.estimate([run], free)
+
+    return Comparison(estimates | {name: beside_rivals(best, runs[0], again)}, refusals)

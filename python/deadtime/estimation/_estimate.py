@@ -7,10 +7,12 @@ from typing import Any, overload
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import OpenRange
+from deadtime.estimation._findings import bound, command_on_its_row, loop_as_seen
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import estimate_by_evidence
 from deadtime.estimation.evidence._question import Between
+from deadtime.estimation.evidence._rival import beside_rivals
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay
@@ -204,7 +206,8 @@ def estimate_delay(
     -----
     A ground station sees the sum of all delays on the way round the loop; from its own log,
     it cannot distinguish the part in the command from the part in the measurement. A model that
-    does not explain the recording is returned with ``verdict="indication"``, not refused. Several
+    does not explain the recording is returned with ``verdict="indication"``, not refused, and so is
+    one whose plant is clearly behind another that explains the recording. Several
     recordings are weighted by the inverse of their noise where residuals are white, and by that of
     their excitation where they are not.
 
@@ -283,9 +286,13 @@ def estimate_delay(
             f"the {chosen.name} method is for linear plants, and this one limits the rate of its "
             "command: use method='output_error' on a recording with the logged command"
         )
+    of_loop = isinstance(chosen, Waveform)
     if chosen.joint:
-        runs = [_sampled_as_seen(run) for run in runs]
-    return chosen.estimate(runs, free)
+        runs = [loop_as_seen(run, of_loop=of_loop) for run in runs]
+    found = bound(chosen.estimate(runs, free), runs, of_loop=of_loop)
+    if len(runs) > 1 or not (isinstance(chosen, (OutputError, Waveform)) and chosen.rivals):
+        return found
+    return beside_rivals(found, runs[0], lambda run, names: chosen.estimate([run], names))
 
 
 #: Findings that the methods refuse themselves, or that some of them can do without.
@@ -293,21 +300,15 @@ OWN_REFUSALS = ("no_step", "command_constant", "output_constant")
 
 
 def checked_run(run: Run) -> Run:
-    """The run with what a check finds; refused by name where no estimate would be right."""
+    """The run with what a check finds; refused by name where no estimate would be right.
+
+    A command that was logged one row late or early is moved.
+    """
     check = run.recording.check(run.loop, run.window)
     for finding in check.findings:
         if finding.severity == "refused" and finding.code not in OWN_REFUSALS:
             raise NotIdentifiableError(str(finding))
-    return run._replace(check=check)
-
-
-def _sampled_as_seen(run: Run) -> Run:
-    """The run with the sample time that its rows show, where the loop has none."""
-    assert run.check is not None
-    for finding in run.check.findings:
-        if finding.code == "sample_time_seen" and finding.severity == "warning":
-            return run._replace(loop=run.loop.replace(sample_time=run.check.sample_time_seen))
-    return run
+    return command_on_its_row(run._replace(check=check))
 
 
 def automatic_method(recordings: Iterable[Recording]) -> str:

@@ -17,6 +17,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import non_negative, real_array
 from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
+from deadtime.estimation._felt import FELT, WORDS, Felt, highest_excited
 from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
@@ -79,7 +80,7 @@ class FittedRun(ReadOnlyArrays):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayEstimate(ReadOnlyArrays, Pictured):
+class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
     """An estimated delay, with the fitted loop and the uncertainty of every fitted parameter.
 
     Attributes
@@ -199,12 +200,15 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         level : float
             Between 0 and 1.
         name : str
-            One of `free`, or ``"delay+lag"`` (``"delay+time_constant"`` where that was fitted).
+            One of `free`, or ``"delay+lag"`` (``"delay+time_constant"`` where that was fitted);
+            of what a loop feels, ``"largest_gain"``, ``"crossover"``, ``"gain_at_crossover"``,
+            ``"phase_at_crossover"`` and ``"delay_at_crossover"``.
 
         Returns
         -------
         (float, float)
-            In seconds for a delay or lag, and not below zero for these.
+            In seconds for a delay or lag, and not below zero for these. Not claimed to hold where
+            the verdict is ``"indication"``.
 
         Raises
         ------
@@ -218,6 +222,10 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
         if not self.calibrated:
             raise ValueError(f"no interval: {self.uncalibrated}")
+        if name in FELT:
+            if not math.isfinite(self.crossover):
+                raise ValueError(f"no interval of {name}: no proportional gain is the largest")
+            return self._felt_interval(level, name)
         if name not in self.stderr:
             raise ValueError(
                 f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
@@ -230,10 +238,18 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
             reach = beside * float(special.ndtri(0.5 + level / 2))
             low = value - math.hypot(value - low, reach)
             return max(low, floor_of(name)), value + math.hypot(high - value, reach)
-        freedom = max(1, sum(one.residuals.size for one in self.runs) - len(self.free))
-        reach = float(special.stdtrit(freedom, 0.5 + level / 2)) * self.stderr[name]
+        reach = self.quantile(level) * self.stderr[name]
         low = value - reach
         return (max(low, floor_of(name)), value + reach)
+
+    def quantile(self, level: float) -> float:
+        """That of Student's distribution that goes with the standard errors at a level."""
+        from scipy import special
+
+        freedom = float(max(1, sum(one.residuals.size for one in self.runs) - len(self.free)))
+        if self._profile is not None:
+            freedom = min(self._profile.freedom_of(name) for name in self.free)
+        return float(special.stdtrit(freedom, 0.5 + level / 2))
 
     def explore(
         self,
@@ -368,6 +384,7 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
                 if self.calibrated
                 else None
             ),
+            **{name: getattr(self, name) for name in FELT[:2] + FELT[-1:]},
             "rms": self.rms,
             "white": self.whiteness.white,
             "residual_autocorrelation": self.whiteness.autocorrelation,
@@ -418,16 +435,20 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
         ends = between(*self.ci(0.95), error, "s")
         return f"reliable: delay {stated(self.delay, error, 's')} (95 %: {ends})"
 
-    def doubted(self, why: str) -> DelayEstimate:
+    def doubted(self, why: str, advice: str = "") -> DelayEstimate:
         """The estimate as an indication, for this further reason.
 
         Parameters
         ----------
         why : str
             The reason, in words that follow "indication: ".
+        advice : str
+            What to try, in place of what was advised before.
         """
-        known, begins, advice = self.message.partition(ADVICE)
-        message = f"{known}{'; ' if REASONS in known else REASONS}{why}{begins}{advice}"
+        known, begins, advised = self.message.partition(ADVICE)
+        if advice:
+            begins, advised = ADVICE, f"{advice})"
+        message = f"{known}{'; ' if REASONS in known else REASONS}{why}{begins}{advised}"
         return replace(self, verdict="indication", message=message)
 
     def summary(self) -> str:
@@ -461,12 +482,38 @@ class DelayEstimate(ReadOnlyArrays, Pictured):
                 f"  Cramér-Rao bound {stated(bound, math.nan, 's')}, for "
                 f"{' | '.join(noises) or self.crb.noise} with {', '.join(self.crb.free)} free"
             )
+        lines += self._felt_lines()
         kind = "white" if self.whiteness.white else "coloured"
         lines.append(
             f"  residuals {self.rms:.4g} rms, {kind} (lag-1 autocorrelation "
             f"{self.whiteness.autocorrelation:.2f})"
         )
         return lines
+
+    def _felt_lines(self) -> list[str]:
+        """What a loop feels of the plant: at crossover, or where the command still moves."""
+        if not self.loop.plant.is_linear:
+            return []
+        if math.isfinite(self.crossover):
+            values = ("largest_gain", ""), ("crossover", "rad/s"), ("delay_at_crossover", "s")
+            parts = []
+            for name, unit in values:
+                error = math.nan
+                if self.verdict == "reliable" and self.calibrated:
+                    low, high = self.ci(0.95, name)
+                    error = (high - low) / (2.0 * self.quantile(0.95))
+                shown = claimed(self.verdict, float(getattr(self, name)), error, unit)
+                parts.append(f"{WORDS[name]} {shown}")
+            return [f"  {', '.join(parts)} (without a hold)"]
+        line = "  no proportional gain makes the loop unstable"
+        omega = highest_excited(self.recording, self.loop)
+        if math.isfinite(omega):
+            view = self.at(omega)
+            line += (
+                f"; at {omega:.3g} rad/s, the highest frequency of the command: gain "
+                f"{rough(view.gain[0])}, equivalent delay {rough(view.delay[0], 's')}"
+            )
+        return [line]
 
     def plot(self, ax: Sequence[Axes] | None = None) -> list[Axes]:
         """Draw the fit over the data, the residuals, and the profile of the delay.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._base.verdicts import Verdict
+from deadtime._base.verdicts import Verdict, rough
 from deadtime.estimation import DelayEstimate, estimate_delay
 from deadtime.flights._plan import FlightPlan
 from deadtime.flights._plants import (
@@ -64,8 +64,14 @@ class Learned:
 
     @property
     def verdict(self) -> Verdict:
-        """That on the fit, and an indication where the times of the flights are not regular."""
-        return "indication" if self.irregular else self.fit.verdict
+        """That on the fit; an indication where times are irregular or the parts do not add up."""
+        doubted = self.irregular or not self.adds_up
+        return "indication" if doubted else self.fit.verdict
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether link and vehicle together take what the loop does, within their intervals."""
+        return self.split is None or self.split.adds_up(self.fit, self.whole_delay)
 
     @property
     def whole_delay(self) -> float:
@@ -84,6 +90,13 @@ class Learned:
                 f"The times of the flights are not regular ({'; '.join(self.irregular)}), so the "
                 "estimate is an indication: repeat the experiment on a computer with less other "
                 "work."
+            )
+        if self.split is not None and not self.adds_up:
+            parts = self.split.transport.delay + self.split.vehicle_delay
+            found.append(
+                f"By the vehicle's reports link and vehicle take {rough(parts, 's')}, by command "
+                f"and output {rough(self.whole_delay, 's')}: they do not add up within their "
+                "intervals, so the estimate is an indication."
             )
         if self.fit.verdict != "reliable":
             found.append(

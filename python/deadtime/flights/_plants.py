@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.estimation import DelayEstimate, OutputError, estimate_delay
 from deadtime.flights._arrivals import error_of_mean
 from deadtime.flights._runs import FlownSteps
 from deadtime.links.axes import Axis
@@ -125,7 +125,7 @@ def fit_by_evidence(
             fit = estimate_delay(
                 [one.measured for one in flights],
                 loops,
-                method="output_error",
+                method=OutputError(rivals=False),
                 free=free,
                 window=[(0.5 * one.settle, None) for one in flights],
             )

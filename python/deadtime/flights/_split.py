@@ -19,12 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from deadtime.estimation import DelayEstimate, estimate_delay
+from deadtime.estimation import DelayEstimate, OutputError, estimate_delay
 from deadtime.flights._runs import Telemetry
 from deadtime.loops import ControlLoop, FirstOrder, Integrator, P
 from deadtime.recordings import Recording
 
 Array = NDArray[np.float64]
+
+#: The plants of both parts are known: no other is looked for.
+METHOD = OutputError(rivals=False)
 
 #: Time between used messages, s, while the setpoint is constant: more of them hold no more
 #: information on the delay.
@@ -61,6 +64,21 @@ class DelaySplit:
         """Delay and time constant of the vehicle together, s."""
         return self.vehicle.delay + self.vehicle.loop.parameters["time_constant"]
 
+    def adds_up(self, whole: DelayEstimate, together: float) -> bool:
+        """Whether both parts take what the loop does, within the 95 % intervals of all three.
+
+        Parameters
+        ----------
+        whole : DelayEstimate
+            That from command and output, with ``delay+lag``.
+        together : float
+            Delay and lags of the loop for small commands by it, s.
+        """
+        parts = self.transport.delay + self.vehicle_delay
+        asked = ((self.transport, "delay"), (self.vehicle, self.late), (whole, "delay+lag"))
+        widths = [0.5 * float(np.ptp(fit.ci(0.95, name))) for fit, name in asked]
+        return abs(parts - together) <= float(np.linalg.norm(widths))
+
 
 def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
     """Estimate both parts from the messages of one flight or several.
@@ -82,17 +100,15 @@ def split_delay(flights: Sequence[Telemetry]) -> DelaySplit:
     # The controller is not part of this path; the sample time makes the commands held.
     link = ControlLoop(Integrator(), P(1.0), sample_time=_period(flights[0].command_time))
     transport = estimate_delay(
-        [_followed(one) for one in flights], link, method="output_error", free=("delay", "gain")
+        [_followed(one) for one in flights], link, method=METHOD, free=("delay", "gain")
     )
     own = link.replace(plant=FirstOrder(1.0, GUESS))
     climbed = [_climbed(one) for one in flights]
     free = ("delay", "gain", "time_constant")
-    vehicle = estimate_delay(climbed, own, method="output_error", free=free)
+    vehicle = estimate_delay(climbed, own, method=METHOD, free=free)
     if vehicle.delay == 0.0:
         # At its bound the delay has no interval, and a lag alone explains the response.
-        vehicle = estimate_delay(
-            climbed, own.replace(delay=0.0), method="output_error", free=free[1:]
-        )
+        vehicle = estimate_delay(climbed, own.replace(delay=0.0), method=METHOD, free=free[1:])
     return DelaySplit(transport, vehicle)
 
 

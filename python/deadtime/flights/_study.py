@@ -28,6 +28,10 @@ COLUMNS = (
 )
 
 
+#: Parts of the delay of the loop in words: only their sum is called the delay.
+PART_WORDS = (("delay", "dead time"), ("lag", "lag"), ("delay+lag", "delay, both together"))
+
+
 @dataclass(frozen=True)
 class FlightStudy:
     """Results of the whole experiment on one axis.
@@ -137,7 +141,7 @@ class FlightStudy:
         fit, split = self.learned.fit, self.learned.split
         lines: list[tuple[str, ...]] = [
             _part(fit, name, f"{words}, from command and {self.axis.words}")
-            for name, words in (("delay", "delay"), ("lag", "lag"), ("delay+lag", "together"))
+            for name, words in PART_WORDS
             if name in fit.stderr
         ]
         speed = self.axis.rate.replace("_", " ")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.plain import plain_fields
 from deadtime.loops import ControlLoop
 from deadtime.recordings._check_clock import clock_findings, read_clock
 from deadtime.recordings._check_command import Law, command_findings, read_command
@@ -129,7 +130,7 @@ class RecordingCheck(ReadOnlyArrays):
     def to_dict(self) -> dict[str, Any]:
         """All that was found, as plain values for JSON."""
         found = {**self._shown(), "refused": self.refused}
-        found["findings"] = [asdict(finding) for finding in self.findings]
+        found["findings"] = [plain_fields(asdict(one)) for one in self.findings]
         found["holes"] = [hole._asdict() for hole in self.holes]
         found["repeated"] = self.repeated.tolist()
         return found

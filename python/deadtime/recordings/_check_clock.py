@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -131,6 +132,7 @@ def _near_samples(rows: Rows, sample_time: float, whole: int, ratio: float) -> I
             + f" of {seconds(sample_time)}: if the time stamps are right, give sample_time="
             f"{rows.mean_time / whole:.6g}; if the controller is, scale the time stamps",
             f"with the wrong one of two clocks, gain and delay are {100.0 * off:.2g} % off",
+            share=off,
         )
     if whole > 1:
         late = 0.5 * (whole - 1) * sample_time
@@ -176,6 +178,7 @@ def _other_spacing(
             f"{apart}, so the rows are not the samples of the controller: commands between them "
             "are missing; log at its rate",
             f"{shift} and by half a row, {seconds(0.5 * rows.mean_time)}",
+            0.5 * (sample_time + rows.mean_time),
         )
     elif columns.command is None:
         yield Finding(
@@ -184,6 +187,7 @@ def _other_spacing(
             f"{apart}, so the rows are not the samples of the controller, and without the command "
             "their times are unknown; log the command",
             shift,
+            0.5 * sample_time,
         )
     else:
         soon = _hasty(columns.time[1:][np.diff(columns.command) != 0.0], sample_time)
@@ -227,6 +231,7 @@ def _without_sample_time(
                 f"the rows are {rows.row_time:g} s apart and last {span:g} s, and a loop with "
                 f"these gains takes about {own:.3g} s: check that the time stamps are seconds",
                 "a delay comes out wrong by the same factor as the times",
+                math.inf,
             )
             return
     if clock.sample_time_seen is not None:

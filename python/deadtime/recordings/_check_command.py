@@ -6,6 +6,7 @@ controller with an integral or a derivative depends on what lies between the row
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -224,6 +225,7 @@ def command_findings(
             f"{columns.time.size} rows: it was logged at another time there, or did not come from "
             "this controller",
             f"each such row may hold a command that is one row, {seconds(rows.row_time)}, off",
+            rows.row_time * command.strays / columns.time.size,
         )
     yield from _limit_findings(columns, command, loop)
 
@@ -249,6 +251,7 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
             f"the command is not Kp (reference - output){part}: another controller, other columns, "
             "or a reference that is not logged",
             loose,
+            math.inf,
         )
     slope = line.slope
     size = abs(slope)
@@ -278,6 +281,7 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
             f"the command is Kp (reference - output) {line.offset:+.3g}: something else is added "
             "to it, or the controller had another reference",
             loose,
+            math.inf,
         )
     return Finding(
         "command_gain",
@@ -285,6 +289,7 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
         f"the command is {slope:.4g} times Kp (reference - output): the gain of the controller was "
         f"{slope * Kp:.4g}, not Kp={Kp:g}",
         loose,
+        math.inf,
     )
 
 

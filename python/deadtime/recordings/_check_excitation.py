@@ -128,4 +128,5 @@ def _range_finding(columns: Columns, loop: ControlLoop) -> Iterator[Finding]:
         "well damped loop with an integrating plant, which reaches its reference: check that both "
         "are in one unit and belong to one loop, and that the loop was closed",
         "a fit of the loop may end at any delay",
+        math.inf,
     )

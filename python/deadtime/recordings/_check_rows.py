@@ -191,6 +191,7 @@ def row_findings(columns: Columns, rows: Rows, loop: ControlLoop) -> Iterator[Fi
             "out, or log each measurement when it arrives",
             f"in the mean the output is {seconds(share * rows.row_time, 3)} older than its row "
             "says, which adds to the delay",
+            share * rows.row_time,
         )
 
 

@@ -29,12 +29,18 @@ class Finding:
         What was found, with its numbers, and what to do.
     effect : str
         What it would do to an estimate of the delay.
+    shift : float
+        By up to how much it may move the delay, s; infinite where that is not known.
+    share : float
+        The same as a share of the delay.
     """
 
     code: str
     severity: Severity
     message: str
     effect: str = ""
+    shift: float = 0.0
+    share: float = 0.0
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.message}" + (f"; {self.effect}" if self.effect else "")

@@ -57,6 +57,8 @@ class Question(ReadOnlyArrays):
         The controller in the loop, where it is known.
     window : (low, high) or None
         The window as it was given, s.
+    limit : float or None
+        Largest size of the command of the controller.
     """
 
     recording: Recording
@@ -68,6 +70,7 @@ class Question(ReadOnlyArrays):
     plant: str | None = None
     controller: Controller | None = None
     window: OpenRange | None = None
+    limit: float | None = None
 
     def answer(
         self,
@@ -97,7 +100,7 @@ class Question(ReadOnlyArrays):
 
     def options(self) -> dict[str, Any]:
         """What was given besides the recording, as arguments of `estimate_delay`."""
-        names = ("window", "controller", "at_rest", "largest_delay", "plant")
+        names = ("window", "controller", "limit", "at_rest", "largest_delay", "plant")
         found = {name: getattr(self, name) for name in names}
         if self.between != "undecided":
             found["between"] = self.between
@@ -159,7 +162,16 @@ def question_of(
     if closed_loop is None:
         closed_loop = controller is not None or shows_controller(part)
     return Question(
-        part, rows.start, closed_loop, at_rest, largest_delay, between, plant, controller, window
+        part,
+        rows.start,
+        closed_loop,
+        at_rest,
+        largest_delay,
+        between,
+        plant,
+        controller,
+        window,
+        limit,
     )
 
 

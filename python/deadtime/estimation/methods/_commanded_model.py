@@ -192,7 +192,7 @@ class CommandedModel(ModelOfOne):
 
 def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> CommandedModel:
     """Commands up to the end of the window, including those before its start where known."""
-    recording, loop, window, _ = run
+    recording, loop, window, *_ = run
     initial_output, computed, known, air, _, complete = assumed
     rows = recording.rows(*window)
     data = recording.window(*window) if known is None else before_filter(recording, rows, known)

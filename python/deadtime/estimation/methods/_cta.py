@@ -83,7 +83,7 @@ class CTA(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         names = checked_names(free, loop)
         check_delay_free(names, "cta")
         stiffness_of(loop, "cta")

@@ -74,7 +74,7 @@ class Decay(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         check_delay_alone("decay", free)
         stiffness = stiffness_of(loop, "decay")
         simulated = SimulatedRecording(recording, loop, window)

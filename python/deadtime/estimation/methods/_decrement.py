@@ -57,7 +57,7 @@ class Decrement(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         names = checked_names(free, loop)
         if "lag" in names:
             raise ValueError(

@@ -95,7 +95,7 @@ class Frequency(Method):
         """Fit `free` to the one recording."""
         from scipy import special
 
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         names = checked_names(free, loop)
         integrator_of(loop, "frequency")
         data = recording.window(*window)

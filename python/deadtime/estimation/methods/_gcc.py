@@ -78,7 +78,7 @@ class GCC(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         check_delay_alone("gcc", free)
         simulated = SimulatedRecording(recording, loop, window)
         data = simulated.recording

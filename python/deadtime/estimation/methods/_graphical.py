@@ -83,7 +83,7 @@ class Graphical(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         check_delay_alone("graphical", free)
         simulated = SimulatedRecording(recording, loop, window)
         reading, _ = read_decaying_step(simulated.recording, "graphical")

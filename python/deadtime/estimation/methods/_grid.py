@@ -94,7 +94,7 @@ class Grid(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         names = checked_names(free, loop)
         check_delay_free(names, "grid")
         simulated = SimulatedRecording(recording, loop, window)

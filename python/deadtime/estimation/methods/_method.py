@@ -23,12 +23,16 @@ Windows: TypeAlias = OpenRange | list[OpenRange | None] | None
 
 
 class Run(NamedTuple):
-    """One recording, the loop that made it, the part to use, and what was found there."""
+    """One recording, the loop that made it, the part to use, and what was found there.
+
+    `corrected` says in words what of it has been put right.
+    """
 
     recording: Recording
     loop: ControlLoop
     window: OpenRange = (None, None)
     check: RecordingCheck | None = None
+    corrected: tuple[str, ...] = ()
 
 
 def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> list[Run]:

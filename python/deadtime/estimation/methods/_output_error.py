@@ -108,6 +108,10 @@ class OutputError(Method):
         numbers, or that of delay and lag together alone. The search for the ends of an interval may
         find a likelier fit than the first, from which all begins anew; most of the time goes there.
         The others are computed when they are asked for.
+    rivals : bool
+        Whether other kinds of plant are fitted to one recording too, where something in it is left
+        that they could explain. Where one is clearly better, the answer is an indication that
+        names it.
 
     Raises
     ------
@@ -126,6 +130,7 @@ class OutputError(Method):
     output_filter: tuple[Sequence[float], Sequence[float]] | None = None
     air: Literal["command", "vehicle"] = "command"
     intervals: Literal["all", "sum"] = "all"
+    rivals: bool = True
 
     name: ClassVar[str] = "output_error"
     joint: ClassVar[bool] = True

@@ -164,7 +164,7 @@ class Overshoot(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         stiffness = stiffness_of(loop, "overshoot")
         simulated = SimulatedRecording(recording, loop, window)
         reading = read_step(simulated.recording)

@@ -84,7 +84,7 @@ class Relay(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the one recording."""
-        ((recording, loop, window, _),) = runs
+        ((recording, loop, window, *_),) = runs
         check_delay_alone("relay", free)
         plant = integrator_of(loop, "relay")
         data = recording.window(*window)

@@ -81,6 +81,10 @@ class Waveform(Method):
         samples of a P controller, unless ``"recording"`` is likelier by a factor of 20.
     initial_output : float, optional
         True output at the start of the window; fitted if not given.
+    rivals : bool
+        Whether other kinds of plant are fitted to one recording too, where something in it is left
+        that they could explain. Where one is clearly better, the answer is an indication that
+        names it.
 
     Raises
     ------
@@ -90,6 +94,7 @@ class Waveform(Method):
 
     noise: NoisePath = "auto"
     initial_output: float | None = None
+    rivals: bool = True
 
     name: ClassVar[str] = "waveform"
     joint: ClassVar[bool] = True

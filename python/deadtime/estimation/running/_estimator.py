@@ -15,6 +15,7 @@ from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay
 from deadtime.estimation._native import OnlineBank
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of, not_yet
 from deadtime.estimation.running._settings import (
     DELAYS,
@@ -140,7 +141,7 @@ class OnlineEstimator:
     >>> for row in zip(flight.time, flight.output, flight.command):
     ...     now = estimator.update(*row)
     >>> now.verdict, bool(now.ci[0] < 0.3 < now.ci[1])
-    (True, True)
+    ('reliable', True)
     """
 
     def __init__(
@@ -386,7 +387,7 @@ class OnlineEstimator:
         recording = Recording(rows[:, 0], held, rows[:, 1], sent=(sent[:, 0], sent[:, 1]))
         free = ("delay", "gain") if self._lags is None else ("delay", "gain", "lag")
         loop = self._loop.replace(delay=None)
-        return estimate_delay(recording, loop, method="output_error", free=free)
+        return estimate_delay(recording, loop, method=OutputError(rivals=False), free=free)
 
     def _replay(self, fit: DelayEstimate) -> OnlineEstimate:
         """Begin with the noise of a fit, and give the bank what was kept."""

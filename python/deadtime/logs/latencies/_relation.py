@@ -40,7 +40,7 @@ CLEARLY, WORTH = 6.0, 0.25
 LACKING, CONTRADICT = "a further lag of", "the recordings contradict one another"
 
 #: Intervals of the other numbers are computed when they are asked for.
-METHOD = OutputError(intervals="sum")
+METHOD = OutputError(intervals="sum", rivals=False)
 
 
 @dataclass(frozen=True, eq=False)

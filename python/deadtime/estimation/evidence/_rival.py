@@ -1,0 +1,180 @@
+"""Whether another plant explains a recording clearly better than the one that was named.
+
+The family of plants is fitted to the rows of an estimate. A plant of it is a rival if
+
+1. it leads the kind of the named plant, fitted in the same way, by more than `CLEAR` in BIC;
+2. it leads in the likelihood of the method of the estimate too, which has air that moves the plant;
+3. where it crosses over, gain or equivalent delay of the named plant lie outside the hull of the
+   family: the intervals do not meet. Of an estimate that is an indication anyhow this is not asked.
+
+The family has no such air. In wind a plant with further numbers follows it there, and is none here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+import deadtime.estimation._native as native
+from deadtime._base.digits import between
+from deadtime._base.errors import DeadtimeError
+from deadtime._base.validation import OpenRange
+from deadtime._base.verdicts import rough
+from deadtime.estimation._criterion import bic
+from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._question import PLANTS, Question, question_of
+from deadtime.estimation.evidence._screen import may_have_rivals
+from deadtime.estimation.evidence._words import CLEAR
+from deadtime.estimation.methods._method import Run
+from deadtime.loops import FactoredPlant, FirstOrder, Integrator, P, Plant
+from deadtime.recordings import Recording
+
+#: Most rows that plants are compared on; of more, as many in which the command changes most. More:
+#: a rival that shows nowhere else is found, and each estimate takes longer.
+MOST_ROWS = 10_000
+
+#: Fits the numbers `free` of a loop to the recording of an estimate, by its method.
+Again = Callable[[Run, Sequence[str]], DelayEstimate]
+
+
+def beside_rivals(fit: DelayEstimate, run: Run, again: Again) -> DelayEstimate:
+    """The estimate, or the same as an indication that names a plant which is clearly better."""
+    kind, question = kind_of(fit.loop.plant, fit.free), _question(run)
+    if kind is None or question is None:
+        return fit
+    doubted = fit.verdict == "indication"
+    if not (doubted or may_have_rivals(fit, question)):
+        return fit
+    found = _answer(question)
+    if found is None:
+        return fit
+    best = found.candidates[0]
+    lead = _behind(found, kind) - best.bic
+    if lead > CLEAR:
+        named = _answer(question.of(kind))
+        lead = min(lead, math.inf if named is None else _behind(named, kind) - best.bic)
+    if not lead > CLEAR or not (doubted or _is_outside(fit, found)):
+        return fit
+    rival = candidate_of(best, best.bic)
+    lead = min(lead, _lead_in_air(fit, rival, run, again))
+    if not lead > CLEAR:
+        return fit
+    ends = between(*found.hull["delay"], math.nan, "s")
+    why = (
+        f"{rival.in_words()}, explains the recording clearly better, by {lead:.3g} in BIC; its "
+        f"dead time is {rough(rival.delay, 's')} ({ends})"
+    )
+    plant = fit.loop.plant
+    if best.plant == kind_of(plant, list(plant.parameters)):
+        free = ("delay", *(name for name in plant.parameters if name in ("lag", *best.names)))
+        return fit.doubted(why, f"free={free!r}")
+    return fit.doubted(why, f"the call without the plant, {_call(question)}")
+
+
+def kind_of(plant: Plant, free: Sequence[str]) -> str | None:
+    """The least kind of the family that has the numbers of a plant; None where none has them."""
+    if isinstance(plant, FirstOrder):
+        return "lag"
+    if isinstance(plant, Integrator):
+        return "integrator, lag" if plant.lag or "lag" in free else "integrator"
+    if not isinstance(plant, FactoredPlant):
+        return None
+    zero = bool(plant.zero) or "zero" in free
+    for order in range(len(plant.lags) + 2 * plant.has_pair, 3):
+        parts = ["integrator"] * plant.integrator + [("", "lag", "two lags")[order], "zero" * zero]
+        name = ", ".join(part for part in parts if part) or "delay"
+        if name in PLANTS:
+            return name
+    return None
+
+
+def _question(run: Run) -> Question | None:
+    """What is asked of the family; None where the command of each row is not known."""
+    loop = run.loop
+    computed = run.recording.command is None
+    if run.recording.sent is not None or not loop.plant.is_linear:
+        return None
+    if computed and not isinstance(loop.controller, P):
+        return None
+    controller, limit = (loop.controller, loop.limit) if computed else (None, None)
+    recording, window = _most_excited(run)
+    try:
+        return question_of(
+            recording, window, None, None, None, "undecided", None, controller, limit
+        )
+    except DeadtimeError:
+        return None
+
+
+def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
+    """The window, or the `MOST_ROWS` of it in which the command, or the reference, changes most.
+
+    As many rows before it are kept: their commands act in it.
+    """
+    rows = run.recording.rows(*run.window)
+    if rows.stop - rows.start <= MOST_ROWS:
+        return run.recording, run.window
+    command = run.recording.command
+    moves = np.abs(np.diff(run.recording.reference if command is None else command))
+    moves = moves[rows.start : rows.stop - 1]
+    total = np.concatenate([[0.0], np.cumsum(moves)])
+    within = MOST_ROWS - 1
+    first = rows.start + int(np.argmax(total[within:] - total[:-within]))
+    time = run.recording.time
+    window = float(time[first]), float(time[first + MOST_ROWS - 1])
+    return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window
+
+
+def _answer(question: Question) -> native.FamilyFit | None:
+    """The family on these rows; None where they are too few, or determine no plant."""
+    try:
+        found = question.answer()
+    except ValueError:
+        return None
+    return found if found.verdict != "none" and found.candidates else None
+
+
+def _behind(found: native.FamilyFit, kind: str) -> float:
+    """BIC of the best plant of a kind; infinite where it could not be fitted."""
+    return min((one.bic for one in found.candidates if one.plant == kind), default=math.inf)
+
+
+def _is_outside(fit: DelayEstimate, found: native.FamilyFit) -> bool:
+    """Whether gain or angle of the named plant lie outside the hull of the family."""
+    omega = found.crossover
+    if not math.isfinite(omega):
+        omega = max(found.excited, default=math.nan)
+    if not omega > 0.0:
+        return False
+    view, hull = fit.at(omega), found.at([omega])
+    for name, own in (("gain", view.gain_ci), ("phase", view.phase_ci)):
+        ends = own[:, 0] if np.all(np.isfinite(own)) else getattr(view, name)[[0, 0]]
+        low, high = hull[name][1][0], hull[name][2][0]
+        if ends[1] < low or ends[0] > high:
+            return True
+    return False
+
+
+def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, again: Again) -> float:
+    """Lead of the rival in the criterion of the method of the estimate; none without a fit."""
+    has_zero = bool(rival.parameters.get("zero"))
+    free = [name for name in rival.plant.parameters if name != "zero" or has_zero]
+    loop = run.loop.replace(plant=rival.plant, delay=rival.delay)
+    try:
+        other = again(run._replace(loop=loop), ("delay", *free))
+    except (DeadtimeError, ValueError):
+        return -math.inf
+    return bic(fit) - bic(other)
+
+
+def _call(question: Question) -> str:
+    """The call that estimates without a plant."""
+    given = "".join(
+        f", {name}={f'dtm.{value!r}' if isinstance(value, P) else value}"
+        for name, value in question.options().items()
+        if value != (None, None)
+    )
+    return f"dtm.estimate_delay(recording{given})"
