@@ -13,6 +13,7 @@
 mod disturbance;
 mod family;
 mod fit;
+mod flight;
 mod kept;
 mod kicks;
 mod likelihood;
@@ -41,6 +42,7 @@ pub use family::{
     Question, Record, Triple, Verdict, fit_family,
 };
 pub use fit::{Fit, Model, Search};
+pub use flight::{FlightFit, FlightPlant, FlightRun};
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};
 pub use path::held_response;
