@@ -17,7 +17,7 @@ type Array = Py<PyArray1<f64>>;
 
 /// The rows of one recording.
 #[derive(FromPyObject)]
-struct RecordedRows<'py> {
+pub(crate) struct RecordedRows<'py> {
     time: Floats<'py>,
     output: Floats<'py>,
     used: PyReadonlyArrayDyn<'py, bool>,
@@ -31,7 +31,7 @@ struct RecordedRows<'py> {
 }
 
 impl RecordedRows<'_> {
-    fn rows(&self) -> PyResult<Rows> {
+    pub(crate) fn rows(&self) -> PyResult<Rows> {
         let rows = Rows {
             time: owned(&self.time)?,
             output: owned(&self.output)?,
@@ -156,7 +156,7 @@ impl PlantNumbers {
 }
 
 impl PlantNumbers {
-    fn fit(&self) -> Fit {
+    pub(crate) fn fit(&self) -> Fit {
         let noise = self.noise.iter().map(RowNoise::noise);
         Fit {
             point: Point {
@@ -381,7 +381,7 @@ impl FlightLikelihood {
     }
 }
 
-fn read(quantity: &str) -> PyResult<Quantity> {
+pub(crate) fn read(quantity: &str) -> PyResult<Quantity> {
     Ok(match quantity {
         "delay" => Quantity::Delay,
         "total" => Quantity::Total,

@@ -29,6 +29,7 @@ mod propagation;
 mod quotients;
 mod rows;
 mod search;
+pub mod statistics;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -42,7 +43,10 @@ pub use family::{
     Question, Record, Triple, Verdict, fit_family,
 };
 pub use fit::{Fit, Model, Search};
-pub use flight::{FlightFit, FlightPlant, FlightRun};
+pub use flight::{
+    Asked, Cause, Finding, FlightFit, FlightPlant, FlightRun, Judgement, Whiteness, colour_factors,
+    judge, unseen_lag, whiteness,
+};
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};
 pub use path::held_response;

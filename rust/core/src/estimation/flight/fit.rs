@@ -10,6 +10,9 @@ use super::plant::FlightPlant;
 use super::tolerances::PRICES;
 use crate::{Error, Task};
 
+/// Most rows of a search.
+const PART: usize = 5000;
+
 /// One recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlightRun {
@@ -181,6 +184,16 @@ impl FlightFit {
     /// As for `Model::at`.
     pub fn fitted(&self, start: &Point, tolerance: f64, task: &Task) -> Result<Fit, Error> {
         fitted(&self.model, start, tolerance, task)
+    }
+
+    /// The rows of the recordings.
+    pub(super) fn rows(&self) -> Vec<Rows> {
+        self.runs.iter().map(|run| run.rows.clone()).collect()
+    }
+
+    /// Would a search on all rows take too long?
+    pub fn is_long(&self) -> bool {
+        self.runs.iter().any(|run| run.rows.time.len() > PART)
     }
 
     /// The noise of each recording.

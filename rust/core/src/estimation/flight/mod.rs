@@ -6,8 +6,12 @@
 //! Akaike's criterion asks for them.
 
 mod fit;
+mod judge;
 mod plant;
 mod tolerances;
 
 pub use fit::{FlightFit, FlightRun};
+pub use judge::{
+    Asked, Cause, Finding, Judgement, Whiteness, colour_factors, judge, unseen_lag, whiteness,
+};
 pub use plant::FlightPlant;
