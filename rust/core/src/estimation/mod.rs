@@ -42,7 +42,10 @@ pub use family::{
     Question, Record, Triple, Verdict, fit_family,
 };
 pub use fit::{Fit, Model, Search};
-pub use flight::{FlightFit, FlightPlant, FlightRun};
+pub use flight::{
+    FlightFit, FlightPlant, FlightProfile, FlightRun, KnownQuantity, Scatter, excited_part,
+    fit_flight, least_squares, scatter_of, spikes,
+};
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};
 pub use path::held_response;
