@@ -1,7 +1,7 @@
 //! Bindings of the tests of a fit of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Asked, Finding, FlightFit, FlightPlant, FlightRun, Free, Judgement, Quantity,
+    Asked, Finding, FlightFit, FlightPlant, FlightProfile, FlightRun, Free, Judgement, Quantity,
     Whiteness as Found, colour_factors as colours, judge as judged, unseen_lag as unseen,
     whiteness as tested,
 };
@@ -104,13 +104,15 @@ impl From<Found> for FlightWhiteness {
     }
 }
 
-/// One thing that speaks against a fit.
+/// What one test of a fit says.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 #[derive(Clone)]
 pub(crate) struct FlightFinding {
     cause: &'static str,
     run: Option<usize>,
     sizes: Vec<f64>,
+    p_value: f64,
+    is_against: bool,
     plant_lacks: bool,
 }
 
@@ -118,7 +120,6 @@ pub(crate) struct FlightFinding {
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 pub(crate) struct FlightJudgement {
     whiteness: FlightWhiteness,
-    further_lag: f64,
     is_coloured: bool,
     findings: Vec<FlightFinding>,
 }
@@ -132,29 +133,33 @@ impl From<Judgement> for FlightJudgement {
                 cause: one.cause.name(),
                 run: one.run,
                 sizes: one.sizes,
+                p_value: one.p_value,
+                is_against: one.is_against,
                 plant_lacks: one.plant_lacks,
             });
         Self {
             whiteness: found.whiteness.into(),
-            further_lag: found.further_lag,
             is_coloured: found.is_coloured,
             findings: findings.collect(),
         }
     }
 }
 
-/// Test a fit; `total` is the interval out of which a further lag may not move delay and lags.
+/// Test a fit with intervals of these quantities; `total` is the interval out of which a further lag
+/// may not move delay and lags.
 #[pyfunction]
-#[pyo3(signature = (fit, *, commands_given, widens, total=None))]
+#[pyo3(signature = (fit, quantities, *, commands_given, widens, total=None))]
 pub(crate) fn judge(
     py: Python<'_>,
     fit: GivenFit<'_>,
+    quantities: Vec<String>,
     commands_given: bool,
     widens: bool,
     total: Option<(f64, f64)>,
 ) -> PyResult<FlightJudgement> {
-    let fit = fit.fit()?;
+    let (fit, quantities) = (fit.fit()?, read_all(&quantities)?);
     let asked = Asked {
+        quantities: &quantities,
         commands_given,
         widens,
         total,
@@ -176,10 +181,14 @@ pub(crate) fn colour_factors(
     fit: GivenFit<'_>,
     quantities: Vec<String>,
 ) -> PyResult<Vec<f64>> {
-    let fit = fit.fit()?;
-    let quantities = quantities.iter().map(|name| read(name));
-    let quantities: Vec<Quantity> = quantities.collect::<PyResult<_>>()?;
-    run_here(py, |task| colours(&fit, &quantities, task))
+    let (fit, quantities) = (fit.fit()?, read_all(&quantities)?);
+    run_here(py, |task| {
+        colours(&FlightProfile::new(fit, &quantities, task)?, task)
+    })
+}
+
+fn read_all(names: &[String]) -> PyResult<Vec<Quantity>> {
+    names.iter().map(|name| read(name)).collect()
 }
 
 /// Test the residuals of each recording after a fit of so many parameters for whiteness.

@@ -44,8 +44,9 @@ pub use family::{
 };
 pub use fit::{Fit, Model, Search};
 pub use flight::{
-    Asked, Cause, Finding, FlightFit, FlightPlant, FlightRun, Judgement, Whiteness, colour_factors,
-    judge, unseen_lag, whiteness,
+    Asked, Cause, Finding, FlightFit, FlightPlant, FlightProfile, FlightRun, Judgement,
+    KnownQuantity, Scatter, Whiteness, colour_factors, excited_part, fit_flight, judge,
+    least_squares, scatter_of, spikes, unseen_lag, whiteness,
 };
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};

@@ -10,9 +10,6 @@ use super::plant::FlightPlant;
 use super::tolerances::PRICES;
 use crate::{Error, Task};
 
-/// Most rows of a search.
-const PART: usize = 5000;
-
 /// One recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlightRun {
@@ -80,20 +77,40 @@ impl FlightFit {
         given_gain: Option<f64>,
     ) -> Result<Self, Error> {
         let rows = runs.iter().map(|run| run.rows.clone()).collect();
-        let model = Arc::new(plant.model(rows, trim)?);
+        let model = plant.model(rows, trim)?;
+        let found = Self::of(plant, runs, trim, fit, model);
         Ok(Self {
+            given_gain,
+            ..found
+        })
+    }
+
+    /// The same with the likelihood of these recordings.
+    pub(super) fn of(
+        plant: FlightPlant,
+        runs: Arc<[FlightRun]>,
+        trim: bool,
+        fit: Fit,
+        model: Model,
+    ) -> Self {
+        Self {
             plant,
             runs,
             trim,
             fit,
-            given_gain,
-            model,
+            given_gain: None,
+            model: Arc::new(model),
             parts: OnceLock::new(),
-        })
+        }
+    }
+
+    /// Is the gain that of least squares on the rows?
+    pub(super) fn gain_is_eliminated(&self) -> bool {
+        self.plant.free.gain && self.runs.len() == 1
     }
 
     /// The likelihood that was maximised.
-    pub fn model(&self) -> &Model {
+    pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
@@ -189,11 +206,6 @@ impl FlightFit {
     /// The rows of the recordings.
     pub(super) fn rows(&self) -> Vec<Rows> {
         self.runs.iter().map(|run| run.rows.clone()).collect()
-    }
-
-    /// Would a search on all rows take too long?
-    pub fn is_long(&self) -> bool {
-        self.runs.iter().any(|run| run.rows.time.len() > PART)
     }
 
     /// The noise of each recording.

@@ -40,11 +40,7 @@ const NONE_SEEN: DelayChange = DelayChange {
 };
 
 /// The test for one of the recordings.
-pub(super) fn delay_change(
-    fit: &FlightFit,
-    run: usize,
-    task: &Task,
-) -> Result<DelayChange, Error> {
+pub(super) fn delay_change(fit: &FlightFit, run: usize, task: &Task) -> Result<DelayChange, Error> {
     let rows = &fit.runs[run];
     let commands = &rows.rows.commands.value;
     let jumps: Vec<f64> = commands.windows(2).map(|pair| pair[1] - pair[0]).collect();

@@ -15,7 +15,9 @@
 //!
 //! in the place of (JᵀJ)⁻¹, w the weights of Bartlett's window.
 
+use super::super::covariance::Common;
 use super::super::fit::FlightFit;
+use super::super::intervals::FlightProfile;
 use super::super::start::is_long;
 use super::motion::{moving_and_resting, rows_since_motion, speeds};
 use super::tolerances::{COLOUR, LEVELS};
@@ -29,9 +31,15 @@ use crate::linear_algebra::singular::Singular;
 use crate::linear_algebra::vectors::{add_multiple, dot};
 use crate::{Error, Task};
 
-/// Are the whitened residuals coloured at rest, and not otherwise while the vehicle moves?
-pub(super) fn is_coloured_at_rest(fit: &FlightFit, run: usize, task: &Task) -> Result<bool, Error> {
-    let (rows, part) = (&fit.runs[run].rows, &fit.parts(task)?[run]);
+/// Are the whitened residuals coloured at rest, and not otherwise while the vehicle moves? That is
+/// known of recordings that are not long.
+pub(super) fn is_coloured_at_rest(fit: &FlightFit, task: &Task) -> Result<bool, Error> {
+    let mut each = fit.runs.iter().zip(fit.parts(task)?);
+    Ok(!is_long(&fit.runs) && each.all(|(run, part)| is_alike(&run.rows, part)))
+}
+
+/// The same of one recording.
+fn is_alike(rows: &Rows, part: &Evaluation) -> bool {
     let since = rows_since_motion(&speeds(part));
     let [moving, resting] = moving_and_resting(&since, &rows.used)
         .map(|marks| Autocorrelations::of(&part.whitened, &marks));
@@ -101,16 +109,13 @@ fn tapered(whitened: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The variance of each quantity for coloured residuals, over that for white ones.
+/// The variance of each quantity of a profile for coloured residuals, over that for white ones.
 ///
 /// # Errors
 ///
 /// As for `Model::at`.
-pub fn colour_factors(
-    fit: &FlightFit,
-    quantities: &[Quantity],
-    task: &Task,
-) -> Result<Vec<f64>, Error> {
+pub fn colour_factors(profile: &FlightProfile, task: &Task) -> Result<Vec<f64>, Error> {
+    let fit = &profile.fit;
     let common = fit.plant.common();
     let size = common.len();
     let (mut plain, mut spread) = (vec![0.0; size * size], vec![0.0; size * size]);
@@ -139,23 +144,14 @@ pub fn colour_factors(
             .map(|row| dot(row, vector))
             .collect()
     };
-    let factors = quantities.iter().map(|quantity| {
-        let weights: Vec<f64> = common.iter().map(|one| weight(*quantity, *one)).collect();
+    let numbers = Common::new(fit, task)?;
+    let factors = profile.known.iter().map(|known| {
+        let weights = numbers.weights(known.quantity);
         let moved = times(&bread, &weights);
         let coloured = dot(&moved, &times(&spread, &moved));
         (coloured / dot(&weights, &moved)).max(1.0)
     });
     Ok(factors.collect())
-}
-
-/// The part of a common number in a quantity.
-fn weight(quantity: Quantity, number: Quantity) -> f64 {
-    match (quantity, number) {
-        (Quantity::Total, Quantity::Gain) => 0.0,
-        (Quantity::Total, Quantity::Zero) => -1.0,
-        (Quantity::Total, _) => 1.0,
-        _ => f64::from(u8::from(quantity == number)),
-    }
 }
 
 /// The values of rows that are used.

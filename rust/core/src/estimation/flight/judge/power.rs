@@ -8,6 +8,7 @@
 
 use super::super::fit::{FlightFit, with_times};
 use super::super::plant::longest_delay;
+use super::super::start::{is_long, parts_of};
 use super::tolerances::{LEVELS, POWER};
 use crate::estimation::fit::{Model, Search};
 use crate::estimation::statistics::normal_quantile;
@@ -15,12 +16,18 @@ use crate::{Error, Task};
 
 /// Below this further lag, s, the test for one finds it in less than 90 % of such recordings.
 ///
-/// Infinite where none would be found.
+/// Infinite where none would be found. A long recording shows at least what its excited part shows.
 ///
 /// # Errors
 ///
 /// As for `Model::at`.
 pub fn unseen_lag(fit: &FlightFit, task: &Task) -> Result<f64, Error> {
+    let part = if is_long(&fit.runs) {
+        Some(fit.on(parts_of(&fit.runs))?)
+    } else {
+        None
+    };
+    let fit = part.as_ref().unwrap_or(fit);
     // Half the distribution of the ratio is at zero.
     let wanted = normal_quantile(1.0 - LEVELS.test) + normal_quantile(POWER.power);
     let longest = longest_delay(&fit.rows());
