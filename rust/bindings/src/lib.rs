@@ -9,6 +9,7 @@ mod errors;
 mod estimation;
 mod family;
 mod fixed_step;
+mod flight;
 mod frequency;
 mod loading;
 mod loops;
@@ -52,6 +53,8 @@ mod _deadtime {
     #[pymodule_export]
     use super::fixed_step::FixedStepResponse;
     #[pymodule_export]
+    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part, residual_spikes};
+    #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
@@ -91,6 +94,8 @@ mod _deadtime {
         doubles_write, loop_packet_read, loop_packet_write, navdata_full, navdata_layouts,
         navdata_read, navdata_write,
     };
+    #[pymodule_export]
+    use deadtime::estimation::{LAG_FACTORS, LONGEST_DELAY, ROUGH, SEARCHED_ROWS, SHORTEST_LAG};
     use pyo3::prelude::*;
 
     #[pymodule_init]

@@ -26,7 +26,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
-from deadtime.estimation._native import PlantNumbers, RowNoise
+from deadtime.estimation._native import ROUGH, PlantNumbers, RowNoise
 from deadtime.estimation.fit._residuals import SIGNIFICANCE, Whiteness, whiteness_of
 from deadtime.estimation.likelihood._agreement import contradictions
 from deadtime.estimation.likelihood._air_at_rest import air_at_rest
@@ -36,10 +36,9 @@ from deadtime.estimation.likelihood._colour_at_rest import (
     colour_of_squares,
     overshoots,
 )
+from deadtime.estimation.likelihood._flight import NoiseFit
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import ROUGH, NoiseFit
-from deadtime.estimation.likelihood._start import is_long
+from deadtime.estimation.likelihood._rows import FlightRows, is_long
 
 #: Starts of the further lag, in rows.
 FURTHER = (0.7, 3.0)

@@ -15,10 +15,9 @@ import numpy as np
 
 from deadtime._base.digits import stated
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import PlantNumbers
+from deadtime.estimation._native import ROUGH, PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._search import ROUGH
 
 #: Level of the quantiles that widen the standard errors.
 LEVEL = 0.95
@@ -66,7 +65,8 @@ def _value_of(profile: LikelihoodProfile, name: str) -> tuple[float, float]:
     value = fit.gain
     if profile.names[name] == "total":
         value = one.delay + math.fsum(one.lags) - one.zero + fit.model.own_lag
-    wider = profile._quantile(name, LEVEL) / float(special.ndtri(0.5 + LEVEL / 2))
+    reach = float(special.stdtrit(profile.freedom[name], 0.5 + LEVEL / 2))
+    wider = reach / float(special.ndtri(0.5 + LEVEL / 2))
     return value, profile.stderr[name] * wider
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from deadtime._base.arrays import Array, Indices, Mask
 from deadtime.estimation._native import RowLikelihood, RowNoise
+from deadtime.estimation.likelihood._flight import NoiseFit
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit
 
 #: Rows over which changes are taken.
 OVER = (4, 8, 16)

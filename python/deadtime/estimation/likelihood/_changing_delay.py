@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import ROUGH, NoiseFit, changed, with_noise
-from deadtime.estimation.likelihood._start import is_long
+from deadtime.estimation._native import ROUGH
+from deadtime.estimation.likelihood._flight import NoiseFit, changed, with_noise
+from deadtime.estimation.likelihood._rows import FlightRows, is_long
 
 #: Delays that wander are sums of so many waves at most, with 1, 2, ... half periods in the window,
 #: one for so many rows.

@@ -21,17 +21,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
-from deadtime.estimation._native import PlantNumbers
+from deadtime.estimation._native import ROUGH, FlightProfile, PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
 from deadtime.estimation.likelihood._air_at_rest import RESTS, SHOWS, rows_since_motion
+from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
 from deadtime.estimation.likelihood._free_numbers import numbers_of, plant_at
-from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air
-from deadtime.estimation.likelihood._search import ROUGH, NoiseFit, PlantModel
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 
 #: Autocorrelations that are compared, and the fewest pairs of rows of which each is known.
 LAGS, FEWEST = 20, 50
@@ -52,11 +51,8 @@ class ColouredProfile(LikelihoodProfile):
 
     colour: Mapping[str, float] = field(default_factory=dict)
 
-    @cached_property
-    def unseen(self) -> dict[str, float]:
-        """Factors for air that may be there unseen, and for the colour."""
-        found = unseen_air(self.fit, self._weights, self.bounds)
-        return {name: one * self.colour[name] for name, one in found.items()}
+    def _native(self) -> FlightProfile:
+        return super()._native().widened([self.colour[name] for name in self.names])
 
 
 def coloured_profile(profile: LikelihoodProfile) -> ColouredProfile:
@@ -157,7 +153,7 @@ def _factors(profile: LikelihoodProfile) -> dict[str, float]:
     both = bread @ spread @ bread
     return {
         name: max(1.0, float(weight @ both @ weight) / float(weight @ bread @ weight))
-        for name, weight in profile._weights.items()
+        for name, weight in zip(profile.names, np.array(profile.native.weights), strict=True)
     }
 
 

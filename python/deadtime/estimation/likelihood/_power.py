@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from deadtime.estimation._native import FlightLikelihood, PlantNumbers
+from deadtime.estimation._native import LONGEST_DELAY, FlightLikelihood, PlantNumbers
 from deadtime.estimation.fit._residuals import SIGNIFICANCE
-from deadtime.estimation.likelihood._search import LONGEST, NoiseFit
-from deadtime.estimation.likelihood._start import excited_part, is_long
+from deadtime.estimation.likelihood._flight import NoiseFit
+from deadtime.estimation.likelihood._rows import excited_part, is_long
 
 #: Probability with which the lag would have been found.
 POWER = 0.9
@@ -44,7 +44,7 @@ def unseen_lag(fit: NoiseFit) -> float:
     wanted = float(special.ndtri(1.0 - SIGNIFICANCE) + special.ndtri(POWER))
     one = fit.numbers
     between = fit.runs[0].row_time
-    longest = min(LONGEST * float(run.time[-1] - run.time[0]) for run in fit.runs)
+    longest = min(LONGEST_DELAY * float(run.time[-1] - run.time[0]) for run in fit.runs)
     richer = replace(fit.model, extra=fit.model.extra + 1).likelihood(fit.runs, fit.trim)
     may_move = "delay" in fit.model.names
 

@@ -29,6 +29,7 @@ mod propagation;
 mod quotients;
 mod rows;
 mod search;
+pub mod statistics;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -43,8 +44,9 @@ pub use family::{
 };
 pub use fit::{Fit, Model, Search};
 pub use flight::{
-    FlightFit, FlightPlant, FlightProfile, FlightRun, KnownQuantity, Scatter, excited_part,
-    fit_flight, least_squares, scatter_of, spikes,
+    FlightFit, FlightPlant, FlightProfile, FlightRun, KnownQuantity, LAG_FACTORS, LONGEST_DELAY,
+    ROUGH, SEARCHED_ROWS, SHORTEST_LAG, Scatter, excited_part, fit_flight, least_squares,
+    scatter_of, spikes,
 };
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};

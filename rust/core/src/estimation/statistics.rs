@@ -84,7 +84,10 @@ pub fn student_reach(level: f64, freedom: f64) -> f64 {
         z * (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / 384.0,
         z * ((((79.0 * z2 + 776.0) * z2 + 1482.0) * z2 - 1920.0) * z2 - 945.0) / 92160.0,
     ];
-    let mut reach = z + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom);
+    let mut reach = z + terms
+        .iter()
+        .rev()
+        .fold(0.0, |sum, term| (sum + term) / freedom);
     if freedom > MANY {
         return reach;
     }

@@ -19,5 +19,7 @@ pub(crate) mod elimination;
 mod hessenberg;
 pub(crate) mod lu;
 pub(crate) mod rows;
+pub(crate) mod singular;
+pub(crate) mod symmetric;
 pub(crate) mod triangle;
 pub(crate) mod vectors;
