@@ -1,8 +1,10 @@
 //! Bindings of `deadtime::estimation`.
 
+use std::sync::Arc;
+
 use deadtime::estimation::{
-    Commands, Disturbance, Entry, Evaluation, Fit, Free, Limits, Model, Noise, Plant, Point,
-    Quantity, Rows, Search, Timing, held_response as response, whiten,
+    Commands, Disturbance, Entry, Evaluation, Fit, FlightRun, Free, Limits, Model, Noise, Plant,
+    Point, Quantity, Rows, Search, Timing, held_response as response, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -28,9 +30,19 @@ pub(crate) struct RecordedRows<'py> {
     uncertain: Vec<(f64, f64, f64)>,
     offset: bool,
     trim: bool,
+    row_time: f64,
+    rounding: f64,
 }
 
 impl RecordedRows<'_> {
+    pub(crate) fn run(&self) -> PyResult<FlightRun> {
+        Ok(FlightRun {
+            rows: self.rows()?,
+            row_time: self.row_time,
+            rounding: self.rounding,
+        })
+    }
+
     pub(crate) fn rows(&self) -> PyResult<Rows> {
         let rows = Rows {
             time: owned(&self.time)?,
@@ -170,7 +182,7 @@ impl PlantNumbers {
         }
     }
 
-    fn from_fit(fit: &Fit) -> Self {
+    pub(crate) fn from_fit(fit: &Fit) -> Self {
         let noise = fit.point.noise.iter().map(|one| RowNoise {
             air_time: one.air_time,
             air: one.air,
@@ -207,7 +219,7 @@ pub(crate) struct RowLikelihood {
 }
 
 impl RowLikelihood {
-    fn new(py: Python<'_>, found: Evaluation) -> Self {
+    pub(crate) fn new(py: Python<'_>, found: Evaluation) -> Self {
         let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
         Self {
             objective: found.objective,
@@ -228,7 +240,7 @@ impl RowLikelihood {
 /// Recordings of one plant, with what is unknown about it.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct FlightLikelihood {
-    model: Model,
+    model: Arc<Model>,
 }
 
 #[pymethods]
@@ -259,7 +271,7 @@ impl FlightLikelihood {
             zero,
         };
         let model = converted(Model::new(plant, runs, free, longest))?;
-        Ok(Self { model })
+        Ok(Self::of(model.into()))
     }
 
     /// The likelihood of one recording.
@@ -374,6 +386,10 @@ impl FlightLikelihood {
 }
 
 impl FlightLikelihood {
+    pub(crate) fn of(model: Arc<Model>) -> Self {
+        Self { model }
+    }
+
     fn known(&self, numbers: &PlantNumbers) -> Fit {
         let Fit { point, objective } = numbers.fit();
         let point = self.model.timed(point);

@@ -19,14 +19,10 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime.estimation.likelihood._flight import NoiseFit, changed, with_noise
 from deadtime.estimation.likelihood._free_numbers import numbers_of, plant_at
-from deadtime.estimation.likelihood._profile import (
-    LikelihoodProfile,
-    common_covariance,
-    unseen_air,
-)
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit, changed, with_noise
 
 #: The rows of all recordings with the commands that a plant of these numbers leads to.
 Refilled: TypeAlias = Callable[[NoiseFit], Sequence[FlightRows]]
@@ -61,11 +57,10 @@ class LostCommandsProfile(LikelihoodProfile):
         return self.cov
 
     @cached_property
-    def unseen(self) -> dict[str, float]:
-        """As where the commands are given."""
-        given = common_covariance(self.fit)
-        errors = {name: math.sqrt(float(w @ given @ w)) for name, w in self._weights.items()}
-        return unseen_air(self.fit, self._weights, errors)
+    def bounds(self) -> dict[str, float]:
+        """Standard errors for the fitted noise."""
+        pairs = zip(self.names, np.array(self.native.weights), strict=True)
+        return {name: math.sqrt(float(w @ self.cov @ w)) for name, w in pairs}
 
     def statistic(self, name: str, value: float) -> float:
         """The squared t for which `value` is the end of an interval."""
@@ -73,7 +68,11 @@ class LostCommandsProfile(LikelihoodProfile):
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
         """Ends of the interval around the fitted `value`."""
-        return self._from_curvature(name, value, level)
+        from scipy import special
+
+        quantile = float(special.stdtrit(self.freedom[name], 0.5 + level / 2))
+        low, high = (value + sign * quantile * self.stderr[name] for sign in (-1.0, 1.0))
+        return low if name == "gain" else max(0.0, low), high
 
 
 def with_lost_commands(
@@ -88,7 +87,7 @@ def with_lost_commands(
         calm = [changed(one, air=0.0, sensor=0.0) for one in fit.numbers.noise]
         starts.append(replace(fit, trim=False, numbers=with_noise(fit.with_gain, calm)))
     starts = [_started(one, refilled, sample_time) for one in starts]
-    sizes = np.sqrt(np.diag(common_covariance(fit)))
+    sizes = np.sqrt(np.diag(fit.covariance))
     found = [_searched(one, refilled, sizes) for one in starts]
     best = min(found, key=lambda one: one.criterion)
     cov = _covariance(partial(_objective, best, refilled, sizes), np.zeros(sizes.size))

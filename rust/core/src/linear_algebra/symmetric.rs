@@ -66,7 +66,9 @@ impl Symmetric {
     pub(crate) fn inverse_square(&self, x: &[f64], least: f64) -> f64 {
         let along = |vector: &Vec<f64>| vector.iter().zip(x).map(|(v, x)| v * x).sum::<f64>();
         let pairs = self.values.iter().zip(&self.vectors);
-        pairs.map(|(value, vector)| along(vector).powi(2) / value.max(least)).sum()
+        pairs
+            .map(|(value, vector)| along(vector).powi(2) / value.max(least))
+            .sum()
     }
 }
 

@@ -54,6 +54,8 @@ pub struct FlightProfile {
     pub centre: Fit,
     /// Rows less unknowns of the mean.
     pub rows: usize,
+    /// Each quantity as a sum of the numbers that all recordings share.
+    pub weights: Vec<Vec<f64>>,
     /// Ends found so far: of a quantity, at a level.
     ends: Vec<(Quantity, f64, (f64, f64))>,
 }
@@ -96,12 +98,14 @@ impl FlightProfile {
             freedom: freedom[i],
         });
         let known = known.collect();
+        drop(common);
         Ok(Self {
             fit,
             known,
             covariance,
             centre,
             rows,
+            weights,
             ends: Vec::new(),
         })
     }
@@ -159,6 +163,11 @@ impl FlightProfile {
             known.unseen *= factor;
         }
         Ok(wider)
+    }
+
+    /// Are intervals those of the curvature?
+    pub fn is_long(&self) -> bool {
+        is_long(&self.fit.runs)
     }
 
     /// How well a quantity is known.

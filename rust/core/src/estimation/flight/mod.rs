@@ -24,10 +24,26 @@ mod tolerances;
 pub use fit::{FlightFit, FlightRun};
 pub use intervals::{FlightProfile, Known as KnownQuantity};
 pub use judge::{
-    Asked, Cause, Finding, Judgement, Whiteness, colour_factors, judge, unseen_lag, whiteness,
+    Asked, Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge, unseen_lag,
+    whiteness,
 };
 pub use outliers::spikes;
 pub use plant::FlightPlant;
 pub use rounds::fit_flight;
 pub use search::{Scatter, scatter_of};
 pub use start::{excited_part, least_squares};
+
+/// Longest delay of a search, as a share of the window.
+pub const LONGEST_DELAY: f64 = tolerances::START.longest;
+
+/// Factors of a time constant at which searches start.
+pub const LAG_FACTORS: [f64; 3] = tolerances::START.factors;
+
+/// The shortest lag of a search, in rows.
+pub const SHORTEST_LAG: f64 = tolerances::SEARCH.shortest;
+
+/// Most rows of a search.
+pub const SEARCHED_ROWS: usize = tolerances::LONG.part;
+
+/// Accuracy of −2 ln L where fits are compared.
+pub const ROUGH: f64 = tolerances::SEARCH.rough;

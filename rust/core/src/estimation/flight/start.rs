@@ -30,17 +30,21 @@ pub(super) fn is_long(runs: &[FlightRun]) -> bool {
 ///
 /// It keeps the commands of as long a time before it. What those before have left is a part of the
 /// offset.
-pub fn excited_part(time: &[f64], commands: &Commands) -> Option<(Range<usize>, Range<usize>)> {
+pub fn excited_part(
+    time: &[f64],
+    sent: &[f64],
+    commands: &[f64],
+) -> Option<(Range<usize>, Range<usize>)> {
     if time.len() <= LONG.part {
         return None;
     }
     let mut changes = vec![0.0];
     let mut sum = 0.0;
-    for pair in commands.value.windows(2) {
+    for pair in commands.windows(2) {
         sum += (pair[1] - pair[0]).abs();
         changes.push(sum);
     }
-    let sent_by = |moment: f64| commands.time.partition_point(|time| *time <= moment);
+    let sent_by = |moment: f64| sent.partition_point(|time| *time <= moment);
     let last = |moment: f64| sent_by(moment).saturating_sub(1);
     let firsts = (0..=time.len() - LONG.part).step_by(LONG.part / LONG.overlap);
     let (mut best, mut most) = (0, f64::NEG_INFINITY);
@@ -59,16 +63,16 @@ pub fn excited_part(time: &[f64], commands: &Commands) -> Option<(Range<usize>, 
     }
     let rows = best..best + LONG.part;
     let (begin, end) = (time[rows.start], time[rows.end - 1]);
-    let since = (2.0 * begin - end).max(*commands.time.first()?);
+    let since = (2.0 * begin - end).max(*sent.first()?);
     Some((rows, last(since)..sent_by(end).max(1)))
 }
 
 /// The rows of a search: all, or those in which the command changes most.
 fn excited(run: &FlightRun) -> FlightRun {
-    let Some((kept, sent)) = excited_part(&run.rows.time, &run.rows.commands) else {
+    let (all, commands) = (&run.rows, &run.rows.commands);
+    let Some((kept, sent)) = excited_part(&all.time, &commands.time, &commands.value) else {
         return run.clone();
     };
-    let (all, commands) = (&run.rows, &run.rows.commands);
     let (start, stop) = (all.time[kept.start], all.time[kept.end - 1]);
     let speed = if all.speed.is_empty() {
         Vec::new()
