@@ -18,6 +18,5 @@ from deadtime._deadtime import (
     RowNoise as RowNoise,
     excited_part as excited_part,
     fit_family as fit_family,
-    residual_spikes as residual_spikes,
     whitened_columns as whitened_columns,
 )

@@ -53,7 +53,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::fixed_step::FixedStepResponse;
     #[pymodule_export]
-    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part, residual_spikes};
+    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part};
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
@@ -94,8 +94,6 @@ mod _deadtime {
         doubles_write, loop_packet_read, loop_packet_write, navdata_full, navdata_layouts,
         navdata_read, navdata_write,
     };
-    #[pymodule_export]
-    use deadtime::estimation::{LAG_FACTORS, LONGEST_DELAY, ROUGH, SEARCHED_ROWS, SHORTEST_LAG};
     use pyo3::prelude::*;
 
     #[pymodule_init]
@@ -103,6 +101,7 @@ mod _deadtime {
         // Where there is no memory for it now, each call asks again.
         let _ = super::reserve::ready();
         super::loading::load_numpy(module.py(), || super::special::add_ufuncs(module))?;
+        super::flight::add_constants(module)?;
         super::pointers::add_pointers(module)
     }
 }

@@ -45,8 +45,8 @@ pub use family::{
 pub use fit::{Fit, Model, Search};
 pub use flight::{
     FlightFit, FlightPlant, FlightProfile, FlightRun, KnownQuantity, LAG_FACTORS, LONGEST_DELAY,
-    ROUGH, SEARCHED_ROWS, SHORTEST_LAG, Scatter, excited_part, fit_flight, least_squares,
-    scatter_of, spikes,
+    ROUGH, SEARCHED_ROWS, SHORTEST_LAG, Scatter, beside_noise, excited_part, fit_flight,
+    least_squares, scatter_of,
 };
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};

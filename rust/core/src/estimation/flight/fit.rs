@@ -7,6 +7,7 @@ use super::super::likelihood::{Evaluation, Noise};
 use super::super::point::{Point, Timing};
 use super::super::rows::Rows;
 use super::covariance::Common;
+use super::outliers::median_step;
 use super::plant::FlightPlant;
 use super::search::airs_of;
 use super::tolerances::PRICES;
@@ -24,6 +25,15 @@ pub struct FlightRun {
 }
 
 impl FlightRun {
+    /// Checked rows, and the step to which their output is rounded.
+    pub fn new(rows: Rows, rounding: f64) -> Self {
+        Self {
+            row_time: median_step(&rows.time),
+            rows,
+            rounding,
+        }
+    }
+
     /// The same with other marks of use.
     pub(super) fn with_used(&self, used: Vec<bool>) -> Self {
         let rows = Rows {

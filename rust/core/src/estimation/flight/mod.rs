@@ -22,9 +22,8 @@ mod tolerances;
 
 pub use fit::{FlightFit, FlightRun};
 pub use intervals::{FlightProfile, Known as KnownQuantity};
-pub use outliers::spikes;
 pub use plant::FlightPlant;
-pub use rounds::fit_flight;
+pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
 pub use start::{excited_part, least_squares};
 

@@ -7,7 +7,7 @@ use super::tolerances::OUTLIERS;
 /// Rows of these residuals that are far from the median of their neighbours.
 ///
 /// Rows within a step of the rounding are none.
-pub fn spikes(residuals: &[f64], rounding: f64) -> Vec<bool> {
+pub(super) fn spikes(residuals: &[f64], rounding: f64) -> Vec<bool> {
     let (away, robust) = from_neighbours(residuals);
     let least = f64::max(OUTLIERS.spike * robust, rounding);
     let found: Vec<bool> = away.iter().map(|away| away.abs() > least).collect();
@@ -102,6 +102,11 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
     } else {
         *middle
     }
+}
+
+/// Median time between rows, s.
+pub(super) fn median_step(time: &[f64]) -> f64 {
+    median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())
 }
 
 fn deviation(values: &[f64]) -> f64 {
