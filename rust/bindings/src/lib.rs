@@ -11,6 +11,7 @@ mod family;
 mod fixed_step;
 mod flight;
 mod frequency;
+mod judgement;
 mod loading;
 mod loops;
 mod matrix;
@@ -58,6 +59,11 @@ mod _deadtime {
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
+    };
+    #[pymodule_export]
+    use super::judgement::{
+        FlightFinding, FlightJudgement, FlightWhiteness, colour_factors, judge, unseen_lag,
+        whiteness,
     };
     #[pymodule_export]
     use super::loops::{

@@ -2,7 +2,7 @@
 //!
 //! Tails are the incomplete gamma and beta functions by their series and continued fractions (Olver et
 //! al., NIST Handbook of Mathematical Functions 2010, 8.7.1, 8.9.2 and 8.17.22), accurate to 1e-12 of
-//! themselves, times the number of degrees of freedom in 1e4 where there are more. Only functions of
+//! themselves, and to 1e-9 with a hundred thousand degrees of freedom. Only functions of
 //! this crate and of `libm` are used, so that the bits are the same on every machine.
 
 use std::f64::consts::{PI, SQRT_2};

@@ -240,6 +240,11 @@ impl FlightFit {
         Ok(Common::new(self, task)?.covariance(self.parts(task)?))
     }
 
+    /// The rows of the recordings.
+    pub(super) fn rows(&self) -> Vec<Rows> {
+        self.runs.iter().map(|run| run.rows.clone()).collect()
+    }
+
     /// The noise of each recording.
     pub fn noises(&self) -> &[Noise] {
         &self.fit.point.noise

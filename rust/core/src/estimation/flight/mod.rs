@@ -4,12 +4,13 @@
 //! plant lacks. Least squares on a grid over delay and lag gives the first start (`start`); the same
 //! grid in strong air gives others (`search`). Trim, air, coloured sensor noise and scattered times are
 //! kept where Akaike's criterion asks for them, outliers are left out (`rounds`), and intervals are
-//! those of the profile (`intervals`).
+//! those of the profile (`intervals`). Tests say whether the fit is adequate (`judge`).
 
 mod covariance;
 mod fit;
 mod grid;
 mod intervals;
+mod judge;
 mod noise_known;
 mod outliers;
 mod plant;
@@ -22,6 +23,9 @@ mod tolerances;
 
 pub use fit::{FlightFit, FlightRun};
 pub use intervals::{FlightProfile, Known as KnownQuantity};
+pub use judge::{
+    Asked, Cause, Finding, Judgement, Whiteness, colour_factors, judge, unseen_lag, whiteness,
+};
 pub use plant::FlightPlant;
 pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
