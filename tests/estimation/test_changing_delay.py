@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from deadtime.estimation.likelihood import _adequacy
 from deadtime.estimation.likelihood._changing_delay import DelayChange, delay_change
-from deadtime.estimation.likelihood._search import NoiseFit
+from deadtime.estimation.likelihood._flight import NoiseFit
 from marks import NIGHTLY
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))

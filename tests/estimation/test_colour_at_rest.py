@@ -6,7 +6,6 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation.likelihood import _colour_at_rest as colour
-from deadtime.estimation.likelihood._profile import common_covariance
 from marks import NIGHTLY
 from scipy import signal
 
@@ -93,7 +92,7 @@ def test_derivatives_of_the_rows_have_the_covariance_of_the_likelihood():
     fit = dtm.estimate_delay(flown(2), LOOP, free=FREE)._profile.fit
     columns = colour._columns(fit, 0)[fit.runs[0].used]
     found = np.linalg.inv(columns.T @ columns) * fit.parts[0].variance
-    np.testing.assert_allclose(found, common_covariance(fit), rtol=0.02)
+    np.testing.assert_allclose(found, fit.covariance, rtol=0.02)
 
 
 def test_the_colour_makes_no_interval_shorter():

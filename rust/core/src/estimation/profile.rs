@@ -15,10 +15,8 @@ const TOLERANCE: f64 = 4e-3;
 /// Widest first step to the end of an interval of a time, as a share of delay and lag together.
 const WIDEST: f64 = 0.25;
 
-/// Accuracy of −2 ln L where a quantity is held, and on the way to an end: as much moves the end by
-/// less than `TOLERANCE`.
+/// Accuracy of −2 ln L where a quantity is held.
 const RISE_TOLERANCE: f64 = 2e-3;
-const ON_THE_WAY: f64 = 0.02;
 
 /// Farthest guess beyond what was seen of a profile, as a multiple of it.
 const BEYOND: f64 = 2.0;
@@ -163,7 +161,7 @@ impl Model {
         task: &Task,
     ) -> Result<Fit, Error> {
         let start = quantity.held(&near.point, value, self);
-        self.held_from(start, quantity, RISE_TOLERANCE, &mut None, task)
+        self.held_from(start, quantity, &mut None, task)
     }
 
     /// The same from a point with that value and the inverse Hessian of a search near by, as in
@@ -172,7 +170,6 @@ impl Model {
         &self,
         start: Point,
         quantity: Quantity,
-        tolerance: f64,
         inverse: &mut Option<Vec<f64>>,
         task: &Task,
     ) -> Result<Fit, Error> {
@@ -184,7 +181,7 @@ impl Model {
             );
         }
         let (held, all) = (Some(quantity), Search::All);
-        let found = self.fit_near(&start, held, all, tolerance, inverse, task)?;
+        let found = self.fit_near(&start, held, all, RISE_TOLERANCE, inverse, task)?;
         // A search does not come back from a lag of zero.
         let least = AT_LEAST * SHORTEST_LAG * self.row_time;
         let vanished = |(i, lag): &(usize, &f64)| {
@@ -195,7 +192,7 @@ impl Model {
         };
         let mut start = found.point.clone();
         start.lags[i] = (SECOND_LAG * self.row_time).copysign(start.lags[i]);
-        let second = self.fit(&start, held, all, tolerance, task)?;
+        let second = self.fit(&start, held, all, RISE_TOLERANCE, task)?;
         Ok(if second.objective < found.objective {
             second
         } else {
@@ -263,7 +260,7 @@ impl Model {
         let mut held_at = |value: f64, near: &Fit, before: Option<&Fit>| {
             let guess = before.map(|before| quantity.guess(&near.point, &before.point, value));
             let start = quantity.held(guess.as_ref().unwrap_or(&near.point), value, self);
-            self.held_from(start, quantity, ON_THE_WAY, inverse, task)
+            self.held_from(start, quantity, inverse, task)
         };
         let (mut inner, mut inner_rise) = (centre, 0.0);
         let mut outer = centre + reach;
