@@ -22,7 +22,6 @@ from deadtime._deadtime import (
     excited_part as excited_part,
     fit_family as fit_family,
     judge as judge,
-    residual_spikes as residual_spikes,
     unseen_lag as unseen_lag,
     whitened_columns as whitened_columns,
     whiteness as whiteness,

@@ -3,7 +3,7 @@
 use deadtime::estimation::{
     Fit, FlightFit as CoreFit, FlightPlant as CorePlant, FlightProfile as CoreProfile, FlightRun,
     Free, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, Quantity, ROUGH, SEARCHED_ROWS, SHORTEST_LAG,
-    Scatter, excited_part as part_of, fit_flight, least_squares, scatter_of, spikes,
+    Scatter, beside_noise, excited_part as part_of, fit_flight, least_squares, scatter_of,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -106,6 +106,12 @@ impl FlightFit {
     ) -> PyResult<Self> {
         let (plant, runs) = (&plant.core, given(&runs)?);
         let core = run_here(py, |task| least_squares(plant, runs, (delay, gain), task))?;
+        Ok(Self { core })
+    }
+
+    /// The likeliest plant and noise from these numbers of least squares, without what spikes from them.
+    fn beside_noise(&self, py: Python<'_>) -> PyResult<Self> {
+        let core = run_here(py, |task| beside_noise(&self.core, task))?;
         Ok(Self { core })
     }
 
@@ -295,17 +301,6 @@ pub(crate) fn excited_part(
     let commands = (owned(&command_time)?, owned(&command)?);
     let found = part_of(&owned(&time)?, &commands.0, &commands.1);
     Ok(found.map(|(rows, sent)| (rows.start, rows.end, sent.start, sent.end)))
-}
-
-/// Rows of residuals that are far from the median of their neighbours, and from it by more than a step
-/// of the rounding.
-#[pyfunction]
-pub(crate) fn residual_spikes<'py>(
-    py: Python<'py>,
-    residuals: Floats<'py>,
-    rounding: f64,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    Ok(spikes(&owned(&residuals)?, rounding).into_pyarray(py))
 }
 
 /// Numbers of the search that stages around it need.

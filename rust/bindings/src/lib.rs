@@ -54,7 +54,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::fixed_step::FixedStepResponse;
     #[pymodule_export]
-    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part, residual_spikes};
+    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part};
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,

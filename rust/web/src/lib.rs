@@ -14,7 +14,6 @@ mod margins;
 mod request;
 mod responses;
 mod roots;
-mod statistics;
 
 use exchange::answered;
 

@@ -214,6 +214,10 @@ class NoiseFit(PickledByFields):
         found = NoiseFit(self.model, self.runs, self.trim, numbers, self.given_gain)
         return found._with(self.native.moved(numbers))
 
+    def beside_noise(self) -> NoiseFit:
+        """The likeliest plant and noise from these numbers of least squares, without outliers."""
+        return NoiseFit.of(self.model, self.runs, self.native.beside_noise())
+
     def refit(self, tolerance: float, white: bool) -> NoiseFit:
         """The maximum near, also from slow air where there is none unless all noise is `white`."""
         native = self.native.refit(tolerance, white)

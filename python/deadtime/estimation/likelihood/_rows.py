@@ -11,7 +11,6 @@ from deadtime._base.arrays import Array, Mask
 from deadtime.estimation._native import (
     SEARCHED_ROWS,
     excited_part as native_part,
-    residual_spikes,
 )
 
 #: Steps of a rounded output are multiples of the least, within this share of it, and at least this
@@ -41,14 +40,6 @@ class FlightRows(NamedTuple):
     trim: bool = False
     speed: Array = NO_SPEED
     rounding: float = 0.0
-
-
-def spikes(residuals: Array, rounding: float) -> Mask:
-    """Rows of these residuals that are outliers: far from the median of their neighbours.
-
-    Rows within a step of the rounding are none.
-    """
-    return residual_spikes(residuals, rounding)
 
 
 def is_long(runs: Sequence[FlightRows]) -> bool:

@@ -50,7 +50,7 @@ from deadtime.estimation.likelihood._lost_commands import (
 )
 from deadtime.estimation.likelihood._missing import predicted_commands, with_missing
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._rows import FlightRows, excited_part, is_long, spikes
+from deadtime.estimation.likelihood._rows import FlightRows, excited_part, is_long
 from deadtime.estimation.methods._commanded_model import Assumed, CommandedModel, commanded_model
 from deadtime.estimation.methods._conclusion import (
     check_fit,
@@ -322,12 +322,8 @@ class _Likeliest(NamedTuple):
 
 def _likeliest(begun: _Begun) -> _Likeliest:
     """Plant, noise and intervals, with the numbers around them and the commands between rows."""
-    linear, models, white, fitted = begun.names.linear, begun.models, begun.white, begun.fitted
-    kept = [
-        one._replace(used=one.used & ~spikes(part.residuals, one.rounding))
-        for one, part in zip(begun.whole.runs, begun.whole.parts, strict=True)
-    ]
-    fit = fitted_flight(white.model, kept, white.with_gain)
+    linear, models, fitted = begun.names.linear, begun.models, begun.fitted
+    fit = begun.whole.beside_noise()
     free = None
     if begun.numbers:
         fit, free = fit_numbers(fit, partial(_given, linear, models, fit.runs), begun.numbers)

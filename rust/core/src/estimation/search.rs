@@ -104,11 +104,12 @@ fn descend(
         }
     }
     // What the known slopes lack is less than a coarse tolerance.
-    if n == 0 || (n == known && tolerance >= WORTHWHILE) {
+    let is_coarse = tolerance >= WORTHWHILE;
+    if n == 0 || (n == known && is_coarse) {
         let value = found.value;
         return Ok((Minimum { place: x, value }, false));
     }
-    let mut near = Near::new(variables, &mut steps, &x, &found, function)?;
+    let mut near = Near::new(variables, &mut steps, &x, &found, is_coarse, function)?;
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
     if let Some(known) = known_inverse.take_if(|known| known.len() == n * n) {
@@ -148,7 +149,7 @@ fn descend(
             if !is_poor || fresh {
                 shorten(&variables[known..], &others.curvature, &mut steps[known..]);
                 near.follow(&moved, &found.slope, others.slope);
-                (exact, fresh) = (known == 0, false);
+                (exact, fresh) = (known == 0 || is_coarse, false);
                 continue;
             }
         } else if fresh {
@@ -156,7 +157,7 @@ fn descend(
             break;
         }
         // What was gathered on the way misleads here.
-        near = Near::new(variables, &mut steps, &x, &found, function)?;
+        near = Near::new(variables, &mut steps, &x, &found, is_coarse, function)?;
         (exact, fresh) = (true, true);
     }
     *known_inverse = Some(near.inverse);
@@ -218,34 +219,42 @@ impl Near {
     /// by each of the others alone; by each of all where the known one is not positive.
     ///
     /// Mixed derivatives by the others are left to the update: where two of them have almost the same
-    /// effect, steps of Newton's run along the valley, past minima.
+    /// effect, steps of Newton's run along the valley, past minima. A coarse search takes the known
+    /// slopes as they are, where their curvature is positive.
     fn new(
         variables: &[Variable],
         steps: &mut [f64],
         x: &[f64],
         found: &Value,
+        is_coarse: bool,
         function: &mut impl Function,
     ) -> Result<Self, Error> {
         let (n, known) = (x.len(), found.slope.len());
-        let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
-        if shorten(variables, &quotients.curvature, steps) {
-            quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
+        let first = inverse_of_positive(&found.curvature, known, RIDGE);
+        let from = if is_coarse && first.is_some() {
+            known
+        } else {
+            0
+        };
+        let mut quotients = Quotients::new(variables, steps, x, found, from..n, function)?;
+        if shorten(&variables[from..], &quotients.curvature, &mut steps[from..]) {
+            quotients = Quotients::new(variables, steps, x, found, from..n, function)?;
         }
+        let mut gradient = found.slope[..from].to_vec();
+        gradient.extend(quotients.slope);
         let mut inverse = vec![0.0; n * n];
         for (i, bend) in quotients.curvature.iter().enumerate() {
-            inverse[i * n + i] = 1.0 / bend;
+            inverse[(from + i) * (n + 1)] = 1.0 / bend;
         }
-        if let Some(first) = inverse_of_positive(&found.curvature, known, RIDGE) {
-            for (to, from) in inverse
-                .chunks_exact_mut(n)
-                .zip(first.chunks_exact(known.max(1)))
-            {
-                to[..known].copy_from_slice(from);
-            }
+        let rows = first
+            .iter()
+            .flat_map(|first| first.chunks_exact(known.max(1)));
+        for (to, from) in inverse.chunks_exact_mut(n).zip(rows) {
+            to[..known].copy_from_slice(from);
         }
         Ok(Self {
-            lacking: difference(&quotients.slope, &found.slope),
-            gradient: quotients.slope,
+            lacking: difference(&gradient[..known], &found.slope),
+            gradient,
             inverse,
         })
     }

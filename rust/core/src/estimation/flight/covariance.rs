@@ -106,21 +106,7 @@ impl<'a> Common<'a> {
         if parts.len() < 2 {
             return blocks.next().unwrap_or_default();
         }
-        // A recording whose derivatives are singular tells nothing here, which is the safe side.
-        let mut sum: Option<Vec<f64>> = None;
-        for block in blocks.filter(|block| block.iter().all(|entry| entry.is_finite())) {
-            // A number that one recording does not move at all, as a second lag of zero, has no
-            // variance.
-            let information = Singular::new(&block, n).pseudo_inverse(INTERVALS.told);
-            sum = Some(match sum {
-                None => information,
-                Some(sum) => sum.iter().zip(&information).map(|(a, b)| a + b).collect(),
-            });
-        }
-        match sum {
-            Some(sum) => Singular::new(&sum, n).pseudo_inverse(INTERVALS.told),
-            None => vec![f64::NAN; n * n],
-        }
+        together(blocks, n)
     }
 
     /// The block of the common numbers of one recording.
@@ -140,10 +126,45 @@ impl<'a> Common<'a> {
     }
 }
 
+/// The covariance of n numbers that several recordings tell.
+fn together(blocks: impl Iterator<Item = Vec<f64>>, n: usize) -> Vec<f64> {
+    // A recording whose derivatives are singular tells nothing here, which is the safe side.
+    let told = blocks.filter(|block| block.iter().all(|entry| entry.is_finite()));
+    // A number that one recording does not move at all, as a second lag of zero, has no variance.
+    let inverse = |matrix: &[f64]| Singular::new(matrix, n).pseudo_inverse(INTERVALS.told);
+    let sum = told.fold(None, |sum: Option<Vec<f64>>, block| {
+        let own = inverse(&block);
+        Some(match sum {
+            None => own,
+            Some(sum) => sum.iter().zip(&own).map(|(a, b)| a + b).collect(),
+        })
+    });
+    sum.map_or_else(|| vec![f64::NAN; n * n], |sum| inverse(&sum))
+}
+
 /// The variance of a sum of numbers with these weights.
 pub(super) fn variance(cov: &[f64], weights: &[f64]) -> f64 {
     let n = weights.len();
     let entries = cov.iter().enumerate();
     let terms = entries.map(|(at, entry)| weights[at / n] * entry * weights[at % n]);
     terms.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The windows of a log of a real firmware had one such, and the report of the log ended there.
+    #[test]
+    fn a_recording_whose_derivatives_are_singular_tells_nothing() {
+        let of = |pairs: [(f64, f64); 2]| {
+            let found = together(pairs.iter().map(|(a, b)| vec![*a, 0.0, 0.0, *b]), 2);
+            (found[0], found[3])
+        };
+        let (a, b) = of([(4.0, 1.0), (4.0, 1.0)]);
+        assert!((a - 2.0).abs() < 1e-14 && (b - 0.5).abs() < 1e-14);
+        let (a, b) = of([(4.0, 1.0), (f64::INFINITY, f64::NAN)]);
+        assert!((a - 4.0).abs() < 1e-14 && (b - 1.0).abs() < 1e-14);
+        assert!(of([(f64::INFINITY, 1.0), (f64::NAN, f64::NAN)]).0.is_nan());
+    }
 }

@@ -7,6 +7,7 @@ use super::super::likelihood::{Evaluation, Noise};
 use super::super::point::{Point, Timing};
 use super::super::rows::Rows;
 use super::covariance::Common;
+use super::outliers::median_step;
 use super::plant::FlightPlant;
 use super::search::airs_of;
 use super::tolerances::PRICES;
@@ -24,6 +25,15 @@ pub struct FlightRun {
 }
 
 impl FlightRun {
+    /// Checked rows, and the step to which their output is rounded.
+    pub fn new(rows: Rows, rounding: f64) -> Self {
+        Self {
+            row_time: median_step(&rows.time),
+            rows,
+            rounding,
+        }
+    }
+
     /// The same with other marks of use.
     pub(super) fn with_used(&self, used: Vec<bool>) -> Self {
         let rows = Rows {
@@ -205,11 +215,6 @@ impl FlightFit {
         fitted(&self.model, start, tolerance, task)
     }
 
-    /// The rows of the recordings.
-    pub(super) fn rows(&self) -> Vec<Rows> {
-        self.runs.iter().map(|run| run.rows.clone()).collect()
-    }
-
     /// The maximum near the numbers, and from slow air where there is none, unless the noise is white:
     /// without air there is none after a search either.
     ///
@@ -233,6 +238,11 @@ impl FlightFit {
     /// As for `parts`.
     pub fn covariance(&self, task: &Task) -> Result<Vec<f64>, Error> {
         Ok(Common::new(self, task)?.covariance(self.parts(task)?))
+    }
+
+    /// The rows of the recordings.
+    pub(super) fn rows(&self) -> Vec<Rows> {
+        self.runs.iter().map(|run| run.rows.clone()).collect()
     }
 
     /// The noise of each recording.

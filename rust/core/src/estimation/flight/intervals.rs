@@ -10,7 +10,7 @@
 
 use super::super::fit::Fit;
 use super::super::point::Quantity;
-use super::super::profile::Limits;
+use super::super::profile::{Limits, Seen};
 use super::super::statistics::student_reach;
 use super::covariance::{Common, variance};
 use super::fit::FlightFit;
@@ -280,11 +280,12 @@ impl FlightProfile {
         let rise = self.rise(quantity, level)?;
         let reach = (self.known_of(quantity)?.error() * rise.sqrt()).max(INTERVALS.reach);
         let limits = Limits { floor, lower };
-        let mut lowest = self.centre.clone();
+        let (mut lowest, mut seen) = (self.centre.clone(), Seen::default());
         let mut found = Vec::new();
         for sign in [-1.0, 1.0] {
             let model = self.fit.model();
-            let (end, low) = model.end(&self.centre, quantity, sign * reach, rise, limits, task)?;
+            let to = (sign * reach, rise);
+            let (end, low) = model.end_near(&self.centre, quantity, to, limits, &mut seen, task)?;
             found.push(if end == floor { 0.0 } else { end });
             if low.objective < lowest.objective {
                 lowest = low;

@@ -27,9 +27,8 @@ pub use judge::{
     Asked, Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge, unseen_lag,
     whiteness,
 };
-pub use outliers::spikes;
 pub use plant::FlightPlant;
-pub use rounds::fit_flight;
+pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
 pub use start::{excited_part, least_squares};
 

@@ -7,7 +7,7 @@ use super::tolerances::OUTLIERS;
 /// Rows of these residuals that are far from the median of their neighbours.
 ///
 /// Rows within a step of the rounding are none.
-pub fn spikes(residuals: &[f64], rounding: f64) -> Vec<bool> {
+pub(super) fn spikes(residuals: &[f64], rounding: f64) -> Vec<bool> {
     let (away, robust) = from_neighbours(residuals);
     let least = f64::max(OUTLIERS.spike * robust, rounding);
     let found: Vec<bool> = away.iter().map(|away| away.abs() > least).collect();
@@ -104,6 +104,11 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
+/// Median time between rows, s.
+pub(super) fn median_step(time: &[f64]) -> f64 {
+    median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())
+}
+
 fn deviation(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -113,6 +118,7 @@ fn deviation(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::tests::gaussian;
     use super::*;
 
     #[test]
@@ -123,19 +129,29 @@ mod tests {
     }
 
     #[test]
-    fn rows_far_from_their_neighbours_are_spikes_and_steps_are_none() {
-        let mut residuals: Vec<f64> = (0..40)
-            .map(|row| 0.01 * (1.7 * f64::from(row)).sin())
-            .collect();
-        (residuals[0], residuals[20]) = (1.0, -1.0);
-        let found = spikes(&residuals, 0.0);
-        let places: Vec<usize> = (0..40).filter(|row| found[*row]).collect();
-        assert_eq!(places, [0, 20]);
-        assert!(!spikes(&residuals, 2.0).contains(&true));
-        let step: Vec<f64> = residuals
-            .iter()
-            .map(|one| one.round() * 0.0 + 1.0)
-            .collect();
-        assert!(!spikes(&step, 0.0).contains(&true));
+    fn outliers_beside_each_other_are_found_and_no_others() {
+        let residuals: Vec<f64> = gaussian(4, 120).iter().map(|one| 0.005 * one).collect();
+        let cases: [&[usize]; 6] = [
+            &[1, 2],
+            &[0, 1],
+            &[60, 61],
+            &[117, 118],
+            &[118, 119],
+            &[0, 3, 119],
+        ];
+        for places in cases {
+            let mut spoilt = residuals.clone();
+            places.iter().for_each(|row| spoilt[*row] += 0.2);
+            let found = spikes(&spoilt, 0.0);
+            let found: Vec<usize> = (0..120).filter(|row| found[*row]).collect();
+            assert_eq!(found, places);
+            assert!(!spikes(&spoilt, 0.3).contains(&true));
+        }
+    }
+
+    #[test]
+    fn where_many_rows_are_far_away_none_is_an_outlier() {
+        assert!(!spikes(&[0.0, 0.001, 5.0, -0.001], 0.0).contains(&true));
+        assert!(!spikes(&[1.0; 40], 0.0).contains(&true));
     }
 }

@@ -5,14 +5,26 @@ use std::sync::Arc;
 use super::super::likelihood::Noise;
 use super::super::point::Point;
 use super::fit::{FlightFit, FlightRun, with_noise, with_times};
-use super::outliers::{outliers, without};
+use super::outliers::{outliers, spikes, without};
 use super::plant::FlightPlant;
 use super::search::fit_noise;
 use super::start::{is_long, parts_of};
 use super::tolerances::{LONG, OUTLIERS, START};
 use crate::{Error, Task};
 
-/// The likeliest plant and noise of recordings, from least squares (`first`).
+/// The likeliest plant and noise from a fit of least squares, without the spikes that it leaves.
+///
+/// # Errors
+///
+/// As for `fit_flight`.
+pub fn beside_noise(white: &FlightFit, task: &Task) -> Result<FlightFit, Error> {
+    let pairs = white.runs.iter().zip(white.parts(task)?);
+    let kept = pairs.map(|(run, part)| without(run, &spikes(&part.residuals, run.rounding)));
+    let first = white.with_gain(task)?.point;
+    fit_flight(&white.plant, &kept.collect(), &first, task)
+}
+
+/// The likeliest plant and noise of recordings, from numbers under white noise.
 ///
 /// # Errors
 ///

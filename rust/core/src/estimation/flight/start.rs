@@ -15,9 +15,9 @@ use super::super::likelihood::Noise;
 use super::super::point::{Point, Timing};
 use super::super::rows::{Commands, Rows};
 use super::fit::{FlightFit, FlightRun, fitted};
+use super::grid;
 use super::plant::FlightPlant;
 use super::tolerances::{LONG, SEARCH};
-use super::{grid, outliers};
 use crate::{Error, Task};
 
 /// Would a search on all rows take too long?
@@ -99,12 +99,7 @@ fn excited(run: &FlightRun) -> FlightRun {
         offset: all.offset || kept.start > 0,
         trim: all.trim,
     };
-    let row_time = median_step(&rows.time);
-    FlightRun {
-        rows,
-        row_time,
-        rounding: run.rounding,
-    }
+    FlightRun::new(rows, run.rounding)
 }
 
 /// The parts of these recordings for a search.
@@ -114,11 +109,6 @@ pub(super) fn parts_of(runs: &Arc<[FlightRun]>) -> Arc<[FlightRun]> {
     } else {
         Arc::clone(runs)
     }
-}
-
-/// Median time between rows, s.
-fn median_step(time: &[f64]) -> f64 {
-    outliers::median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())
 }
 
 /// The fit under white noise alone, from this delay and gain where they are known.
