@@ -702,7 +702,35 @@ class FlightProfile:
     def statistic(self, quantity: str, value: float) -> float: ...
     def interval(self, quantity: str, level: float) -> tuple[float, float]: ...
 
+@final
+class FlightFinding:
+    cause: Final[str]
+    run: Final[int | None]
+    sizes: Final[list[float]]
+    p_value: Final[float]
+    is_against: Final[bool]
+    plant_lacks: Final[bool]
+
+@final
+class FlightJudgement:
+    whiteness: Final[tuple[float, float, int, float]]
+    is_coloured: Final[bool]
+    findings: Final[list[FlightFinding]]
+
+def judge(
+    fit: FlightFit,
+    quantities: Sequence[str],
+    *,
+    commands_given: bool,
+    widens: bool,
+    total: _Pair | None,
+) -> FlightJudgement: ...
+def unseen_lag(fit: FlightFit) -> float: ...
+def colour_factors(profile: FlightProfile) -> list[float]: ...
+def whiteness(pieces: Sequence[_Reals], parameters: int) -> tuple[float, float, int, float]: ...
+
 LAG_FACTORS: Final[list[float]]
+LEVEL_OF_TESTS: Final[float]
 LONGEST_DELAY: Final[float]
 ROUGH: Final[float]
 SEARCHED_ROWS: Final[int]

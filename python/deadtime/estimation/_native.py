@@ -2,12 +2,14 @@
 
 from deadtime._deadtime import (
     LAG_FACTORS as LAG_FACTORS,
+    LEVEL_OF_TESTS as LEVEL_OF_TESTS,
     LONGEST_DELAY as LONGEST_DELAY,
     ROUGH as ROUGH,
     SEARCHED_ROWS as SEARCHED_ROWS,
     SHORTEST_LAG as SHORTEST_LAG,
     FamilyCandidate as FamilyCandidate,
     FamilyFit as FamilyFit,
+    FlightFinding as FlightFinding,
     FlightFit as FlightFit,
     FlightLikelihood as FlightLikelihood,
     FlightPlant as FlightPlant,
@@ -16,7 +18,11 @@ from deadtime._deadtime import (
     PlantNumbers as PlantNumbers,
     RowLikelihood as RowLikelihood,
     RowNoise as RowNoise,
+    colour_factors as colour_factors,
     excited_part as excited_part,
     fit_family as fit_family,
+    judge as judge,
+    unseen_lag as unseen_lag,
     whitened_columns as whitened_columns,
+    whiteness as whiteness,
 )

@@ -20,9 +20,9 @@ import numpy as np
 
 from deadtime._base.digits import between, stated
 from deadtime._base.plain import plain_fields
+from deadtime.estimation._native import LEVEL_OF_TESTS
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
-from deadtime.estimation.fit._residuals import SIGNIFICANCE
 
 #: Steps of the grid in the smallest interval, and most of them; most steps beyond the grid.
 IN_AN_INTERVAL, ON_THE_GRID, BEYOND = 8, 120, 60
@@ -64,7 +64,7 @@ class SharedNumber:
     @property
     def agree(self) -> bool:
         """Whether the estimates may share the number."""
-        return self.p_value >= SIGNIFICANCE
+        return self.p_value >= LEVEL_OF_TESTS
 
     def summary(self) -> str:
         """The number in one line."""
@@ -177,7 +177,7 @@ def shared_number(
         level=level,
         estimates=tuple(values),
         p_value=p_value,
-        adequate=p_value >= SIGNIFICANCE and all(one.adequate for one in estimates),
+        adequate=p_value >= LEVEL_OF_TESTS and all(one.adequate for one in estimates),
     )
 
 

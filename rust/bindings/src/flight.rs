@@ -2,8 +2,8 @@
 
 use deadtime::estimation::{
     Fit, FlightFit as CoreFit, FlightPlant as CorePlant, FlightProfile as CoreProfile, FlightRun,
-    Free, LAG_FACTORS, LONGEST_DELAY, Quantity, ROUGH, SEARCHED_ROWS, SHORTEST_LAG, Scatter,
-    beside_noise, excited_part as part_of, fit_flight, least_squares, scatter_of,
+    Free, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, Quantity, ROUGH, SEARCHED_ROWS, SHORTEST_LAG,
+    Scatter, beside_noise, excited_part as part_of, fit_flight, least_squares, scatter_of,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -72,7 +72,7 @@ impl FlightPlant {
 /// Plant and noise that make recordings likeliest.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct FlightFit {
-    core: CoreFit,
+    pub(crate) core: CoreFit,
 }
 
 fn given(runs: &[RecordedRows<'_>]) -> PyResult<std::sync::Arc<[FlightRun]>> {
@@ -231,14 +231,14 @@ impl FlightFit {
     }
 }
 
-fn all(names: &[String]) -> PyResult<Vec<Quantity>> {
+pub(crate) fn all(names: &[String]) -> PyResult<Vec<Quantity>> {
     names.iter().map(|name| read(name)).collect()
 }
 
 /// The profile of one fit.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct FlightProfile {
-    core: CoreProfile,
+    pub(crate) core: CoreProfile,
 }
 
 #[pymethods]
@@ -306,6 +306,7 @@ pub(crate) fn excited_part(
 /// Numbers of the search that stages around it need.
 pub(crate) fn add_constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("LAG_FACTORS", LAG_FACTORS)?;
+    module.add("LEVEL_OF_TESTS", LEVEL_OF_TESTS)?;
     module.add("LONGEST_DELAY", LONGEST_DELAY)?;
     module.add("ROUGH", ROUGH)?;
     module.add("SEARCHED_ROWS", SEARCHED_ROWS)?;

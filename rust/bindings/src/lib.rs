@@ -62,8 +62,7 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::judgement::{
-        FlightFinding, FlightJudgement, FlightWhiteness, colour_factors, judge, unseen_lag,
-        whiteness,
+        FlightFinding, FlightJudgement, colour_factors, judge, unseen_lag, whiteness,
     };
     #[pymodule_export]
     use super::loops::{

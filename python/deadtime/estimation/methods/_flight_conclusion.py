@@ -10,13 +10,12 @@ from typing import Any, Literal
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import SHORTEST_LAG
+from deadtime.estimation._native import SHORTEST_LAG, unseen_lag
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
-from deadtime.estimation.likelihood._adequacy import Adequacy
 from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
 from deadtime.estimation.likelihood._free_numbers import NumbersProfile
-from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
+from deadtime.estimation.likelihood._judgement import Adequacy, unseen_in_words
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step
 from deadtime.estimation.methods._conclusion import COLOURED, advice
@@ -72,7 +71,7 @@ def concluded_flight(
         values |= profile.free.values
         names = tuple(values)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
-    unseen = unseen_lag(fit)
+    unseen = unseen_lag(fit.native)
     left_out = sum(_outliers(rows) for rows in fit.runs)
     fitted = tuple(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)

@@ -27,8 +27,7 @@ from deadtime.estimation.fit._least_squares import (
     Model,
     solve_jointly,
 )
-from deadtime.estimation.likelihood._adequacy import Adequacy, adequacy_of
-from deadtime.estimation.likelihood._colour_at_rest import coloured_profile
+from deadtime.estimation.likelihood._coloured import coloured_profile
 from deadtime.estimation.likelihood._flight import (
     NoiseFit,
     PlantModel,
@@ -42,6 +41,7 @@ from deadtime.estimation.likelihood._free_numbers import (
     fit_numbers,
     numbers_under_white_noise,
 )
+from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
 from deadtime.estimation.likelihood._lost_commands import (
     LostCommandsProfile,
     Refilled,
@@ -193,7 +193,7 @@ def _estimated(
         return begun.by_least_squares()
     found = _likeliest(begun)
     _check_delay(begun, found.profile)
-    adequacy = adequacy_of(found.profile, len(names.free))
+    adequacy = adequacy_of(found.profile)
     adequacy = replace(adequacy, reasons=(*found.doubts, *adequacy.reasons))
     without = _without_the_plant(begun, found.profile, adequacy)
     return without or _concluded(begun, found, adequacy)

@@ -24,7 +24,8 @@ mod tolerances;
 pub use fit::{FlightFit, FlightRun};
 pub use intervals::{FlightProfile, Known as KnownQuantity};
 pub use judge::{
-    Asked, Cause, Finding, Judgement, Whiteness, colour_factors, judge, unseen_lag, whiteness,
+    Asked, Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge, unseen_lag,
+    whiteness,
 };
 pub use plant::FlightPlant;
 pub use rounds::{beside_noise, fit_flight};

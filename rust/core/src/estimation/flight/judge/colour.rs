@@ -213,8 +213,73 @@ fn whitened_at(model: &Model, run: usize, point: &Point, task: &Task) -> Result<
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::fit::FlightRun;
+    use super::super::super::plant::FlightPlant;
     use super::*;
-    use crate::estimation::tests::gaussian;
+    use crate::estimation::fit::Fit;
+    use crate::estimation::likelihood::Noise;
+    use crate::estimation::tests::{gaussian, recorded};
+    use crate::estimation::variables::Free;
+
+    #[test]
+    fn derivatives_of_the_rows_have_the_covariance_of_the_likelihood() {
+        let rows = recorded((&[1.0], &[1.0, 0.0]), (0.31, 0.85, 0.17), 0.01, 8);
+        let plant = FlightPlant {
+            num: vec![1.0],
+            den: vec![1.0, 0.0],
+            lags: vec![0.17],
+            free: Free {
+                delay: true,
+                gain: true,
+                lags: vec![true],
+                zero: false,
+            },
+            zero: 0.0,
+            own_lag: 0.0,
+            air_behind_lags: false,
+            time_constant: false,
+        };
+        let point = Point {
+            timing: Timing::Delay(0.31),
+            lags: vec![0.17],
+            zero: 0.0,
+            gain: 0.85,
+            noise: vec![Noise {
+                air: 0.3,
+                ..Noise::QUIET
+            }],
+        };
+        let run = FlightRun {
+            row_time: rows.row_time(),
+            rounding: 0.0,
+            rows,
+        };
+        let fit = Fit {
+            point,
+            objective: 0.0,
+        };
+        let task = Task::new();
+        let fit = FlightFit::new(plant, vec![run].into(), false, fit, None).unwrap();
+        let columns = columns(&fit, 0, &fit.plant.common(), &task).unwrap();
+        let size = columns.len();
+        let squares: Vec<f64> = columns
+            .iter()
+            .flat_map(|one| columns.iter().map(move |other| dot(one, other)))
+            .collect();
+        let inverse = Singular::new(&squares, size).pseudo_inverse(COLOUR.singular);
+        let variance = fit.parts(&task).unwrap()[0].variance;
+        let expected = fit.covariance(&task).unwrap();
+        for i in 0..size {
+            for j in 0..size {
+                let scale = (expected[i * (size + 1)] * expected[j * (size + 1)]).sqrt();
+                let found = inverse[i * size + j] * variance;
+                assert!(
+                    (found - expected[i * size + j]).abs() < 0.02 * scale,
+                    "{i} {j} {found}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn squares_of_coloured_rows_vary_more_along_a_slow_direction() {

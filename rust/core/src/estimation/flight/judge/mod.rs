@@ -40,6 +40,9 @@ use lag::{below_zero, further_lag, overshoots};
 use speed::grows_with_speed;
 use tolerances::{LEVELS, REST, WHITE};
 
+/// Level of each test: this share of right fits is called wrong by it.
+pub const LEVEL_OF_TESTS: f64 = LEVELS.test;
+
 /// What is asked about a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked<'a> {
