@@ -591,42 +591,6 @@ class RowLikelihood:
     rate: Final[_Reals]
 
 @final
-class FlightLikelihood:
-    def __new__(
-        cls,
-        num: Sequence[float],
-        den: Sequence[float],
-        runs: Sequence[_RecordedRows],
-        *,
-        delay: bool,
-        gain: bool,
-        lags: Sequence[bool],
-        zero: bool,
-        longest: float,
-        air_behind_lags: bool = False,
-    ) -> FlightLikelihood: ...
-    def at(self, run: int, numbers: PlantNumbers) -> RowLikelihood: ...
-    def under(
-        self, run: int, numbers: PlantNumbers, noises: Sequence[RowNoise]
-    ) -> list[RowLikelihood]: ...
-    def waves(self, run: int, numbers: PlantNumbers, number: int) -> tuple[_Reals, _Reals, int]: ...
-    def objective(self, numbers: PlantNumbers) -> float: ...
-    def over_delays(self, numbers: PlantNumbers, delays: Sequence[float]) -> list[float]: ...
-    def fit(
-        self, start: PlantNumbers, tolerance: float = 1e-6, noise: bool = True
-    ) -> PlantNumbers: ...
-    def held(self, near: PlantNumbers, quantity: str, value: float) -> PlantNumbers: ...
-    def end(
-        self,
-        best: PlantNumbers,
-        quantity: str,
-        reach: float,
-        rise: float,
-        floor: float,
-        lower: float = ...,
-    ) -> tuple[float, PlantNumbers]: ...
-
-@final
 class FlightPlant:
     def __new__(
         cls,
@@ -643,7 +607,6 @@ class FlightPlant:
         air_behind_lags: bool = False,
         time_constant: bool = False,
     ) -> FlightPlant: ...
-    def likelihood(self, runs: Sequence[_RecordedRows], trim: bool) -> FlightLikelihood: ...
 
 @final
 class FlightFit:
@@ -677,8 +640,7 @@ class FlightFit:
     def parts(self) -> list[RowLikelihood]: ...
     @property
     def covariance(self) -> _Reals: ...
-    @property
-    def likelihood(self) -> FlightLikelihood: ...
+    def objective(self, numbers: PlantNumbers) -> float: ...
     def rows(self, run: int) -> tuple[NDArray[np.bool_], _Reals]: ...
     def beside_noise(self) -> FlightFit: ...
     def refit(self, tolerance: float, white: bool) -> FlightFit: ...
@@ -732,7 +694,6 @@ def whiteness(pieces: Sequence[_Reals], parameters: int) -> tuple[float, float, 
 LAG_FACTORS: Final[list[float]]
 LEVEL_OF_TESTS: Final[float]
 LONGEST_DELAY: Final[float]
-ROUGH: Final[float]
 SEARCHED_ROWS: Final[int]
 SHORTEST_LAG: Final[float]
 

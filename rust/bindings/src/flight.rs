@@ -2,14 +2,14 @@
 
 use deadtime::estimation::{
     Fit, FlightFit as CoreFit, FlightPlant as CorePlant, FlightProfile as CoreProfile, FlightRun,
-    Free, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, Quantity, ROUGH, SEARCHED_ROWS, SHORTEST_LAG,
+    Free, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, Quantity, SEARCHED_ROWS, SHORTEST_LAG,
     Scatter, beside_noise, excited_part as part_of, fit_flight, least_squares, scatter_of,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, owned};
-use crate::estimation::{FlightLikelihood, PlantNumbers, RecordedRows, RowLikelihood, read};
+use crate::estimation::{PlantNumbers, RecordedRows, RowLikelihood, read};
 use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -56,16 +56,6 @@ impl FlightPlant {
                 time_constant,
             },
         }
-    }
-
-    /// The likelihood of these recordings.
-    fn likelihood(&self, runs: Vec<RecordedRows<'_>>, trim: bool) -> PyResult<FlightLikelihood> {
-        let rows = runs
-            .iter()
-            .map(RecordedRows::rows)
-            .collect::<PyResult<_>>()?;
-        let model = converted(self.core.model(rows, trim))?;
-        Ok(FlightLikelihood::of(model.into()))
     }
 }
 
@@ -169,9 +159,10 @@ impl FlightFit {
         Ok(found.into_pyarray(py))
     }
 
-    #[getter]
-    fn likelihood(&self) -> FlightLikelihood {
-        FlightLikelihood::of(self.core.model().clone())
+    /// −2 ln L at other numbers.
+    fn objective(&self, py: Python<'_>, numbers: &PlantNumbers) -> PyResult<f64> {
+        let point = numbers.fit().point;
+        run_here(py, |task| self.core.model().objective(&point, task))
     }
 
     /// Which rows of a recording are used, and the slope of the response by which their times count.
@@ -308,7 +299,6 @@ pub(crate) fn add_constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("LAG_FACTORS", LAG_FACTORS)?;
     module.add("LEVEL_OF_TESTS", LEVEL_OF_TESTS)?;
     module.add("LONGEST_DELAY", LONGEST_DELAY)?;
-    module.add("ROUGH", ROUGH)?;
     module.add("SEARCHED_ROWS", SEARCHED_ROWS)?;
     module.add("SHORTEST_LAG", SHORTEST_LAG)
 }

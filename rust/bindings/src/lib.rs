@@ -47,7 +47,7 @@ mod _deadtime {
     use super::dde::{PyLinearLoop, PyLoopResponse, on_samples, rate_limited};
     #[pymodule_export]
     use super::estimation::{
-        FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
+        PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
     };
     #[pymodule_export]
     use super::family::{FamilyCandidate, FamilyFit, fit_family};

@@ -10,7 +10,6 @@ from deadtime._base.arrays import Array
 from deadtime._base.frozen import PickledByFields
 from deadtime.estimation._native import (
     FlightFit,
-    FlightLikelihood,
     FlightPlant,
     PlantNumbers,
     RowLikelihood,
@@ -135,10 +134,6 @@ class PlantModel:
             time_constant="time_constant" in self.names,
         )
 
-    def likelihood(self, runs: Sequence[FlightRows], trim: bool) -> FlightLikelihood:
-        """The likelihood of these recordings, with or without trim."""
-        return self.native.likelihood(runs, trim)
-
 
 @dataclass(frozen=True, eq=False)
 class NoiseFit(PickledByFields):
@@ -177,11 +172,6 @@ class NoiseFit(PickledByFields):
         """The fit of the kernel."""
         plant = self.model.native
         return FlightFit(plant, self.runs, self.trim, self.numbers, self.given_gain)
-
-    @property
-    def likelihood(self) -> FlightLikelihood:
-        """The likelihood that was maximised."""
-        return self.native.likelihood
 
     @cached_property
     def parts(self) -> list[RowLikelihood]:

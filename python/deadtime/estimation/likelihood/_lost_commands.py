@@ -20,7 +20,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime.estimation.likelihood._flight import NoiseFit, changed, with_noise
-from deadtime.estimation.likelihood._free_numbers import numbers_of, plant_at
+from deadtime.estimation.likelihood._free_numbers import EXACT, numbers_of, plant_at
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
 
@@ -127,7 +127,6 @@ def _searched(fit: NoiseFit, refilled: Refilled, sizes: Array) -> NoiseFit:
     """The likeliest fit near this one, by steps of such sizes."""
     from scipy import optimize
 
-    known = replace(fit.model, names=())
     for step in STEPS:
         point = optimize.minimize(
             partial(_objective, fit, refilled, sizes),
@@ -141,7 +140,7 @@ def _searched(fit: NoiseFit, refilled: Refilled, sizes: Array) -> NoiseFit:
             },
         ).x
         one = _moved(fit, sizes * point)
-        noise = known.likelihood(refilled(one), fit.trim).fit(one.with_gain).noise
+        noise = _known(one, refilled).refit(EXACT, white=True).numbers.noise
         fit = one.moved(with_noise(one.with_gain, noise))
     return replace(fit, runs=tuple(refilled(fit)))
 
@@ -161,8 +160,13 @@ def _minus_log_likelihood(fit: NoiseFit, refilled: Refilled) -> float:
     """-2 ln L with the commands of this plant."""
     if min(fit.numbers.delay, *fit.numbers.lags, math.inf) < 0.0:
         return math.inf
-    known = replace(fit.model, names=())
-    return known.likelihood(refilled(fit), fit.trim).objective(fit.with_gain)
+    return _known(fit, refilled).native.objective(fit.with_gain)
+
+
+def _known(fit: NoiseFit, refilled: Refilled) -> NoiseFit:
+    """The fit with the commands of its plant, of which nothing is free."""
+    model, runs = replace(fit.model, names=()), tuple(refilled(fit))
+    return replace(fit, model=model, runs=runs, numbers=fit.with_gain)
 
 
 def _with_common(fit: NoiseFit, values: Array) -> NoiseFit:

@@ -45,7 +45,7 @@ pub use family::{
 pub use fit::{Fit, Model, Search};
 pub use flight::{
     Asked, Cause, Finding, FlightFit, FlightPlant, FlightProfile, FlightRun, Judgement,
-    KnownQuantity, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, ROUGH, SEARCHED_ROWS, SHORTEST_LAG,
+    KnownQuantity, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, SEARCHED_ROWS, SHORTEST_LAG,
     Scatter, Whiteness, beside_noise, colour_factors, excited_part, fit_flight, judge,
     least_squares, scatter_of, unseen_lag, whiteness,
 };

@@ -7,6 +7,17 @@ use super::tolerances::INTERVALS;
 use crate::linear_algebra::singular::Singular;
 use crate::{Error, Task};
 
+impl FlightFit {
+    /// Covariance of the numbers that all recordings share, row-major.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn covariance(&self, task: &Task) -> Result<Vec<f64>, Error> {
+        Ok(Common::new(self, task)?.covariance(self.parts(task)?))
+    }
+}
+
 /// The covariances of one fit, under any noise.
 pub(super) struct Common<'a> {
     fit: &'a FlightFit,

@@ -6,10 +6,8 @@ use super::super::fit::{Fit, Model, Search};
 use super::super::likelihood::{Evaluation, Noise};
 use super::super::point::{Point, Timing};
 use super::super::rows::Rows;
-use super::covariance::Common;
-use super::outliers::median_step;
+use super::median::median_step;
 use super::plant::FlightPlant;
-use super::search::airs_of;
 use super::tolerances::PRICES;
 use crate::{Error, Task};
 
@@ -213,31 +211,6 @@ impl FlightFit {
     /// As for `Model::at`.
     pub fn fitted(&self, start: &Point, tolerance: f64, task: &Task) -> Result<Fit, Error> {
         fitted(&self.model, start, tolerance, task)
-    }
-
-    /// The maximum near the numbers, and from slow air where there is none, unless the noise is white:
-    /// without air there is none after a search either.
-    ///
-    /// # Errors
-    ///
-    /// As for `Model::at`.
-    pub fn refit(&self, tolerance: f64, white: bool, task: &Task) -> Result<Self, Error> {
-        let mut starts = vec![self.fit.point.clone()];
-        if !white && self.noises().iter().any(|noise| noise.air == 0.0) {
-            let [_, slow] = airs_of(&self.plant, &self.runs);
-            starts.push(with_noise(&self.fit.point, slow));
-        }
-        let found = likeliest(&self.model, &starts, tolerance, task)?;
-        Ok(self.moved(found.unwrap_or_else(|| self.fit.clone())))
-    }
-
-    /// Covariance of the numbers that all recordings share, row-major.
-    ///
-    /// # Errors
-    ///
-    /// As for `parts`.
-    pub fn covariance(&self, task: &Task) -> Result<Vec<f64>, Error> {
-        Ok(Common::new(self, task)?.covariance(self.parts(task)?))
     }
 
     /// The rows of the recordings.

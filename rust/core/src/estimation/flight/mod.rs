@@ -11,6 +11,7 @@ mod fit;
 mod grid;
 mod intervals;
 mod judge;
+mod median;
 mod noise_known;
 mod outliers;
 mod plant;
@@ -31,18 +32,4 @@ pub use plant::FlightPlant;
 pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
 pub use start::{excited_part, least_squares};
-
-/// Longest delay of a search, as a share of the window.
-pub const LONGEST_DELAY: f64 = tolerances::START.longest;
-
-/// Factors of a time constant at which searches start.
-pub const LAG_FACTORS: [f64; 3] = tolerances::START.factors;
-
-/// The shortest lag of a search, in rows.
-pub const SHORTEST_LAG: f64 = tolerances::SEARCH.shortest;
-
-/// Most rows of a search.
-pub const SEARCHED_ROWS: usize = tolerances::LONG.part;
-
-/// Accuracy of −2 ln L where fits are compared.
-pub const ROUGH: f64 = tolerances::SEARCH.rough;
+pub use tolerances::{LAG_FACTORS, LONGEST_DELAY, SEARCHED_ROWS, SHORTEST_LAG};

@@ -56,6 +56,24 @@ pub(super) fn airs_of(plant: &FlightPlant, runs: &[FlightRun]) -> [Vec<Noise>; 2
     [air(SEARCH.strong, 1.0), air(SEARCH.weak, SEARCH.slow)]
 }
 
+impl FlightFit {
+    /// The maximum near the numbers, and from slow air where there is none, unless the noise is white:
+    /// without air there is none after a search either.
+    ///
+    /// # Errors
+    ///
+    /// As for `Model::at`.
+    pub fn refit(&self, tolerance: f64, white: bool, task: &Task) -> Result<Self, Error> {
+        let mut starts = vec![self.fit.point.clone()];
+        if !white && self.noises().iter().any(|noise| noise.air == 0.0) {
+            let [_, slow] = airs_of(&self.plant, &self.runs);
+            starts.push(with_noise(&self.fit.point, slow));
+        }
+        let found = likeliest(self.model(), &starts, tolerance, task)?;
+        Ok(self.moved(found.unwrap_or_else(|| self.fit.clone())))
+    }
+}
+
 /// The likeliest plant and noise, from least squares (`first`) and a grid in strong air.
 pub(super) fn fit_noise(
     plant: &FlightPlant,

@@ -199,3 +199,15 @@ pub(super) const INTERVALS: Intervals = Intervals {
     reach: 1e-9,
     told: 1e-15,
 };
+
+/// Longest delay of a search, as a share of the window.
+pub const LONGEST_DELAY: f64 = START.longest;
+
+/// Factors of a time constant at which searches start.
+pub const LAG_FACTORS: [f64; 3] = START.factors;
+
+/// The shortest lag of a search, in rows.
+pub const SHORTEST_LAG: f64 = SEARCH.shortest;
+
+/// Most rows of a search.
+pub const SEARCHED_ROWS: usize = LONG.part;
