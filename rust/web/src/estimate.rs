@@ -2,8 +2,8 @@
 //! method `output_error` where the commands are given.
 
 use deadtime::estimation::{
-    Asked, Cause, Commands, FlightPlant, FlightProfile, FlightRun, Free, Quantity, Rows,
-    beside_noise, judge, least_squares,
+    Asked, Cause, FlightPlant, FlightProfile, FlightRun, Quantity, Rows, beside_noise, judge,
+    least_squares,
 };
 use deadtime::{Error, Task};
 
@@ -19,10 +19,19 @@ const LEVEL: f64 = 0.95;
 /// whether the fit is adequate; then the fitted outputs.
 pub(crate) fn estimate(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let task = Task::new();
-    let plant = plant_of(request)?;
-    let run = recording_of(request)?;
-    let output = run.rows.output.clone();
-    let white = least_squares(&plant, [run].into(), (0.0, 1.0), &task)?;
+    let mut list = || request.list().map(<[f64]>::to_vec);
+    let (num, den) = (list()?, list()?);
+    let lags = usize::from(request.flag()?);
+    let plant = FlightPlant::new(num, den, lags);
+    let mut list = || request.list().map(<[f64]>::to_vec);
+    let (time, output) = (list()?, list()?);
+    let rows = Rows::new((time, output.clone()), (list()?, list()?))?;
+    let white = least_squares(
+        &plant,
+        [FlightRun::new(rows, 0.0)].into(),
+        (0.0, 1.0),
+        &task,
+    )?;
     let mut quantities = plant.common();
     quantities.push(Quantity::Total);
     let fit = beside_noise(&white, &task)?;
@@ -66,44 +75,4 @@ pub(crate) fn estimate(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let rows = output.iter().zip(&part.residuals);
     answer.extend(rows.map(|(output, residual)| output - residual));
     Ok(answer)
-}
-
-fn plant_of(request: &mut Request<'_>) -> Result<FlightPlant, Error> {
-    let (num, den) = (request.list()?.to_vec(), request.list()?.to_vec());
-    let lags = usize::from(request.flag()?);
-    Ok(FlightPlant {
-        num,
-        den,
-        lags: vec![0.0; lags],
-        free: Free {
-            delay: true,
-            gain: true,
-            lags: vec![true; lags],
-            zero: false,
-        },
-        zero: 0.0,
-        own_lag: 0.0,
-        air_behind_lags: false,
-        time_constant: false,
-    })
-}
-
-fn recording_of(request: &mut Request<'_>) -> Result<FlightRun, Error> {
-    let (time, output) = (request.list()?.to_vec(), request.list()?.to_vec());
-    let (command_time, command) = (request.list()?.to_vec(), request.list()?.to_vec());
-    let rows = Rows {
-        used: vec![true; time.len()],
-        time,
-        output,
-        speed: Vec::new(),
-        commands: Commands {
-            time: command_time,
-            value: command,
-            unknown: Vec::new(),
-            uncertain: Vec::new(),
-        },
-        offset: true,
-        trim: false,
-    };
-    Ok(FlightRun::new(rows.checked()?, 0.0))
 }

@@ -3,6 +3,7 @@
 use super::fit::{Fit, Model, Search};
 use super::likelihood::Noise;
 use super::point::{Point, Quantity, Timing};
+use super::search::Accuracy;
 use super::variables::SHORTEST_LAG;
 use crate::{Error, Task};
 
@@ -17,6 +18,12 @@ const WIDEST: f64 = 0.25;
 
 /// Accuracy of −2 ln L where a quantity is held.
 const RISE_TOLERANCE: f64 = 2e-3;
+
+/// The same on the way to an end: what the known slopes lack moves it by less than `TOLERANCE`.
+const ON_THE_WAY: Accuracy = Accuracy {
+    tolerance: RISE_TOLERANCE,
+    takes_known: true,
+};
 
 /// Farthest guess beyond what was seen of a profile, as a multiple of it.
 const BEYOND: f64 = 2.0;
@@ -161,7 +168,13 @@ impl Model {
         task: &Task,
     ) -> Result<Fit, Error> {
         let start = quantity.held(&near.point, value, self);
-        self.held_from(start, quantity, &mut None, task)
+        self.held_from(
+            start,
+            quantity,
+            Accuracy::of(RISE_TOLERANCE),
+            &mut None,
+            task,
+        )
     }
 
     /// The same from a point with that value and the inverse Hessian of a search near by, as in
@@ -170,6 +183,7 @@ impl Model {
         &self,
         start: Point,
         quantity: Quantity,
+        accuracy: Accuracy,
         inverse: &mut Option<Vec<f64>>,
         task: &Task,
     ) -> Result<Fit, Error> {
@@ -181,7 +195,7 @@ impl Model {
             );
         }
         let (held, all) = (Some(quantity), Search::All);
-        let found = self.fit_near(&start, held, all, RISE_TOLERANCE, inverse, task)?;
+        let found = self.fit_near(&start, held, all, accuracy, inverse, task)?;
         // A search does not come back from a lag of zero.
         let least = AT_LEAST * SHORTEST_LAG * self.row_time;
         let vanished = |(i, lag): &(usize, &f64)| {
@@ -192,7 +206,7 @@ impl Model {
         };
         let mut start = found.point.clone();
         start.lags[i] = (SECOND_LAG * self.row_time).copysign(start.lags[i]);
-        let second = self.fit(&start, held, all, RISE_TOLERANCE, task)?;
+        let second = self.fit_near(&start, held, all, accuracy, &mut None, task)?;
         Ok(if second.objective < found.objective {
             second
         } else {
@@ -260,7 +274,7 @@ impl Model {
         let mut held_at = |value: f64, near: &Fit, before: Option<&Fit>| {
             let guess = before.map(|before| quantity.guess(&near.point, &before.point, value));
             let start = quantity.held(guess.as_ref().unwrap_or(&near.point), value, self);
-            self.held_from(start, quantity, inverse, task)
+            self.held_from(start, quantity, ON_THE_WAY, inverse, task)
         };
         let (mut inner, mut inner_rise) = (centre, 0.0);
         let mut outer = centre + reach;

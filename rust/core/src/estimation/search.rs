@@ -44,13 +44,32 @@ pub(super) struct Minimum {
     pub(super) value: f64,
 }
 
-/// Search from the starting point until a step promises less than `tolerance`.
+/// How close to the minimum a search goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Accuracy {
+    /// The search ends where a step promises less.
+    pub(super) tolerance: f64,
+    /// Are the known slopes taken as they are? What they lack costs difference quotients.
+    pub(super) takes_known: bool,
+}
+
+impl Accuracy {
+    /// What the known slopes lack is less than a coarse tolerance.
+    pub(super) fn of(tolerance: f64) -> Self {
+        Self {
+            tolerance,
+            takes_known: tolerance >= WORTHWHILE,
+        }
+    }
+}
+
+/// Search from the starting point until a step promises less than the tolerance.
 ///
 /// `known_inverse` is the inverse of the Hessian at the end of a search near by, if there was one, and then
 /// that of this one: neighbours need fewer steps with it.
 pub(super) fn minimise(
     variables: &[Variable],
-    tolerance: f64,
+    accuracy: Accuracy,
     known_inverse: &mut Option<Vec<f64>>,
     mut function: impl Function,
 ) -> Result<Minimum, Error> {
@@ -59,7 +78,7 @@ pub(super) fn minimise(
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
     keep_within(variables, &mut place, &function);
-    let mut start = |x: Vec<f64>| descend(variables, x, tolerance, known_inverse, &mut function);
+    let mut start = |x: Vec<f64>| descend(variables, x, accuracy, known_inverse, &mut function);
     let (found, is_stuck) = start(place)?;
     if is_stuck {
         return Ok(start(found.place)?.0);
@@ -71,7 +90,10 @@ pub(super) fn minimise(
 fn descend(
     variables: &[Variable],
     mut x: Vec<f64>,
-    tolerance: f64,
+    Accuracy {
+        tolerance,
+        takes_known,
+    }: Accuracy,
     known_inverse: &mut Option<Vec<f64>>,
     function: &mut impl Function,
 ) -> Result<(Minimum, bool), Error> {
@@ -79,13 +101,19 @@ fn descend(
     let mut found = values.swap_remove(0);
     let (n, known) = (x.len(), found.slope.len());
     let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
+    let is_all = takes_known && n == known;
+    let enough = if is_all {
+        tolerance
+    } else {
+        tolerance.max(WORTHWHILE)
+    };
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverse_of_positive(&found.curvature, known, RIDGE) else {
             break;
         };
         let slack = function.slack(&x);
         let step = direction(variables, &x, &inverse, &found.slope, slack.as_ref());
-        if promised(&step, &found.slope) <= tolerance.max(WORTHWHILE) {
+        if promised(&step, &found.slope) <= enough {
             break;
         }
         let line = Line {
@@ -99,17 +127,15 @@ fn descend(
         };
         let decrease = found.value - next.value;
         found = next;
-        if decrease <= tolerance.max(WORTHWHILE) {
+        if decrease <= enough {
             break;
         }
     }
-    // What the known slopes lack is less than a coarse tolerance.
-    let is_coarse = tolerance >= WORTHWHILE;
-    if n == 0 || (n == known && is_coarse) {
+    if n == 0 || is_all {
         let value = found.value;
         return Ok((Minimum { place: x, value }, false));
     }
-    let mut near = Near::new(variables, &mut steps, &x, &found, is_coarse, function)?;
+    let mut near = Near::new(variables, &mut steps, &x, &found, takes_known, function)?;
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
     if let Some(known) = known_inverse.take_if(|known| known.len() == n * n) {
@@ -149,7 +175,7 @@ fn descend(
             if !is_poor || fresh {
                 shorten(&variables[known..], &others.curvature, &mut steps[known..]);
                 near.follow(&moved, &found.slope, others.slope);
-                (exact, fresh) = (known == 0 || is_coarse, false);
+                (exact, fresh) = (known == 0 || takes_known, false);
                 continue;
             }
         } else if fresh {
@@ -157,7 +183,7 @@ fn descend(
             break;
         }
         // What was gathered on the way misleads here.
-        near = Near::new(variables, &mut steps, &x, &found, is_coarse, function)?;
+        near = Near::new(variables, &mut steps, &x, &found, takes_known, function)?;
         (exact, fresh) = (true, true);
     }
     *known_inverse = Some(near.inverse);
@@ -226,12 +252,12 @@ impl Near {
         steps: &mut [f64],
         x: &[f64],
         found: &Value,
-        is_coarse: bool,
+        takes_known: bool,
         function: &mut impl Function,
     ) -> Result<Self, Error> {
         let (n, known) = (x.len(), found.slope.len());
         let first = inverse_of_positive(&found.curvature, known, RIDGE);
-        let from = if is_coarse && first.is_some() {
+        let from = if takes_known && first.is_some() {
             known
         } else {
             0

@@ -30,6 +30,25 @@ pub struct FlightPlant {
 }
 
 impl FlightPlant {
+    /// A plant num/den of which delay, gain and so many lags are unknown.
+    pub fn new(num: Vec<f64>, den: Vec<f64>, lags: usize) -> Self {
+        Self {
+            num,
+            den,
+            lags: vec![0.0; lags],
+            free: Free {
+                delay: true,
+                gain: true,
+                lags: vec![true; lags],
+                zero: false,
+            },
+            zero: 0.0,
+            own_lag: 0.0,
+            air_behind_lags: false,
+            time_constant: false,
+        }
+    }
+
     /// Does a constant input let the output grow?
     pub fn integrates(&self) -> bool {
         self.den.len() > 1 && self.den.last() == Some(&0.0)

@@ -3,27 +3,12 @@
 use super::super::point::Quantity;
 use super::super::rows::{Commands, Rows};
 use super::super::tests::{gaussian, recorded};
-use super::super::variables::Free;
 use super::*;
 use crate::{Error, Task};
 
 /// An integrator with so many free lags.
 fn plant(lags: usize) -> FlightPlant {
-    FlightPlant {
-        num: vec![1.0],
-        den: vec![1.0, 0.0],
-        lags: vec![0.1; lags],
-        free: Free {
-            delay: true,
-            gain: true,
-            lags: vec![true; lags],
-            zero: false,
-        },
-        zero: 0.0,
-        own_lag: 0.0,
-        air_behind_lags: false,
-        time_constant: false,
-    }
+    FlightPlant::new(vec![1.0], vec![1.0, 0.0], lags)
 }
 
 /// The whole fit of recordings.

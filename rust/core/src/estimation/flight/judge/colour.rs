@@ -216,26 +216,12 @@ mod tests {
     use crate::estimation::fit::Fit;
     use crate::estimation::likelihood::Noise;
     use crate::estimation::tests::{gaussian, recorded};
-    use crate::estimation::variables::Free;
 
     #[test]
     fn derivatives_of_the_rows_have_the_covariance_of_the_likelihood() {
         let rows = recorded((&[1.0], &[1.0, 0.0]), (0.31, 0.85, 0.17), 0.01, 8);
-        let plant = FlightPlant {
-            num: vec![1.0],
-            den: vec![1.0, 0.0],
-            lags: vec![0.17],
-            free: Free {
-                delay: true,
-                gain: true,
-                lags: vec![true],
-                zero: false,
-            },
-            zero: 0.0,
-            own_lag: 0.0,
-            air_behind_lags: false,
-            time_constant: false,
-        };
+        let mut plant = FlightPlant::new(vec![1.0], vec![1.0, 0.0], 1);
+        plant.lags = vec![0.17];
         let point = Point {
             timing: Timing::Delay(0.31),
             lags: vec![0.17],
@@ -246,11 +232,7 @@ mod tests {
                 ..Noise::QUIET
             }],
         };
-        let run = FlightRun {
-            row_time: rows.row_time(),
-            rounding: 0.0,
-            rows,
-        };
+        let run = FlightRun::new(rows, 0.0);
         let fit = Fit {
             point,
             objective: 0.0,
