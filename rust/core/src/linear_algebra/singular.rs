@@ -79,7 +79,8 @@ impl Singular {
 fn rotation(one: &[f64], other: &[f64]) -> Option<(f64, f64)> {
     let (alpha, beta, gamma) = (dot(one, one), dot(other, other), dot(one, other));
     // Not a number is left as it is.
-    if !(gamma.abs() > ORTHOGONAL * (alpha * beta).sqrt()) {
+    let is_along = gamma.abs() > ORTHOGONAL * (alpha * beta).sqrt();
+    if !is_along {
         return None;
     }
     let zeta = (beta - alpha) / (2.0 * gamma);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::super::fit::{FlightFit, with_noise};
 use super::super::intervals::FlightProfile;
-use super::Cause;
+use super::finding::Cause;
 use super::tolerances::{FURTHER, LEVELS};
 use crate::estimation::point::Quantity;
 use crate::estimation::statistics::{chi_squared_beyond, normal_quantile, student_reach};

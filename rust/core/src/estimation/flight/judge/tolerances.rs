@@ -13,9 +13,12 @@ pub(super) struct Levels {
     pub(super) compared: f64,
 }
 
+/// Level of each test: this share of right fits is called wrong by it.
+pub const LEVEL_OF_TESTS: f64 = 0.01;
+
 /// See `Levels`.
 pub(super) const LEVELS: Levels = Levels {
-    test: 0.01,
+    test: LEVEL_OF_TESTS,
     lag_in_air: 0.04,
     moves: 0.05,
     compared: 0.95,
