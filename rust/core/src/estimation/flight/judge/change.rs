@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 use super::super::fit::{FlightFit, FlightRun, with_noise};
 use super::super::start::is_long;
 use super::draws::Draws;
-use super::tolerances::{CHANGE, FURTHER};
+use super::tolerances::CHANGE;
 use crate::elementary::{exp, log};
 use crate::estimation::fit::Search;
 use crate::estimation::likelihood::Noise;
@@ -62,7 +62,7 @@ pub(super) fn delay_change(fit: &FlightFit, run: usize, task: &Task) -> Result<D
         };
         let model = fit.model();
         let start = model.timed(with_noise(&fit.with_gain(task)?.point, noises));
-        let calm = model.fit(&start, None, Search::Mean, FURTHER.rough, task)?;
+        let calm = model.fit(&start, None, Search::Mean, CHANGE.rough, task)?;
         let calm = fit.moved(calm);
         // Else the rows do not tell the gain there.
         if calm.gain(task)?.is_finite() {

@@ -15,7 +15,6 @@
 //!
 //! in the place of (JᵀJ)⁻¹, w the weights of Bartlett's window.
 
-use super::super::covariance::Common;
 use super::super::fit::FlightFit;
 use super::super::intervals::FlightProfile;
 use super::super::start::is_long;
@@ -144,12 +143,10 @@ pub fn colour_factors(profile: &FlightProfile, task: &Task) -> Result<Vec<f64>, 
             .map(|row| dot(row, vector))
             .collect()
     };
-    let numbers = Common::new(fit, task)?;
-    let factors = profile.known.iter().map(|known| {
-        let weights = numbers.weights(known.quantity);
-        let moved = times(&bread, &weights);
+    let factors = profile.weights.iter().map(|weights| {
+        let moved = times(&bread, weights);
         let coloured = dot(&moved, &times(&spread, &moved));
-        (coloured / dot(&weights, &moved)).max(1.0)
+        (coloured / dot(weights, &moved)).max(1.0)
     });
     Ok(factors.collect())
 }

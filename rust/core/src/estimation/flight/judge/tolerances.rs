@@ -50,7 +50,7 @@ pub(super) struct Further {
     /// The lag that counts as none, in rows: a longer one is seen.
     pub(super) none: f64,
     /// Accuracy of −2 ln L, and that in long recordings: small beside the rise of a lag that is
-    /// significant.
+    /// significant. From 0.02 on a search takes slopes as they are known, and misses some lags.
     pub(super) rough: f64,
     pub(super) clear: f64,
     /// Starts of a lag with a zero: the lag, and the zero less the lag's own, in rows.
@@ -61,7 +61,7 @@ pub(super) struct Further {
 pub(super) const FURTHER: Further = Further {
     starts: [0.7, 3.0],
     none: 1e-3,
-    rough: 0.02,
+    rough: 0.01,
     clear: 0.3,
     overshoots: [(2.0, 4.0), (8.0, 10.0)],
 };
@@ -164,6 +164,8 @@ pub(super) struct Change {
     pub(super) added: usize,
     /// Share of what shows best below which a sum of waves does not show.
     pub(super) shows: f64,
+    /// Accuracy of −2 ln L of a fit without air: small beside the fall of a change that is significant.
+    pub(super) rough: f64,
     /// How much less likely, in −2 ln L, than a fit with air, scattered times or a coloured sensor
     /// one without these and with delays that wander may be. In air of 0.002 m/s/√s, 1 in 200 flights
     /// with a constant delay is doubted more than at 0, and of flights with a wandering one 1 in 100.
@@ -189,6 +191,7 @@ pub(super) const CHANGE: Change = Change {
     added_a_decade: 4.0,
     added: 25,
     shows: 1e-9,
+    rough: 0.02,
     as_likely: 1.0,
     some: 0.3,
     drawn: 2.0,
