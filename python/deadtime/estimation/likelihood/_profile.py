@@ -65,9 +65,11 @@ class LikelihoodProfile(PickledByFields):
 
     @property
     def initial_output(self) -> float:
-        """The fitted output at the start of the first recording."""
-        model = self.fit.model
-        return self.fit.parts[0].linear["gain" in model.names and len(self.fit.runs) == 1]
+        """The fitted output at the start of the first recording; not a number where it is given."""
+        runs = self.fit.runs
+        if not runs[0].offset:
+            return math.nan
+        return self.fit.parts[0].linear["gain" in self.fit.model.names and len(runs) == 1]
 
     @property
     def common(self) -> Array:
