@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from deadtime._deadtime import FlightLikelihood, PlantNumbers, RowNoise
+from deadtime._deadtime import FlightFit, FlightPlant, PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._rows import FlightRows
 
 try:
@@ -34,6 +34,13 @@ def recording(count: int) -> FlightRows:
     output = GAIN * ROW * np.cumsum(command) + 0.005 * rng.standard_normal(count)
     used = np.ones(count, dtype=bool)
     return FlightRows(moment, ROW, output, used, moment, command, (), False)
+
+
+def plant(free: bool) -> FlightPlant:
+    """An integrator whose delay and gain are free, or known."""
+    return FlightPlant(
+        [1.0], [1.0, 0.0], [], delay=free, gain=free, free_lags=[], zero_is_free=False
+    )
 
 
 def peer_filter(residuals: np.ndarray) -> object:
@@ -72,25 +79,14 @@ def main() -> None:
     print(f"{'rows':>8s}{'peer us':>12s}{'ours us':>12s}{'ratio':>8s}{'difference':>12s}")
     for count in (120, 300, 10_000):
         rows = recording(count)
-        known = FlightLikelihood(
-            [1.0], [1.0, 0.0], [rows], delay=False, gain=False, lags=[], zero=False, longest=5.0
-        )
-        free = FlightLikelihood(
-            [1.0],
-            [1.0, 0.0],
-            [rows._replace(offset=True)],
-            delay=True,
-            gain=True,
-            lags=[],
-            zero=False,
-            longest=5.0,
-        )
+        known = FlightFit(plant(False), [rows], False, numbers)
+        free = FlightFit(plant(True), [rows._replace(offset=True)], False, numbers)
         calls = max(1, 30_000 // count)
         ours = min(seconds(lambda one=free: one.objective(numbers), calls) for _ in range(rounds))
         if KalmanFilter is None:
             print(f"{count:8d}{'':12s}{1e6 * ours:12.1f}")
             continue
-        part = known.at(0, numbers)
+        part = known.parts[0]
         peer = peer_filter(part.residuals)
         theirs = min(seconds(peer.loglike, max(1, calls // 10)) for _ in range(rounds))
         squares = part.variance * part.freedom

@@ -528,6 +528,10 @@ class _RecordedRows(Protocol):
     @property
     def uncertain(self) -> Sequence[tuple[float, float, float]]: ...
     @property
+    def row_time(self) -> float: ...
+    @property
+    def rounding(self) -> float: ...
+    @property
     def offset(self) -> bool: ...
     @property
     def trim(self) -> bool: ...
@@ -587,40 +591,115 @@ class RowLikelihood:
     rate: Final[_Reals]
 
 @final
-class FlightLikelihood:
+class FlightPlant:
     def __new__(
         cls,
         num: Sequence[float],
         den: Sequence[float],
-        runs: Sequence[_RecordedRows],
+        lags: Sequence[float],
         *,
         delay: bool,
         gain: bool,
-        lags: Sequence[bool],
-        zero: bool,
-        longest: float,
+        free_lags: Sequence[bool],
+        zero_is_free: bool,
+        zero: float = 0.0,
+        own_lag: float = 0.0,
         air_behind_lags: bool = False,
-    ) -> FlightLikelihood: ...
-    def at(self, run: int, numbers: PlantNumbers) -> RowLikelihood: ...
-    def under(
-        self, run: int, numbers: PlantNumbers, noises: Sequence[RowNoise]
-    ) -> list[RowLikelihood]: ...
-    def waves(self, run: int, numbers: PlantNumbers, number: int) -> tuple[_Reals, _Reals, int]: ...
+        time_constant: bool = False,
+    ) -> FlightPlant: ...
+
+@final
+class FlightFit:
+    def __new__(
+        cls,
+        plant: FlightPlant,
+        runs: Sequence[_RecordedRows],
+        trim: bool,
+        numbers: PlantNumbers,
+        given_gain: float | None = None,
+    ) -> FlightFit: ...
+    @staticmethod
+    def least_squares(
+        plant: FlightPlant, runs: Sequence[_RecordedRows], delay: float, gain: float
+    ) -> FlightFit: ...
+    @staticmethod
+    def fitted(
+        plant: FlightPlant, runs: Sequence[_RecordedRows], first: PlantNumbers
+    ) -> FlightFit: ...
+    @property
+    def numbers(self) -> PlantNumbers: ...
+    @property
+    def trim(self) -> bool: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def with_gain(self) -> PlantNumbers: ...
+    @property
+    def criterion(self) -> float: ...
+    @property
+    def parts(self) -> list[RowLikelihood]: ...
+    @property
+    def covariance(self) -> _Reals: ...
     def objective(self, numbers: PlantNumbers) -> float: ...
-    def over_delays(self, numbers: PlantNumbers, delays: Sequence[float]) -> list[float]: ...
-    def fit(
-        self, start: PlantNumbers, tolerance: float = 1e-6, noise: bool = True
-    ) -> PlantNumbers: ...
-    def held(self, near: PlantNumbers, quantity: str, value: float) -> PlantNumbers: ...
-    def end(
-        self,
-        best: PlantNumbers,
-        quantity: str,
-        reach: float,
-        rise: float,
-        floor: float,
-        lower: float = ...,
-    ) -> tuple[float, PlantNumbers]: ...
+    def rows(self, run: int) -> tuple[NDArray[np.bool_], _Reals]: ...
+    def beside_noise(self) -> FlightFit: ...
+    def refit(self, tolerance: float, white: bool) -> FlightFit: ...
+    def moved(self, numbers: PlantNumbers) -> FlightFit: ...
+    def scatter(self, run: int, stamps: bool) -> float: ...
+    def profile(
+        self, quantities: Sequence[str], first: Sequence[str], level: float
+    ) -> FlightProfile: ...
+
+@final
+class FlightProfile:
+    @property
+    def fit(self) -> FlightFit: ...
+    @property
+    def is_long(self) -> bool: ...
+    @property
+    def weights(self) -> list[list[float]]: ...
+    @property
+    def known(self) -> list[tuple[float, float, float]]: ...
+    def widened(self, factors: Sequence[float]) -> FlightProfile: ...
+    def statistic(self, quantity: str, value: float) -> float: ...
+    def interval(self, quantity: str, level: float) -> tuple[float, float]: ...
+
+@final
+class FlightFinding:
+    cause: Final[str]
+    run: Final[int | None]
+    sizes: Final[list[float]]
+    p_value: Final[float]
+    is_against: Final[bool]
+    plant_lacks: Final[bool]
+
+@final
+class FlightJudgement:
+    whiteness: Final[tuple[float, float, int, float]]
+    is_coloured: Final[bool]
+    findings: Final[list[FlightFinding]]
+
+def judge(
+    fit: FlightFit,
+    quantities: Sequence[str],
+    *,
+    commands_given: bool,
+    widens: bool,
+    total: _Pair | None,
+) -> FlightJudgement: ...
+def unseen_lag(fit: FlightFit) -> float: ...
+def colour_factors(profile: FlightProfile) -> list[float]: ...
+def whiteness(pieces: Sequence[_Reals], parameters: int) -> tuple[float, float, int, float]: ...
+
+LAG_FACTORS: Final[list[float]]
+LEVEL_OF_TESTS: Final[float]
+LONGEST_DELAY: Final[float]
+SEARCHED_ROWS: Final[int]
+SHORTEST_LAG: Final[float]
+
+def excited_part(
+    time: _Reals, command_time: _Reals, command: _Reals
+) -> tuple[int, int, int, int] | None: ...
 
 @final
 class FamilyCandidate:

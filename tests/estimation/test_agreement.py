@@ -3,9 +3,7 @@
 import warnings
 
 import deadtime as dtm
-import numpy as np
 import pytest
-from deadtime.estimation.likelihood._agreement import differ
 from marks import NIGHTLY
 
 SAMPLE, RUNS = 0.065, 40
@@ -43,10 +41,3 @@ def test_flights_of_two_vehicles_do_not(other, name):
     assert found.verdict != "reliable"
     assert "the recordings contradict one another: " in found.message
     assert f"{name}" in found.message.partition("contradict one another: ")[2]
-
-
-def test_the_probability_is_that_of_chi_squared():
-    # Two values 2.5758 standard errors of their difference apart: 1 %, two-sided.
-    errors = np.array([3.0, 4.0])
-    assert differ(np.array([0.0, 2.5758293 * 5.0]), errors) == pytest.approx(0.01, rel=1e-6)
-    assert differ(np.array([1.0]), np.array([1.0])) == 1.0

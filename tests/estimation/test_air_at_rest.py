@@ -3,8 +3,8 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation.likelihood import _air_at_rest as rest
-from deadtime.estimation.likelihood._air_at_rest import air_at_rest
+from deadtime.estimation._native import judge
+from deadtime.estimation.likelihood._flight import NoiseFit
 from deadtime.experiments import FlightNoise
 from marks import NIGHTLY
 
@@ -48,22 +48,14 @@ def test_air_that_is_there_while_the_vehicle_moves_is_found(flights):
     assert found >= 0.7 * flights
 
 
-def test_the_covariance_of_changes_is_that_of_the_integral_of_air():
-    noise = fitted(0)._profile.fit.numbers.noise[0]
-    between, count = 0.065, 4
-    found = rest._covariance(noise, between, count, 30)
-    # By sums over short steps of the exponential covariance of the speed.
-    parts = 200
-    at = (np.arange(count * parts) + 0.5) * between / parts
-    for apart in (0, 2, 4, 7, 20):
-        gaps = np.abs(at[:, None] - at[None, :] - apart * between)
-        air = noise.air**2 * np.exp(-gaps / noise.air_time)
-        expected = float(np.sum(air)) * (between / parts) ** 2
-        expected += {0: 2.0, count: -1.0}.get(apart, 0.0)
-        assert found[apart] == pytest.approx(expected, rel=1e-4, abs=1e-9)
+def probability(fit):
+    """Of air as much larger while the vehicle moves."""
+    found = judge(fit.native, ["total"], commands_given=True, widens=False, total=None).findings
+    return next(one.p_value for one in found if one.cause == "moving air")
 
 
 def test_a_recording_without_rest_is_not_judged():
-    fit = fitted(1)._profile.fit
+    fit = fitted(0)._profile.fit
     short = fit.runs[0]._replace(used=TIME < 5.0)
-    assert air_at_rest(type(fit)(fit.model, (short,), fit.trim, fit.numbers), 0) == 1.0
+    assert 0.01 < probability(fit) < 1.0
+    assert probability(NoiseFit(fit.model, (short,), fit.trim, fit.numbers)) == 1.0

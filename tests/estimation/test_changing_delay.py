@@ -10,9 +10,7 @@ from unittest import mock
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation.likelihood import _adequacy
-from deadtime.estimation.likelihood._changing_delay import DelayChange, delay_change
-from deadtime.estimation.likelihood._search import NoiseFit
+from deadtime.estimation.likelihood import _judgement
 from marks import NIGHTLY
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
@@ -21,28 +19,32 @@ from reality import detection, table
 from reality.conditions import CONDITIONS, SAMPLE, Condition
 from reality.generator import record
 
+#: The tests of the kernel, before they are remembered.
+_judgement_of = _judgement.judge
+
 NAMED = {condition.name: condition for condition in CONDITIONS}
 
 
-def change_of(condition: Condition, number: int) -> DelayChange | None:
-    """What the test said last in the estimate of such a recording, if it was asked."""
-    asked = []
+def change_of(condition: Condition, number: int) -> tuple[float, float] | None:
+    """Probability and size that the test gave last in the estimate of such a recording."""
+    judged = []
 
-    def remembered(fit: NoiseFit, run: int) -> DelayChange:
-        asked.append(delay_change(fit, run))
-        return asked[-1]
+    def remembered(*asked, **known):
+        judged.append(_judgement_of(*asked, **known))
+        return judged[-1]
 
     run = record(condition, number)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(run.vehicle.Kp), sample_time=SAMPLE, limit=1.0)
-    with mock.patch.object(_adequacy, "delay_change", remembered):
+    with mock.patch.object(_judgement, "judge", remembered):
         dtm.estimate_delay(table.recording_of(condition, run), loop, free=("delay", "gain"))
-    return asked[-1] if asked else None
+    found = [one for last in judged[-1:] for one in last.findings if one.cause == "change"]
+    return (found[0].p_value, found[0].sizes[0]) if found else None
 
 
 def p_values(condition: Condition, runs: int) -> np.ndarray:
     """Of the test in such recordings."""
     found = [change_of(condition, number) for number in range(runs)]
-    return np.array([one.p_value for one in found if one is not None])
+    return np.array([one[0] for one in found if one is not None])
 
 
 @pytest.mark.parametrize("name", ["white", "air 0.02"])
@@ -89,8 +91,9 @@ def test_the_spread_of_a_delay_that_wanders_is_about_that_of_its_commands():
         mean = np.average(delays, weights=weights)
         true = np.sqrt(np.average((delays - mean) ** 2, weights=weights))
         assert change is not None
-        assert change.p_value < 0.01
-        ratios.append(change.spread / true)
+        p_value, spread = change
+        assert p_value < 0.01
+        ratios.append(spread / true)
     assert 0.7 < np.median(ratios) < 1.2
 
 

@@ -5,8 +5,7 @@ import pickle
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation.likelihood import _colour_at_rest as colour
-from deadtime.estimation.likelihood._profile import common_covariance
+from deadtime.estimation.likelihood._coloured import ColouredProfile
 from marks import NIGHTLY
 from scipy import signal
 
@@ -89,13 +88,6 @@ def test_a_colour_that_is_not_there_at_rest_is_a_reason():
     assert not any(fit.verdict == "reliable" for fit in fits)
 
 
-def test_derivatives_of_the_rows_have_the_covariance_of_the_likelihood():
-    fit = dtm.estimate_delay(flown(2), LOOP, free=FREE)._profile.fit
-    columns = colour._columns(fit, 0)[fit.runs[0].used]
-    found = np.linalg.inv(columns.T @ columns) * fit.parts[0].variance
-    np.testing.assert_allclose(found, common_covariance(fit), rtol=0.02)
-
-
 def test_the_colour_makes_no_interval_shorter():
     fit = dtm.estimate_delay(flown(3), LOOP, free=FREE)
     factors = fit._profile.colour
@@ -105,19 +97,5 @@ def test_the_colour_makes_no_interval_shorter():
 def test_the_estimate_survives_a_copy():
     fit = dtm.estimate_delay(flown(4), LOOP, free=FREE)
     again = pickle.loads(pickle.dumps(fit))
-    assert isinstance(again._profile, colour.ColouredProfile)
+    assert isinstance(again._profile, ColouredProfile)
     assert again.ci(0.9) == fit.ci(0.9)
-
-
-def test_squares_of_coloured_rows_vary_more_along_a_slow_direction():
-    # Autocorrelations 0.7^k: squares have 0.49^k, and along a constant the factor is their sum.
-    random = np.random.default_rng(5)
-    rows = signal.lfilter([1.0], [1.0, -0.7], random.standard_normal((400, 3000)))[:, 2000:]
-    slow = np.cos(2.0 * np.pi * np.arange(1000) / 500.0)
-    rows /= rows.std()
-    found = np.var((rows**2) @ slow) / (2.0 * slow @ slow)
-    told = np.mean([colour.colour_of_squares(row, slow) for row in rows])
-    assert told == pytest.approx(found, rel=0.25)
-    assert found > 2.0
-    white = random.standard_normal(1000)
-    assert colour.colour_of_squares(white, slow) < 1.2

@@ -5,8 +5,8 @@ from functools import cache
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation.likelihood import _start as start
-from deadtime.estimation.likelihood._rows import FlightRows
+from deadtime.estimation._native import SEARCHED_ROWS
+from deadtime.estimation.likelihood._rows import FlightRows, excited_part
 
 TRUTH = dtm.ControlLoop(
     dtm.Integrator(0.85, 0.1), dtm.P(1.6), delay=0.3, sample_time=0.05, limit=1.0
@@ -40,16 +40,19 @@ def test_a_long_recording_tells_delay_gain_and_lag():
     assert fit.stderr["delay"] == pytest.approx(0.5 * part.stderr["delay"], rel=0.15)
 
 
-def test_the_search_on_a_part_ends_at_the_maximum_of_all_rows(monkeypatch):
-    recording = recorded(3000)
-    whole = dtm.estimate_delay(recording, TRUTH.replace(delay=None), free=FREE)
-    monkeypatch.setattr(start, "PART", 1000)
-    from_part = dtm.estimate_delay(recording, TRUTH.replace(delay=None), free=FREE)
+def test_the_search_on_a_part_ends_at_the_maximum_of_all_rows():
+    fit = dtm.estimate_delay(recorded(6000), TRUTH.replace(delay=None), free=FREE)
+    found = fit._profile.fit
+    whole = found.refit(1e-6, white=False)
+    for name, value in (("delay", whole.numbers.delay), ("gain", whole.gain)):
+        assert getattr(fit, name) == pytest.approx(value, abs=0.05 * fit.stderr[name])
+    assert fit.lag == pytest.approx(whole.numbers.lags[0], abs=0.05 * fit.stderr["lag"])
+    # The interval is that of the profile where the likelihood is a parabola.
     for name in FREE:
-        error = whole.stderr[name]
-        assert getattr(from_part, name) == pytest.approx(getattr(whole, name), abs=0.05 * error)
-        # The interval is that of the profile where the likelihood is a parabola.
-        np.testing.assert_allclose(from_part.ci(0.95, name), whole.ci(0.95, name), atol=0.1 * error)
+        low, high = fit.ci(0.95, name)
+        for end in (low, high):
+            reach = np.sqrt(fit._profile.statistic(name, end))
+            assert reach == pytest.approx(1.96, abs=0.1)
 
 
 def test_the_search_uses_the_rows_in_which_the_command_changes():
@@ -64,8 +67,8 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
         ((10.0, 11.0), (700.0, 701.0), (800.0, 801.0)),
         False,
     )
-    part = start.excited_part(rows)
-    assert part.time.size == start.PART
+    part = excited_part(rows)
+    assert part.time.size == SEARCHED_ROWS
     assert part.time[0] >= 12_000 * TRUTH.sample_time - 1.0
     # Commands of as long a time before it act on it; the output at its start is unknown.
     assert part.command_time[0] == pytest.approx(2 * part.time[0] - part.time[-1], abs=0.1)
@@ -73,7 +76,7 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
     assert part.unknown == ((800.0, 801.0),)
     assert part.offset
     short = FlightRows(*(one[:4000] if isinstance(one, np.ndarray) else one for one in rows))
-    assert start.excited_part(short) is short
+    assert excited_part(short) is short
 
 
 def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
@@ -83,10 +86,9 @@ def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
     assert "a further lag" in fit.message
 
 
-def test_rows_that_were_lost_before_the_part_are_no_unknowns_of_it(monkeypatch):
-    recording = recorded(3000)
-    kept = np.random.default_rng(1).random(3000) > 0.05
-    monkeypatch.setattr(start, "PART", 1000)
+def test_rows_that_were_lost_before_the_part_are_no_unknowns_of_it():
+    recording = recorded(7000)
+    kept = np.random.default_rng(1).random(7000) > 0.05
     some = (recording.time, recording.reference, recording.output, recording.command)
     fit = dtm.estimate_delay(
         dtm.Recording(*(column[kept] for column in some)),

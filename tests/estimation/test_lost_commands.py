@@ -7,7 +7,8 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
+from deadtime.estimation._native import LEVEL_OF_TESTS
+from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.estimation.likelihood._missing import _closed, _response, smoothed
 from deadtime.estimation.models._held import path_of
 
@@ -122,4 +123,4 @@ def test_white_residuals_are_called_coloured_as_often_as_the_level_says(rows):
     random = np.random.default_rng(0)
     runs = 3000
     coloured = sum(not whiteness_of(random.standard_normal(rows)).white for _ in range(runs))
-    assert 0.5 * SIGNIFICANCE < coloured / runs < 1.8 * SIGNIFICANCE
+    assert 0.5 * LEVEL_OF_TESTS < coloured / runs < 1.8 * LEVEL_OF_TESTS

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from deadtime._deadtime import FlightLikelihood, OnlineBank, PlantNumbers, RowNoise
+from deadtime._deadtime import FlightFit, FlightPlant, OnlineBank, PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._disturbances import Disturbance
 from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.running._estimate import BankNumbers
@@ -138,15 +138,16 @@ def test_the_posterior_over_a_range_is_that_of_the_batch_likelihood():
     )
     last = run(OnlineBank(gaussian), times, output, commands, used)[-1]
     rows = FlightRows(times, ROW, output, used, times, commands, (), True, trim=True)
-    batch = FlightLikelihood(
-        (1.0,), (1.0, 0.0), [rows], delay=False, gain=True, lags=[False], zero=False,
-        longest=1.0, air_behind_lags=True,
+    plant = FlightPlant(
+        (1.0,), (1.0, 0.0), [0.15], delay=False, gain=True, free_lags=[False], zero_is_free=False,
+        air_behind_lags=True,
     )  # fmt: skip
     noise = RowNoise(AIR_TIME, AIR / WHITE, SENSOR_TIME, SENSOR / WHITE)
     logs = []
     fine = np.linspace(0.2, 0.4, 401)
     for delay in fine:
-        part = batch.at(0, PlantNumbers(float(delay), [0.15], [noise]))
+        numbers = PlantNumbers(float(delay), [0.15], [noise])
+        part = FlightFit(plant, [rows], True, numbers).parts[0]
         _, log_det = np.linalg.slogdet(part.inverse.reshape(3, 3))
         squares = part.variance * part.freedom / WHITE**2
         logs.append(-0.5 * (squares + part.log_det - log_det))

@@ -1,13 +1,10 @@
 """Several recordings of one vehicle, fitted with the same parameters."""
 
-from types import SimpleNamespace
-
 import deadtime as dtm
 import numpy as np
 import pytest
 import step_recordings
 from deadtime.estimation.fit._least_squares import JointModel
-from deadtime.estimation.likelihood._profile import _covariance
 from flights import flight_path
 
 TS = 0.065
@@ -139,20 +136,3 @@ def test_the_two_real_flights_are_fitted_together():
     assert fit.verdict != "reliable"
     low, high = fit.ci()
     assert high - low > 0.02
-
-
-def test_a_recording_whose_derivatives_are_singular_tells_nothing():
-    # The windows of a log of a real firmware had one such, and the report of the log ended there.
-    def told(*pairs):
-        parts = [
-            SimpleNamespace(inverse=np.diag([1.0, one, other]).ravel(), linear=[0.0], variance=1.0)
-            for one, other in pairs
-        ]
-        model = SimpleNamespace(
-            names=("delay", "lag"), order=[("delay", "delay"), ("lag", "lag 0")]
-        )
-        return _covariance(SimpleNamespace(model=model, runs=parts), parts)
-
-    np.testing.assert_allclose(told((4.0, 1.0), (4.0, 1.0)), np.diag([2.0, 0.5]))
-    np.testing.assert_allclose(told((4.0, 1.0), (np.inf, np.nan)), np.diag([4.0, 1.0]))
-    assert not np.all(np.isfinite(told((np.inf, 1.0), (np.nan, np.nan))))

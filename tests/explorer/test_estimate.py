@@ -77,7 +77,7 @@ def test_what_tells_nothing_is_refused(web: WebKernels) -> None:
     still = dtm.Recording(
         recording.time, recording.reference, recording.output, command=np.zeros(130)
     )
-    with pytest.raises(ValueError, match=r"tells nothing|tell these numbers apart"):
+    with pytest.raises(ValueError, match=r"tell these numbers apart|tells nothing|depend on"):
         estimate(web, still, lag=False)
     with pytest.raises(ValueError, match="time"):
         web.call("estimate", [1, 1.0, 2, 1.0, 0.0, 0, 2, 1.0, 0.0, 2, 0.0, 0.0, 1, 0.0, 1, 1.0])

@@ -39,6 +39,8 @@ ORDER = {
         "lu",
         "cholesky",
         "triangle",
+        "singular",
+        "symmetric",
         "balance",
         "hessenberg",
         "eigenvalues",
@@ -103,6 +105,7 @@ ORDER = {
         "range",
     ],
     "estimation": [
+        "statistics",
         "plant",
         "disturbance",
         "rows",
@@ -123,6 +126,7 @@ ORDER = {
         "variables",
         "fit",
         "profile",
+        "flight",
         "online",
         "family",
     ],
@@ -325,3 +329,13 @@ def test_the_seam_holds_no_formula():
     for path in rust_sources(BINDINGS):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"\.(exp|ln|sin|cos|sqrt|powi|powf)\(", text), path.name
+
+
+def test_the_page_only_converts():
+    # It had a search of its own, with copies of the constants of the package's.
+    lines = [
+        line.strip()
+        for path in rust_sources(CORE.parents[1] / "web")
+        for line in code(path).splitlines()
+    ]
+    assert sum(1 for line in lines if line) <= 500

@@ -48,7 +48,7 @@ from deadtime.estimation.evidence._question import PLANTS as PLANTS
 from deadtime.estimation.evidence._words import Advice
 from deadtime.estimation.fit._profile import unit_of as unit_of
 from deadtime.estimation.fit._residuals import Whiteness
-from deadtime.estimation.likelihood._power import unseen_in_words as unseen_in_words
+from deadtime.estimation.likelihood._judgement import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._arx_scan import ARXScan
 from deadtime.estimation.methods._cta import CTA
 from deadtime.estimation.methods._decay import Decay

@@ -1,13 +1,26 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
+    LAG_FACTORS as LAG_FACTORS,
+    LEVEL_OF_TESTS as LEVEL_OF_TESTS,
+    LONGEST_DELAY as LONGEST_DELAY,
+    SEARCHED_ROWS as SEARCHED_ROWS,
+    SHORTEST_LAG as SHORTEST_LAG,
     FamilyCandidate as FamilyCandidate,
     FamilyFit as FamilyFit,
-    FlightLikelihood as FlightLikelihood,
+    FlightFinding as FlightFinding,
+    FlightFit as FlightFit,
+    FlightPlant as FlightPlant,
+    FlightProfile as FlightProfile,
     OnlineBank as OnlineBank,
     PlantNumbers as PlantNumbers,
     RowLikelihood as RowLikelihood,
     RowNoise as RowNoise,
+    colour_factors as colour_factors,
+    excited_part as excited_part,
     fit_family as fit_family,
+    judge as judge,
+    unseen_lag as unseen_lag,
     whitened_columns as whitened_columns,
+    whiteness as whiteness,
 )

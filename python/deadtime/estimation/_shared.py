@@ -21,9 +21,9 @@ import numpy as np
 from deadtime._base.digits import between, shown
 from deadtime._base.plain import plain_fields
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
+from deadtime.estimation._native import LEVEL_OF_TESTS
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.fit._profile import floor_of, unit_of
-from deadtime.estimation.fit._residuals import SIGNIFICANCE
 
 #: Steps of the grid in the smallest interval, and most of them; most steps beyond the grid.
 IN_AN_INTERVAL, ON_THE_GRID, BEYOND = 8, 120, 60
@@ -65,7 +65,7 @@ class SharedNumber:
     @property
     def agree(self) -> bool:
         """Whether the estimates may share the number."""
-        return self.p_value >= SIGNIFICANCE
+        return self.p_value >= LEVEL_OF_TESTS
 
     def summary(self) -> str:
         """The number in one line."""
@@ -182,7 +182,7 @@ def shared_number(
         estimates=tuple(values),
         p_value=p_value,
         verdict=verdict_if(
-            p_value >= SIGNIFICANCE and all(one.verdict == "reliable" for one in estimates)
+            p_value >= LEVEL_OF_TESTS and all(one.verdict == "reliable" for one in estimates)
         ),
     )
 

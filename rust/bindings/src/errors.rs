@@ -14,6 +14,7 @@ pub(crate) fn to_python(py: Python<'_>, error: Error) -> PyErr {
         Error::Argument(_) | Error::TooMuch { .. } | Error::Diverges { .. } => {
             PyValueError::new_err(message)
         }
+        Error::NotIdentifiable(_) => own(py, "NotIdentifiableError", (message,)),
         Error::Interrupted => PyKeyboardInterrupt::new_err(message),
         Error::Memory { .. } => PyMemoryError::new_err(message),
         Error::Caller => PyRuntimeError::new_err(message),

@@ -1,8 +1,8 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Commands, Disturbance, Entry, Evaluation, Fit, Free, Limits, Model, Noise, Plant, Point,
-    Quantity, Rows, Search, Timing, held_response as response, whiten,
+    Commands, Disturbance, Entry, Evaluation, Fit, FlightRun, Noise, Plant, Point, Quantity, Rows,
+    Timing, held_response as response, whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -17,7 +17,7 @@ type Array = Py<PyArray1<f64>>;
 
 /// The rows of one recording.
 #[derive(FromPyObject)]
-struct RecordedRows<'py> {
+pub(crate) struct RecordedRows<'py> {
     time: Floats<'py>,
     output: Floats<'py>,
     used: PyReadonlyArrayDyn<'py, bool>,
@@ -28,10 +28,20 @@ struct RecordedRows<'py> {
     uncertain: Vec<(f64, f64, f64)>,
     offset: bool,
     trim: bool,
+    row_time: f64,
+    rounding: f64,
 }
 
 impl RecordedRows<'_> {
-    fn rows(&self) -> PyResult<Rows> {
+    pub(crate) fn run(&self) -> PyResult<FlightRun> {
+        Ok(FlightRun {
+            rows: self.rows()?,
+            row_time: self.row_time,
+            rounding: self.rounding,
+        })
+    }
+
+    pub(crate) fn rows(&self) -> PyResult<Rows> {
         let rows = Rows {
             time: owned(&self.time)?,
             output: owned(&self.output)?,
@@ -156,7 +166,7 @@ impl PlantNumbers {
 }
 
 impl PlantNumbers {
-    fn fit(&self) -> Fit {
+    pub(crate) fn fit(&self) -> Fit {
         let noise = self.noise.iter().map(RowNoise::noise);
         Fit {
             point: Point {
@@ -170,7 +180,7 @@ impl PlantNumbers {
         }
     }
 
-    fn from_fit(fit: &Fit) -> Self {
+    pub(crate) fn from_fit(fit: &Fit) -> Self {
         let noise = fit.point.noise.iter().map(|one| RowNoise {
             air_time: one.air_time,
             air: one.air,
@@ -207,7 +217,7 @@ pub(crate) struct RowLikelihood {
 }
 
 impl RowLikelihood {
-    fn new(py: Python<'_>, found: Evaluation) -> Self {
+    pub(crate) fn new(py: Python<'_>, found: Evaluation) -> Self {
         let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
         Self {
             objective: found.objective,
@@ -225,163 +235,7 @@ impl RowLikelihood {
     }
 }
 
-/// Recordings of one plant, with what is unknown about it.
-#[pyclass(frozen, module = "deadtime._deadtime")]
-pub(crate) struct FlightLikelihood {
-    model: Model,
-}
-
-#[pymethods]
-impl FlightLikelihood {
-    #[new]
-    #[pyo3(signature = (num, den, runs, *, delay, gain, lags, zero, longest, air_behind_lags=false))]
-    #[expect(clippy::too_many_arguments, reason = "given by name")]
-    fn new(
-        num: Vec<f64>,
-        den: Vec<f64>,
-        runs: Vec<RecordedRows<'_>>,
-        delay: bool,
-        gain: bool,
-        lags: Vec<bool>,
-        zero: bool,
-        longest: f64,
-        air_behind_lags: bool,
-    ) -> PyResult<Self> {
-        let plant = converted(Plant::new(&num, &den))?.with_air_behind_lags(air_behind_lags);
-        let runs = runs
-            .iter()
-            .map(RecordedRows::rows)
-            .collect::<PyResult<_>>()?;
-        let free = Free {
-            delay,
-            gain,
-            lags,
-            zero,
-        };
-        let model = converted(Model::new(plant, runs, free, longest))?;
-        Ok(Self { model })
-    }
-
-    /// The likelihood of one recording.
-    fn at(&self, py: Python<'_>, run: usize, numbers: &PlantNumbers) -> PyResult<RowLikelihood> {
-        let point = numbers.fit().point;
-        let found = run_here(py, |task| self.model.at(run, &point, task))?;
-        Ok(RowLikelihood::new(py, found))
-    }
-
-    /// The likelihood of one recording under each of these noises in the place of its own, without what
-    /// has a value for each row.
-    fn under(
-        &self,
-        py: Python<'_>,
-        run: usize,
-        numbers: &PlantNumbers,
-        noises: Vec<RowNoise>,
-    ) -> PyResult<Vec<RowLikelihood>> {
-        let point = numbers.fit().point;
-        let noises: Vec<Noise> = noises.iter().map(RowNoise::noise).collect();
-        let found = run_here(py, |task| self.model.under(run, &point, &noises, task))?;
-        Ok(found
-            .into_iter()
-            .map(|one| RowLikelihood::new(py, one))
-            .collect())
-    }
-
-    /// What so many waves of the delay over the commands do to the rows of one recording: R of Q R,
-    /// row-major, the residuals along Q, and the sum of squares of all.
-    fn waves(
-        &self,
-        py: Python<'_>,
-        run: usize,
-        numbers: &PlantNumbers,
-        number: usize,
-    ) -> PyResult<(Array, Array, usize)> {
-        let point = numbers.fit().point;
-        let found = run_here(py, |task| self.model.waves(run, &point, number, task))?;
-        let array = |values: Vec<f64>| values.into_pyarray(py).unbind();
-        Ok((array(found.factor), array(found.along), found.freedom))
-    }
-
-    /// −2 ln L of all recordings.
-    fn objective(&self, py: Python<'_>, numbers: &PlantNumbers) -> PyResult<f64> {
-        let point = numbers.fit().point;
-        run_here(py, |task| self.model.objective(&point, task))
-    }
-
-    /// −2 ln L of all recordings at each of these delays and the other numbers; finite also where the
-    /// numbers that are searched cannot be told apart.
-    fn over_delays(
-        &self,
-        py: Python<'_>,
-        numbers: &PlantNumbers,
-        delays: Vec<f64>,
-    ) -> PyResult<Vec<f64>> {
-        let point = numbers.fit().point;
-        run_here(py, |task| self.model.over_delays(&point, &delays, task))
-    }
-
-    /// The maximum from a starting point; under its noise unless `noise` is searched too.
-    #[pyo3(signature = (start, tolerance=1e-6, noise=true))]
-    fn fit(
-        &self,
-        py: Python<'_>,
-        start: &PlantNumbers,
-        tolerance: f64,
-        noise: bool,
-    ) -> PyResult<PlantNumbers> {
-        let start = self.known(start).point;
-        let search = if noise { Search::All } else { Search::Mean };
-        let found = run_here(py, |task| {
-            self.model.fit(&start, None, search, tolerance, task)
-        })?;
-        Ok(PlantNumbers::from_fit(&found))
-    }
-
-    /// The maximum with one quantity at a value, from a fit near it.
-    fn held(
-        &self,
-        py: Python<'_>,
-        near: &PlantNumbers,
-        quantity: &str,
-        value: f64,
-    ) -> PyResult<PlantNumbers> {
-        let (near, quantity) = (self.known(near), read(quantity)?);
-        let found = run_here(py, |task| self.model.held(&near, quantity, value, task))?;
-        Ok(PlantNumbers::from_fit(&found))
-    }
-
-    /// The end of an interval, and the lowest point seen on the way, at which the search ends if it is
-    /// `lower` than the best by as much.
-    #[pyo3(signature = (best, quantity, reach, rise, floor, lower=f64::INFINITY))]
-    #[expect(clippy::too_many_arguments, reason = "the numbers of one search")]
-    fn end(
-        &self,
-        py: Python<'_>,
-        best: &PlantNumbers,
-        quantity: &str,
-        reach: f64,
-        rise: f64,
-        floor: f64,
-        lower: f64,
-    ) -> PyResult<(f64, PlantNumbers)> {
-        let limits = Limits { floor, lower };
-        let (best, quantity) = (self.known(best), read(quantity)?);
-        let (end, lowest) = run_here(py, |task| {
-            self.model.end(&best, quantity, reach, rise, limits, task)
-        })?;
-        Ok((end, PlantNumbers::from_fit(&lowest)))
-    }
-}
-
-impl FlightLikelihood {
-    fn known(&self, numbers: &PlantNumbers) -> Fit {
-        let Fit { point, objective } = numbers.fit();
-        let point = self.model.timed(point);
-        Fit { point, objective }
-    }
-}
-
-fn read(quantity: &str) -> PyResult<Quantity> {
+pub(crate) fn read(quantity: &str) -> PyResult<Quantity> {
     Ok(match quantity {
         "delay" => Quantity::Delay,
         "total" => Quantity::Total,

@@ -9,7 +9,9 @@ mod errors;
 mod estimation;
 mod family;
 mod fixed_step;
+mod flight;
 mod frequency;
+mod judgement;
 mod loading;
 mod loops;
 mod matrix;
@@ -45,16 +47,22 @@ mod _deadtime {
     use super::dde::{PyLinearLoop, PyLoopResponse, on_samples, rate_limited};
     #[pymodule_export]
     use super::estimation::{
-        FlightLikelihood, PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
+        PlantNumbers, RowLikelihood, RowNoise, held_response, whitened_columns,
     };
     #[pymodule_export]
     use super::family::{FamilyCandidate, FamilyFit, fit_family};
     #[pymodule_export]
     use super::fixed_step::FixedStepResponse;
     #[pymodule_export]
+    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part};
+    #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
+    };
+    #[pymodule_export]
+    use super::judgement::{
+        FlightFinding, FlightJudgement, colour_factors, judge, unseen_lag, whiteness,
     };
     #[pymodule_export]
     use super::loops::{
@@ -98,6 +106,7 @@ mod _deadtime {
         // Where there is no memory for it now, each call asks again.
         let _ = super::reserve::ready();
         super::loading::load_numpy(module.py(), || super::special::add_ufuncs(module))?;
+        super::flight::add_constants(module)?;
         super::pointers::add_pointers(module)
     }
 }

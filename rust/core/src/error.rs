@@ -27,6 +27,10 @@ pub enum Error {
     #[error("{0}")]
     Argument(String),
 
+    /// Data from which numbers cannot be told.
+    #[error("{0}")]
+    NotIdentifiable(String),
+
     /// A response exceeded the limit for diverging runs.
     #[error(
         "the response exceeds {bound:e} at t = {time} s after the start: the loop is unstable, end \

@@ -14,7 +14,6 @@ mod margins;
 mod request;
 mod responses;
 mod roots;
-mod statistics;
 
 use exchange::answered;
 
@@ -48,44 +47,30 @@ pub extern "C" fn message_count() -> usize {
     exchange::message().1
 }
 
-/// Counts, and where they are asked for abscissas, of a map: see [`maps::cells`].
-#[unsafe(no_mangle)]
-pub extern "C" fn map() -> bool {
-    answered(maps::cells)
+/// Functions that read the request and write the answer; false where there is none.
+macro_rules! answering {
+    ($($(#[$about:meta])* $name:ident = $work:path;)+) => {$(
+        $(#[$about])*
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $name() -> bool {
+            answered($work)
+        }
+    )+};
 }
 
-/// The curves on which roots lie on the edge of stability: see [`maps::boundaries`].
-#[unsafe(no_mangle)]
-pub extern "C" fn boundaries() -> bool {
-    answered(maps::boundaries)
-}
-
-/// The rightmost roots: see [`roots::rightmost`].
-#[unsafe(no_mangle)]
-pub extern "C" fn rightmost() -> bool {
-    answered(roots::rightmost)
-}
-
-/// The roots in a region: see [`roots::in_region`].
-#[unsafe(no_mangle)]
-pub extern "C" fn roots() -> bool {
-    answered(roots::in_region)
-}
-
-/// Gain, phase and delay margins: see [`margins::margins`].
-#[unsafe(no_mangle)]
-pub extern "C" fn margins() -> bool {
-    answered(margins::margins)
-}
-
-/// Responses to a step of the reference or of the load: see [`responses::step`].
-#[unsafe(no_mangle)]
-pub extern "C" fn step() -> bool {
-    answered(responses::step)
-}
-
-/// Delay, gain and lag of a recording: see [`estimate::estimate`].
-#[unsafe(no_mangle)]
-pub extern "C" fn estimate() -> bool {
-    answered(estimate::estimate)
+answering! {
+    /// Counts, and where they are asked for abscissas, of a map: see [`maps::cells`].
+    map = maps::cells;
+    /// The curves on which roots lie on the edge of stability: see [`maps::boundaries`].
+    boundaries = maps::boundaries;
+    /// The rightmost roots: see [`roots::rightmost`].
+    rightmost = roots::rightmost;
+    /// The roots in a region: see [`roots::in_region`].
+    roots = roots::in_region;
+    /// Gain, phase and delay margins: see [`margins::margins`].
+    margins = margins::margins;
+    /// Responses to a step of the reference or of the load: see [`responses::step`].
+    step = responses::step;
+    /// Delay, gain and lag of a recording: see [`estimate::estimate`].
+    estimate = estimate::estimate;
 }

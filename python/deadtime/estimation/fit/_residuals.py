@@ -15,13 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._base.arrays import Array
-
-#: Excess of the variance of Q over that of chi-squared, in lags over rows, by simulation: without
-#: it, the 1 % level calls 2.5 % of white residuals of 120 rows coloured.
-EXCESS = 1.6
-
-#: Significance level of the whiteness test: this share of white residuals is called coloured.
-SIGNIFICANCE = 0.01
+from deadtime.estimation._native import LEVEL_OF_TESTS, whiteness
 
 
 @dataclass(frozen=True)
@@ -49,7 +43,7 @@ class Whiteness:
     @property
     def white(self) -> bool:
         """Whether the residuals pass for white at the 1 % level."""
-        return self.p_value > SIGNIFICANCE
+        return self.p_value > LEVEL_OF_TESTS
 
 
 def whiteness_of(
@@ -60,27 +54,7 @@ def whiteness_of(
     Residuals of several recordings, of these `sizes`, are tested one recording at a time, and
     the statistics are added. Residuals of zero pass.
     """
-    from scipy import special
-
-    statistic, freedom, first, weight, excess = 0.0, -parameters, 0.0, 0.0, 0.0
-    longest = 1
-    for piece in pieces_of(residuals, sizes):
-        n = piece.size
-        centred = piece - piece.mean()
-        power = float(centred @ centred)
-        lags = max(1, min(20, n // 4))
-        longest, freedom = max(longest, lags), freedom + lags
-        excess += EXCESS * lags**2 / n
-        if power == 0.0:
-            continue
-        rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
-        statistic += float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-        first, weight = first + n * float(rho[0]), weight + n
-    # A multiple of chi-squared with that mean and variance.
-    freedom = max(1, freedom)
-    wider = 1.0 + excess / freedom
-    p_value = float(special.chdtrc(freedom / wider, statistic / wider))
-    return Whiteness(statistic, p_value, longest, first / weight if weight else 0.0)
+    return Whiteness(*whiteness(pieces_of(residuals, sizes), parameters))
 
 
 def pieces_of(values: Array, sizes: Sequence[int] | None) -> list[Array]:

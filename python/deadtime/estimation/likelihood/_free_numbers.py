@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -22,9 +21,9 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._native import PlantNumbers
-from deadtime.estimation.likelihood._profile import LikelihoodProfile, unseen_air
+from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit, PlantModel, airs_of, with_noise
 
 #: The plant with such numbers, and the rows under the command that it gets.
 Given: TypeAlias = Callable[[Mapping[str, float]], tuple[PlantModel, Sequence[FlightRows]]]
@@ -103,11 +102,6 @@ class NumbersProfile(LikelihoodProfile):
         return self._with_numbers(
             {name: one * math.sqrt(self.unseen[name]) for name, one in known.items()}
         )
-
-    @cached_property
-    def unseen(self) -> dict[str, float]:
-        """As for known numbers."""
-        return unseen_air(self.fit, self._weights, super().bounds)
 
     def _with_numbers(self, known: Mapping[str, float]) -> dict[str, float]:
         """Standard errors from those for known numbers."""
@@ -213,14 +207,7 @@ def _fits(fit: NoiseFit, given: Given, first: Mapping[str, float], white: bool =
 
     def at(logs: Array, near: NoiseFit = fit, tolerance: float = EXACT) -> NoiseFit:
         model, rows = given(_values(first, logs))
-        likelihood = model.likelihood(rows, near.trim)
-        starts = [near.numbers]
-        if not white and any(noise.air == 0.0 for noise in near.numbers.noise):
-            # Without air there is none after a search either.
-            starts.append(with_noise(near.numbers, airs_of(model, rows)[1]))
-        fits = (likelihood.fit(one, tolerance) for one in starts)
-        found = min(fits, key=lambda one: one.objective)
-        return NoiseFit(model, tuple(rows), near.trim, found)
+        return NoiseFit(model, tuple(rows), near.trim, near.numbers).refit(tolerance, white)
 
     return at
 

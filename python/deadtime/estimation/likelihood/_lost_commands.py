@@ -19,14 +19,10 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation.likelihood._free_numbers import numbers_of, plant_at
-from deadtime.estimation.likelihood._profile import (
-    LikelihoodProfile,
-    common_covariance,
-    unseen_air,
-)
+from deadtime.estimation.likelihood._flight import NoiseFit, changed, with_noise
+from deadtime.estimation.likelihood._free_numbers import EXACT, numbers_of, plant_at
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit, changed, with_noise
 
 #: The rows of all recordings with the commands that a plant of these numbers leads to.
 Refilled: TypeAlias = Callable[[NoiseFit], Sequence[FlightRows]]
@@ -61,11 +57,10 @@ class LostCommandsProfile(LikelihoodProfile):
         return self.cov
 
     @cached_property
-    def unseen(self) -> dict[str, float]:
-        """As where the commands are given."""
-        given = common_covariance(self.fit)
-        errors = {name: math.sqrt(float(w @ given @ w)) for name, w in self._weights.items()}
-        return unseen_air(self.fit, self._weights, errors)
+    def bounds(self) -> dict[str, float]:
+        """Standard errors for the fitted noise."""
+        pairs = zip(self.names, np.array(self.native.weights), strict=True)
+        return {name: math.sqrt(float(w @ self.cov @ w)) for name, w in pairs}
 
     def statistic(self, name: str, value: float) -> float:
         """The squared t for which `value` is the end of an interval."""
@@ -73,7 +68,11 @@ class LostCommandsProfile(LikelihoodProfile):
 
     def interval(self, name: str, value: float, stderr: float, level: float) -> tuple[float, float]:
         """Ends of the interval around the fitted `value`."""
-        return self._from_curvature(name, value, level)
+        from scipy import special
+
+        quantile = float(special.stdtrit(self.freedom[name], 0.5 + level / 2))
+        low, high = (value + sign * quantile * self.stderr[name] for sign in (-1.0, 1.0))
+        return low if name == "gain" else max(0.0, low), high
 
 
 def with_lost_commands(
@@ -88,7 +87,7 @@ def with_lost_commands(
         calm = [changed(one, air=0.0, sensor=0.0) for one in fit.numbers.noise]
         starts.append(replace(fit, trim=False, numbers=with_noise(fit.with_gain, calm)))
     starts = [_started(one, refilled, sample_time) for one in starts]
-    sizes = np.sqrt(np.diag(common_covariance(fit)))
+    sizes = np.sqrt(np.diag(fit.covariance))
     found = [_searched(one, refilled, sizes) for one in starts]
     best = min(found, key=lambda one: one.criterion)
     cov = _covariance(partial(_objective, best, refilled, sizes), np.zeros(sizes.size))
@@ -128,7 +127,6 @@ def _searched(fit: NoiseFit, refilled: Refilled, sizes: Array) -> NoiseFit:
     """The likeliest fit near this one, by steps of such sizes."""
     from scipy import optimize
 
-    known = replace(fit.model, names=())
     for step in STEPS:
         point = optimize.minimize(
             partial(_objective, fit, refilled, sizes),
@@ -142,7 +140,7 @@ def _searched(fit: NoiseFit, refilled: Refilled, sizes: Array) -> NoiseFit:
             },
         ).x
         one = _moved(fit, sizes * point)
-        noise = known.likelihood(refilled(one), fit.trim).fit(one.with_gain).noise
+        noise = _known(one, refilled).refit(EXACT, white=True).numbers.noise
         fit = one.moved(with_noise(one.with_gain, noise))
     return replace(fit, runs=tuple(refilled(fit)))
 
@@ -162,8 +160,13 @@ def _minus_log_likelihood(fit: NoiseFit, refilled: Refilled) -> float:
     """-2 ln L with the commands of this plant."""
     if min(fit.numbers.delay, *fit.numbers.lags, math.inf) < 0.0:
         return math.inf
-    known = replace(fit.model, names=())
-    return known.likelihood(refilled(fit), fit.trim).objective(fit.with_gain)
+    return _known(fit, refilled).native.objective(fit.with_gain)
+
+
+def _known(fit: NoiseFit, refilled: Refilled) -> NoiseFit:
+    """The fit with the commands of its plant, of which nothing is free."""
+    model, runs = replace(fit.model, names=()), tuple(refilled(fit))
+    return replace(fit, model=model, runs=runs, numbers=fit.with_gain)
 
 
 def _with_common(fit: NoiseFit, values: Array) -> NoiseFit:

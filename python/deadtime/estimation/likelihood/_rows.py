@@ -1,20 +1,17 @@
-"""Rows of a recording for the likelihood, and which of them are outliers."""
+"""Rows of a recording for the likelihood."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
-
-#: Spikes of the residuals beyond so many robust deviations are outliers, at most this share of the
-#: rows. Half a window of the median that spikes are measured from, in rows.
-SPIKE, MOST_SPIKES, HALF_WINDOW = 6.0, 0.15, 2
-
-#: Median absolute deviation of a Gaussian, and the least robust deviation as a share of the plain.
-MAD, LEAST_ROBUST = 0.6745, 0.1
-
+from deadtime.estimation._native import (
+    SEARCHED_ROWS,
+    excited_part as native_part,
+)
 
 #: Steps of a rounded output are multiples of the least, within this share of it, and at least this
 #: share of the rows is equal to the row before.
@@ -45,49 +42,34 @@ class FlightRows(NamedTuple):
     rounding: float = 0.0
 
 
-def spikes(residuals: Array, rounding: float) -> Mask:
-    """Rows of these residuals that are outliers: far from the median of their neighbours.
+def is_long(runs: Sequence[FlightRows]) -> bool:
+    """Whether a search on all rows would take too long."""
+    return any(rows.time.size > SEARCHED_ROWS for rows in runs)
 
-    Rows within a step of the rounding are none.
+
+def excited_part(rows: FlightRows) -> FlightRows:
+    """The rows of a search: all, or those of a long recording in which the command changes most.
+
+    They keep the commands of as long a time before them. What those before have left is a part of
+    the offset.
     """
-    away, robust = _from_neighbours(residuals)
-    found = np.abs(away) > max(SPIKE * robust, rounding)
-    if robust == 0.0:
-        found[:] = False
-    if np.sum(found) > MOST_SPIKES * away.size:
-        return np.zeros(away.size, dtype=bool)
-    return found
-
-
-def _from_neighbours(residuals: Array) -> tuple[Array, float]:
-    """Difference from the median of the rows around, and its robust deviation.
-
-    At the ends the window is as wide and on one side, because two of its rows may be outliers. A
-    slope of the residuals shows there, so that the deviation is that of the other rows.
-    """
-    wide = min(2 * HALF_WINDOW + 1, residuals.size)
-    windows = np.sort(np.lib.stride_tricks.sliding_window_view(residuals, wide), axis=1)
-    medians = 0.5 * (windows[:, (wide - 1) // 2] + windows[:, wide // 2])
-    places = np.arange(residuals.size) - HALF_WINDOW
-    away = residuals - medians[np.clip(places, 0, medians.size - 1)]
-    inner = away[(places >= 0) & (places < medians.size)]
-    robust = float(np.median(np.abs(inner[inner != 0.0]))) / MAD if np.any(inner) else 0.0
-    return away, max(robust, LEAST_ROBUST * float(np.std(inner)))
-
-
-def is_outlier(whitened: Array, residuals: Array, rows: FlightRows) -> Mask:
-    """Rows whose whitened residual, in robust deviations, is beyond `SPIKE`.
-
-    Rows within a step of the rounding are none.
-    """
-    used = rows.used
-    sizes = np.abs(whitened[used])
-    robust = max(float(np.median(sizes)) / MAD, LEAST_ROBUST)
-    found = used & (np.abs(whitened) > SPIKE * robust) & (np.abs(residuals) > rows.rounding)
-    if np.sum(~used) + np.sum(found) > MOST_SPIKES * used.size:
-        return np.zeros(used.size, dtype=bool)
-    # The rows after an outlier are predicted from it: only the first of a run is one.
-    return np.asarray(found & ~np.r_[False, found[:-1]])
+    part = native_part(rows.time, rows.command_time, rows.command)
+    if part is None:
+        return rows
+    kept, sent = slice(*part[:2]), slice(*part[2:])
+    start, stop = rows.time[kept.start], rows.time[kept.stop - 1]
+    return rows._replace(
+        time=rows.time[kept],
+        row_time=float(np.median(np.diff(rows.time[kept]))),
+        output=rows.output[kept],
+        used=rows.used[kept],
+        speed=rows.speed[kept],
+        command_time=rows.command_time[sent],
+        command=rows.command[sent],
+        unknown=tuple(one for one in rows.unknown if start < one[1] and one[0] < stop),
+        uncertain=tuple(one for one in rows.uncertain if start < one[1] and one[0] < stop),
+        offset=rows.offset or kept.start > 0,
+    )
 
 
 def rounding_of(output: Array) -> float:

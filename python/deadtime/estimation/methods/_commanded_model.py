@@ -18,6 +18,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._native import LONGEST_DELAY, SHORTEST_LAG
 from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._commands import commands_of
 from deadtime.estimation.data._known_filter import KnownFilter, before_filter
@@ -26,14 +27,9 @@ from deadtime.estimation.fit._least_squares import (
     Ends,
     ModelOfOne,
 )
+from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
 from deadtime.estimation.likelihood._missing import HeldCommands, with_lost, with_missing
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of
-from deadtime.estimation.likelihood._search import (
-    LONGEST,
-    SHORTEST,
-    NoiseFit,
-    PlantModel,
-)
 from deadtime.estimation.methods._method import (
     Run,
 )
@@ -163,9 +159,9 @@ class CommandedModel(ModelOfOne):
         size = abs(value)
         if label.startswith("lag_") and value >= 0.0:
             # A shorter one acts as a delay, and takes ever longer to simulate.
-            return Ends(SHORTEST * self._sample, self.span, self._sample)
+            return Ends(SHORTEST_LAG * self._sample, self.span, self._sample)
         return {
-            "delay": Ends(0.0, LONGEST * self.span, self._sample),
+            "delay": Ends(0.0, LONGEST_DELAY * self.span, self._sample),
             "lag": Ends(0.0, self.span, self._sample),
             "time_constant": Ends(1e-3 * size, 1e3 * size, size),
             "rate": Ends(1e-3 * size, 1e3 * size, size),

@@ -11,22 +11,14 @@ import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._native import PlantNumbers, RowNoise
+from deadtime.estimation._native import SHORTEST_LAG, unseen_lag
 from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import LEAST_GAIN
-from deadtime.estimation.likelihood._adequacy import Adequacy
+from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
 from deadtime.estimation.likelihood._free_numbers import NumbersProfile
-from deadtime.estimation.likelihood._power import unseen_in_words, unseen_lag
-from deadtime.estimation.likelihood._profile import LikelihoodProfile, best_profile
-from deadtime.estimation.likelihood._rows import FlightRows, is_outlier, on_same_step
-from deadtime.estimation.likelihood._search import (
-    SHORTER,
-    NoiseFit,
-    PlantModel,
-    fit_noise,
-    scatter_of,
-)
-from deadtime.estimation.likelihood._start import excited_part, is_long, on_all_rows
+from deadtime.estimation.likelihood._judgement import Adequacy, unseen_in_words
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
+from deadtime.estimation.likelihood._rows import FlightRows, on_same_step
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
@@ -37,39 +29,6 @@ NO_LAG = 2.0
 #: Ratio of the residuals to those of least squares from which the noise stands for the plant.
 LESS = 1.5
 
-#: Rounds of leaving out outliers.
-ROUNDS = 3
-
-
-def fitted_flight(model: PlantModel, rows: Sequence[FlightRows], first: PlantNumbers) -> NoiseFit:
-    """The likeliest plant and noise, without outliers; from a part of long recordings first."""
-    runs = tuple(excited_part(one) for one in rows)
-    start = _start(model, first, rows)
-    fit = fit_noise(model, runs, start)
-    for _ in range(ROUNDS):
-        found = [
-            is_outlier(part.whitened, part.residuals, one)
-            for part, one in zip(fit.parts, fit.runs, strict=True)
-        ]
-        if not any(np.any(rows) for rows in found):
-            break
-        kept = tuple(
-            one._replace(used=one.used & ~outliers)
-            for one, outliers in zip(fit.runs, found, strict=True)
-        )
-        fit = fit_noise(model, kept, fit.numbers)
-    return _in_order(on_all_rows(fit, rows) if is_long(rows) else fit)
-
-
-def _in_order(fit: NoiseFit) -> NoiseFit:
-    """The same plant with the longest of its free lags first: their order has no effect."""
-    one, free = fit.numbers, fit.model.free_lags
-    longest = iter(sorted((lag for lag, own in zip(one.lags, free, strict=True) if own))[::-1])
-    lags = [next(longest) if own else lag for lag, own in zip(one.lags, free, strict=True)]
-    return fit.moved(
-        PlantNumbers(one.delay, lags, one.noise, one.gain, one.zero, objective=one.objective)
-    )
-
 
 def profile_for(
     fit: NoiseFit, names: tuple[str, ...], intervals: Literal["all", "sum"] = "all"
@@ -78,7 +37,7 @@ def profile_for(
     found = profiled(fit.model, names)
     total = [name for name, kernel in found.items() if kernel == "total"]
     first = total if intervals == "sum" and total else found
-    return best_profile(LikelihoodProfile(fit, found), first)
+    return LikelihoodProfile.best(fit, found, first)
 
 
 def profiled(model: PlantModel, names: tuple[str, ...]) -> dict[str, str]:
@@ -89,22 +48,6 @@ def profiled(model: PlantModel, names: tuple[str, ...]) -> dict[str, str]:
         slow = "time_constant" if "time_constant" in names else "lag"
         wanted[f"delay+{slow}"] = "total"
     return wanted
-
-
-def _start(model: PlantModel, first: PlantNumbers, rows: Sequence[FlightRows]) -> PlantNumbers:
-    """The numbers under white noise; a lag of about zero becomes a short one.
-
-    Free lags that are equal would stay equal, since they have the same effect: they are spread.
-    """
-    least = 0.5 * rows[0].row_time
-    delay, lags = first.delay, []
-    for lag, free in zip(first.lags, model.free_lags, strict=True):
-        if free and abs(lag) < least:
-            delay, lag = max(0.0, delay - least + lag), least
-        while free and lag in lags:
-            lag *= SHORTER
-        lags.append(lag)
-    return PlantNumbers(delay, lags, [RowNoise()] * len(rows), first.gain, first.zero)
 
 
 def concluded_flight(
@@ -129,7 +72,7 @@ def concluded_flight(
         values |= profile.free.values
         names = tuple(values)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
-    unseen = unseen_lag(fit)
+    unseen = unseen_lag(fit.native)
     left_out = sum(_outliers(rows) for rows in fit.runs)
     fitted = tuple(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)
@@ -143,7 +86,7 @@ def concluded_flight(
     scatter = {
         f"scatter_of_{what}": max(times)
         for what, part in (("rows", "stamps"), ("commands", "arrivals"))
-        if any(times := [scatter_of(fit, run, part) for run in range(len(runs))])
+        if any(times := [fit.scatter(run, part) for run in range(len(runs))])
     }
     labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
     labels += ("trim",) * fit.trim
@@ -182,7 +125,7 @@ def values_of(
     Beside no lag there is no zero: its effect would be a pulse between rows.
     """
     numbers = fit.numbers
-    least = NO_LAG * 1e-3 * fit.runs[0].row_time
+    least = NO_LAG * SHORTEST_LAG * fit.runs[0].row_time
     found = {"delay": numbers.delay, "gain": fit.gain, "zero": numbers.zero}
     for name, lag in zip(fit.model.lag_names, numbers.lags, strict=True):
         if name.startswith("lag") and lag <= least:

@@ -30,6 +30,7 @@ from deadtime._base.arrays import Array, Mask
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime._base.verdicts import verdict_if
+from deadtime.estimation._native import LEVEL_OF_TESTS
 from deadtime.estimation._result import ADVICE, REASONS, DelayEstimate
 from deadtime.estimation.data._checks import (
     ROUNDING,
@@ -45,7 +46,7 @@ from deadtime.estimation.data._periodic import PeriodicSpectra, periodic_spectra
 from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.fit._line_fit import LineProfile, Lines, fit_lines
 from deadtime.estimation.fit._profile import Profile
-from deadtime.estimation.fit._residuals import SIGNIFICANCE, whiteness_of
+from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.models._held import HeldResponse, held_transfer
@@ -128,7 +129,7 @@ class Frequency(Method):
         check_gain(values, errors)
         residuals = _residuals(data, response, found)
         whiteness = whiteness_of(residuals, len(names))
-        white = p_value > SIGNIFICANCE if lines.known_noise else whiteness.white
+        white = p_value > LEVEL_OF_TESTS if lines.known_noise else whiteness.white
         reliable = white or is_rounding(residuals, data)
         return estimate_with_residuals(
             "frequency",

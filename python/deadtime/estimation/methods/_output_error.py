@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cached_property, partial
 from itertools import product
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._native import LAG_FACTORS, LONGEST_DELAY
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.data._known_filter import KnownFilter
@@ -26,14 +27,21 @@ from deadtime.estimation.fit._least_squares import (
     Model,
     solve_jointly,
 )
-from deadtime.estimation.likelihood._adequacy import adequacy_of
-from deadtime.estimation.likelihood._colour_at_rest import coloured_profile
+from deadtime.estimation.likelihood._coloured import coloured_profile
+from deadtime.estimation.likelihood._flight import (
+    NoiseFit,
+    PlantModel,
+    fitted_flight,
+    least_squares,
+    names_in_kernel,
+)
 from deadtime.estimation.likelihood._free_numbers import (
     MOST_NUMBERS,
     NumbersProfile,
     fit_numbers,
     numbers_under_white_noise,
 )
+from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
 from deadtime.estimation.likelihood._lost_commands import (
     LostCommandsProfile,
     Refilled,
@@ -42,15 +50,7 @@ from deadtime.estimation.likelihood._lost_commands import (
 )
 from deadtime.estimation.likelihood._missing import predicted_commands, with_missing
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._rows import FlightRows, spikes
-from deadtime.estimation.likelihood._search import (
-    FACTORS,
-    LONGEST,
-    NoiseFit,
-    PlantModel,
-    names_in_kernel,
-)
-from deadtime.estimation.likelihood._start import excited_part, is_long, least_squares
+from deadtime.estimation.likelihood._rows import FlightRows, excited_part, is_long
 from deadtime.estimation.methods._commanded_model import Assumed, CommandedModel, commanded_model
 from deadtime.estimation.methods._conclusion import (
     check_fit,
@@ -61,7 +61,6 @@ from deadtime.estimation.methods._conclusion import (
 from deadtime.estimation.methods._flight_conclusion import (
     concluded_flight,
     explains_less,
-    fitted_flight,
     gain_is_certain,
     profile_for,
     profiled,
@@ -75,6 +74,7 @@ from deadtime.estimation.methods._method import (
     check_initial_output,
 )
 from deadtime.estimation.methods._rounded_conclusion import read_as_intervals, rounding_is_all
+from deadtime.loops import ControlLoop
 from deadtime.recordings import RecordingCheck
 
 #: Most rounds of predicting the commands between rows and fitting again, and the change of Akaike's
@@ -189,136 +189,57 @@ def _criterion(estimate: DelayEstimate) -> float:
 
 
 def _estimated(
-    method: str,
-    runs: Sequence[Run],
-    free: Sequence[str],
-    assumed: Assumed,
+    method: str, runs: Sequence[Run], free: Sequence[str], assumed: Assumed
 ) -> DelayEstimate:
-    initial_output, computed, known_filter, *_ = assumed
-    known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *runs[0].loop.plant.parameters]))
-    names = checked_names(free, runs[0].loop, known)
-    # What least squares with all derivatives knows; the likelihood knows other plants too.
-    common = tuple(name for name in names if name in VEHICLE_PARAMETERS)
-    in_kernel = names_in_kernel(runs[0].loop.plant)
-    linear = tuple(name for name in names if name in in_kernel)
-    others = [name for name in names if name not in in_kernel]
-    begun = _begun(runs, common, linear, others, assumed)
-    if any(one.commands.lost for one in begun.models):
-        held = _begun(runs, common, linear, others, assumed._replace(complete=True))
-        begun = min(begun, held, key=lambda one: one.criterion)
-    models, rows, checks, white, numbers, whole = begun
-    fitted = [Run(one.recording, run.loop) for one, run in zip(models, runs, strict=True)]
-    sources = {one.source for one in models}
-    message = f"over {', '.join(names)} on the response to the command"
-    if computed:
-        message += " computed from the recorded output, on whose noise the controller acts"
-    elif sources != {"logged"}:
-        message += ", which was not logged but computed from reference and output"
-    elif lost := sum(one.commands.lost for one in models):
-        message += f", with commands taken for lost in {lost} gap{'s' * (lost > 1)} of their log"
-    if known_filter is not None:
-        message += f", before the filter, in means of {known_filter.together} rows"
-    details: dict[str, Any] = {
-        "command": " or ".join(sorted(sources)),
-        **({"noise": "loop"} if computed else {}),
-    }
-
-    @cache
-    def plain() -> tuple[Model, Minimum]:
-        """Least squares with all its derivatives, from that of the likelihood."""
-        started = [one.started(white, numbers) for one in models]
-        model, found = solve_jointly(started)
-        return model, without_vanishing(model, found)
-
-    def concluded_plain() -> DelayEstimate:
-        model, found = plain()
-        start = found.point[len(common) :] if initial_output is None else [initial_output]
-        return concluded(
-            method,
-            model,
-            found,
-            fitted,
-            message=f"least squares {message}",
-            details={**details, "initial_output": float(start[0])},
-        )
-
-    if common == names and _is_nearly_exact(white) and is_exact(*plain(), fitted):
-        return concluded_plain()
-    kept = [
-        one._replace(used=one.used & ~spikes(part.residuals, one.rounding))
-        for one, part in zip(whole.runs, whole.parts, strict=True)
-    ]
-    free_numbers = None
-    fit = fitted_flight(white.model, kept, white.with_gain)
-    if numbers:
-        fit, free_numbers = fit_numbers(fit, partial(_given, linear, models, fit.runs), numbers)
-        fitted = [run._replace(loop=run.loop.replace(**free_numbers.values)) for run in fitted]
-    doubts: tuple[str, ...] = ()
-    joint = None
-    if any(one.commands.computed for one in models):
-        fit, step, doubts = _with_predicted_commands(linear, fit, models, runs)
-        missing = max(one.commands.longest for one in models)
-        # Single rows are predicted well enough. Where most are missing, as in a log at a lower
-        # rate, the likelihood has too many kinks.
-        few = all(one.commands.time.size < 2 * one.logged.size for one in models)
-        period = max(run.loop.sample_time or 0.0 for run in fitted)
-        if missing > 1 and few and period and not (numbers or is_long(rows)):
-            joint = with_lost_commands(fit, _refilling(linear, models, runs, step), period)
-    if joint is not None:
-        fit, cov = joint
-        profile: LikelihoodProfile = LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
-    else:
-        profile = profile_for(fit, linear, assumed.intervals)
-    if free_numbers is not None:
-        profile = NumbersProfile(
-            profile.fit, profile.names, profile.preferred, profile._ends, free_numbers
-        )
-    longest = min(LONGEST * one.span for one in models)
-    if "delay" in names and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
-        raise NotIdentifiableError(
-            f"the fit ends at a delay of {longest:g} s, {LONGEST:g} of the window: the output is "
-            "no response to this command; check columns and units, or choose a longer window"
-        )
-    if not gain_is_certain(profile):
-        check_fit(*plain(), fitted)
-    adequacy = adequacy_of(profile, len(names))
-    adequacy = replace(adequacy, reasons=(*doubts, *adequacy.reasons))
-    astray = adequacy.reasons and explains_less(profile.fit, whole)
-    if common == names and (adequacy.plant_lacks or astray):
-        try:
-            return without_the_plant(concluded_plain(), adequacy)
-        except NotIdentifiableError:
-            # Where air moves the output far more than the command does, least squares sees nothing.
-            if not gain_is_certain(profile):
-                raise
-    if adequacy.coloured:
-        profile = coloured_profile(profile)
-        message += ", intervals widened for residuals that are coloured at rest, too"
-    details["initial_output"] = (
-        initial_output if initial_output is not None else profile.initial_output
-    )
-    found = concluded_flight(
-        method,
-        linear,
-        fitted,
-        profile,
-        models[0].known,
-        f"maximum likelihood {message}",
-        details,
-        adequacy,
-    )
-    intervals_tell = common == names and type(profile) is LikelihoodProfile and not is_long(rows)
-    if intervals_tell and found.verdict == "reliable" and rounding_is_all(profile.fit):
-        repeated = [np.empty(0, int) if one is None else one.repeated for one in checks]
-        return read_as_intervals(found, models, rows, repeated)
-    return found
+    """The estimate in stages: commands, least squares, noise, intervals, tests."""
+    names = _Names.of(free, runs[0].loop)
+    begun = _begun(method, runs, names, assumed)
+    if begun.is_exact:
+        return begun.by_least_squares()
+    found = _likeliest(begun)
+    _check_delay(begun, found.profile)
+    adequacy = adequacy_of(found.profile)
+    adequacy = replace(adequacy, reasons=(*found.doubts, *adequacy.reasons))
+    without = _without_the_plant(begun, found.profile, adequacy)
+    return without or _concluded(begun, found, adequacy)
 
 
-class _Begun(NamedTuple):
+class _Names(NamedTuple):
+    """What is fitted: all, what least squares knows with all derivatives, what the kernel fits."""
+
+    free: tuple[str, ...]
+    common: tuple[str, ...]
+    linear: tuple[str, ...]
+
+    @classmethod
+    def of(cls, free: Sequence[str], loop: ControlLoop) -> _Names:
+        """The checked names of a loop."""
+        known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *loop.plant.parameters]))
+        names, in_kernel = checked_names(free, loop, known), names_in_kernel(loop.plant)
+        common = tuple(name for name in names if name in VEHICLE_PARAMETERS)
+        return cls(names, common, tuple(name for name in names if name in in_kernel))
+
+    @property
+    def others(self) -> list[str]:
+        """Those that are fitted around the search of the kernel."""
+        return [name for name in self.free if name not in self.linear]
+
+    @property
+    def are_common(self) -> bool:
+        """Whether least squares knows all of them."""
+        return self.common == self.free
+
+
+@dataclass(frozen=True, eq=False)
+class _Begun:
     """Recordings with their commands, and least squares on them.
 
     Attributes
     ----------
+    method : str
+    runs : sequence of Run
+    names : _Names
+    assumed : Assumed
     models : list of CommandedModel
     rows : list of FlightRows
     checks : list of RecordingCheck or None
@@ -330,6 +251,10 @@ class _Begun(NamedTuple):
         The same with all rows.
     """
 
+    method: str
+    runs: Sequence[Run]
+    names: _Names
+    assumed: Assumed
     models: list[CommandedModel]
     rows: list[FlightRows]
     checks: list[RecordingCheck | None]
@@ -342,24 +267,176 @@ class _Begun(NamedTuple):
         """Akaike's criterion, in which an unknown command is a number."""
         return self.whole.criterion + 2.0 * sum(len(one.unknown) for one in self.rows)
 
+    @property
+    def fitted(self) -> list[Run]:
+        """The recordings as they are fitted."""
+        pairs = zip(self.models, self.runs, strict=True)
+        return [Run(one.recording, run.loop) for one, run in pairs]
 
-def _begun(
-    runs: Sequence[Run],
-    common: tuple[str, ...],
-    linear: tuple[str, ...],
-    others: Sequence[str],
-    assumed: Assumed,
-) -> _Begun:
+    @property
+    def message(self) -> str:
+        """What is fitted to what, in words."""
+        sources = {one.source for one in self.models}
+        text = f"over {', '.join(self.names.free)} on the response to the command"
+        if self.assumed.computed:
+            text += " computed from the recorded output, on whose noise the controller acts"
+        elif sources != {"logged"}:
+            text += ", which was not logged but computed from reference and output"
+        elif lost := sum(one.commands.lost for one in self.models):
+            gaps = f"gap{'s' * (lost > 1)}"
+            text += f", with commands taken for lost in {lost} {gaps} of their log"
+        if (known := self.assumed.output_filter) is not None:
+            text += f", before the filter, in means of {known.together} rows"
+        return text
+
+    def details(self, initial_output: float) -> dict[str, Any]:
+        """Further results."""
+        sources = sorted({one.source for one in self.models})
+        noise = {"noise": "loop"} if self.assumed.computed else {}
+        given = self.assumed.initial_output
+        start = initial_output if given is None else given
+        return {"command": " or ".join(sources), **noise, "initial_output": start}
+
+    @cached_property
+    def plain(self) -> tuple[Model, Minimum]:
+        """Least squares with all its derivatives, from that of the likelihood."""
+        model, found = solve_jointly([one.started(self.white, self.numbers) for one in self.models])
+        return model, without_vanishing(model, found)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether least squares leaves rounding alone."""
+        nearly = self.names.are_common and _is_nearly_exact(self.white)
+        return nearly and is_exact(*self.plain, self.fitted)
+
+    def by_least_squares(self) -> DelayEstimate:
+        """The estimate of least squares."""
+        model, found = self.plain
+        start = [*found.point[len(self.names.common) :], math.nan][0]
+        details, message = self.details(float(start)), f"least squares {self.message}"
+        return concluded(self.method, model, found, self.fitted, message=message, details=details)
+
+
+class _Likeliest(NamedTuple):
+    """The likeliest plant and noise, doubts about its commands, and the recordings with it."""
+
+    profile: LikelihoodProfile
+    doubts: tuple[str, ...]
+    fitted: list[Run]
+
+
+def _likeliest(begun: _Begun) -> _Likeliest:
+    """Plant, noise and intervals, with the numbers around them and the commands between rows."""
+    linear, models, fitted = begun.names.linear, begun.models, begun.fitted
+    fit = begun.whole.beside_noise()
+    free = None
+    if begun.numbers:
+        fit, free = fit_numbers(fit, partial(_given, linear, models, fit.runs), begun.numbers)
+        fitted = [run._replace(loop=run.loop.replace(**free.values)) for run in fitted]
+    doubts: tuple[str, ...] = ()
+    if any(one.commands.computed for one in models):
+        fit, step, doubts = _with_predicted_commands(linear, fit, models, begun.runs)
+        if (lost := _with_lost_commands(begun, fit, step)) is not None:
+            return _Likeliest(lost, doubts, fitted)
+    profile = profile_for(fit, linear, begun.assumed.intervals)
+    if free is not None:
+        profile = NumbersProfile(profile.fit, profile.names, profile.preferred, free=free)
+    return _Likeliest(profile, doubts, fitted)
+
+
+def _with_lost_commands(
+    begun: _Begun, fit: NoiseFit, step: int | None
+) -> LostCommandsProfile | None:
+    """The profile whose commands in missing rows follow from its plant; None where they need not.
+
+    Single rows are predicted well enough. Where most are missing, as in a log at a lower rate, the
+    likelihood has too many kinks.
+    """
+    linear, models = begun.names.linear, begun.models
+    missing = max(one.commands.longest for one in models)
+    few = all(one.commands.time.size < 2 * one.logged.size for one in models)
+    period = max(run.loop.sample_time or 0.0 for run in begun.fitted)
+    if missing <= 1 or not few or not period or begun.numbers or is_long(begun.rows):
+        return None
+    found = with_lost_commands(fit, _refilling(linear, models, begun.runs, step), period)
+    if found is None:
+        return None
+    fit, cov = found
+    return LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
+
+
+def _check_delay(begun: _Begun, profile: LikelihoodProfile) -> None:
+    """Refuse a fit at the longest delay, and one that explains hardly more than a constant does."""
+    longest = min(LONGEST_DELAY * one.span for one in begun.models)
+    if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
+        raise NotIdentifiableError(
+            f"the fit ends at a delay of {longest:g} s, {LONGEST_DELAY:g} of the window: the "
+            "output is no response to this command; check columns and units, or choose a longer "
+            "window"
+        )
+    if not gain_is_certain(profile):
+        check_fit(*begun.plain, begun.fitted)
+
+
+def _without_the_plant(
+    begun: _Begun, profile: LikelihoodProfile, adequacy: Adequacy
+) -> DelayEstimate | None:
+    """The estimate of least squares where the noise stands for what the plant lacks."""
+    astray = adequacy.reasons and explains_less(profile.fit, begun.whole)
+    if not (begun.names.are_common and (adequacy.plant_lacks or astray)):
+        return None
+    try:
+        return without_the_plant(begun.by_least_squares(), adequacy)
+    except NotIdentifiableError:
+        # Where air moves the output far more than the command does, least squares sees nothing.
+        if not gain_is_certain(profile):
+            raise
+    return None
+
+
+def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEstimate:
+    """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
+    profile, message = found.profile, f"maximum likelihood {begun.message}"
+    if adequacy.coloured:
+        profile = coloured_profile(profile)
+        message += ", intervals widened for residuals that are coloured at rest, too"
+    estimate = concluded_flight(
+        begun.method,
+        begun.names.linear,
+        found.fitted,
+        profile,
+        begun.models[0].known,
+        message,
+        begun.details(profile.initial_output),
+        adequacy,
+    )
+    plain = begun.names.are_common and type(profile) is LikelihoodProfile
+    if plain and not is_long(begun.rows) and estimate.verdict == "reliable" and rounding_is_all(profile.fit):
+        repeated = [np.empty(0, int) if one is None else one.repeated for one in begun.checks]
+        return read_as_intervals(estimate, begun.models, begun.rows, repeated)
+    return estimate
+
+
+def _begun(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
+    """Least squares on recordings, with gaps in their commands or without if that is likelier."""
+    begun = _begun_with(method, runs, names, assumed)
+    if any(one.commands.lost for one in begun.models):
+        held = _begun_with(method, runs, names, assumed._replace(complete=True))
+        begun = min(begun, held, key=lambda one: one.criterion)
+    return begun
+
+
+def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assumed) -> _Begun:
     """Least squares on recordings whose commands are as `assumed`."""
-    models = [commanded_model(run, common, assumed) for run in runs]
-    _check_others(others, models[0].known)
+    models = [commanded_model(run, names.common, assumed) for run in runs]
+    _check_others(names.others, models[0].known)
     checks = [run.check if assumed.output_filter is None else None for run in runs]
     rows = [
         one.rows(assumed.initial_output, check) for one, check in zip(models, checks, strict=True)
     ]
-    white, numbers = _first(linear, models, rows, others)
-    whole = replace(white, runs=tuple(_given(linear, models, rows, numbers)[1]))
-    return _Begun(models, rows, checks, white, numbers, whole)
+    white, numbers = _first(names.linear, models, rows, names.others)
+    whole = replace(white, runs=tuple(_given(names.linear, models, rows, numbers)[1]))
+    return _Begun(method, runs, names, assumed, models, rows, checks, white, numbers, whole)
 
 
 def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
@@ -388,7 +465,7 @@ def _first(
         model, whole = _given(names, models, rows, values)
         return model, [excited_part(one) for one in whole]
 
-    for factors in product(FACTORS, repeat=len(others)):
+    for factors in product(LAG_FACTORS, repeat=len(others)):
         values = {name: factor * known[name] for name, factor in zip(others, factors, strict=True)}
         fit = least_squares(*within(values), known["delay"], known["gain"])
         found.append((fit, values))

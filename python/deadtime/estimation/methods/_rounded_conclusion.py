@@ -13,10 +13,10 @@ from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import standard_errors
 from deadtime.estimation.fit._least_squares import JointModel, Model
 from deadtime.estimation.fit._profile import Profile
+from deadtime.estimation.likelihood._flight import NoiseFit
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.likelihood._rounded import RoundedCost, RoundedLikelihood
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.likelihood._search import NoiseFit
 from deadtime.estimation.methods._commanded_model import CommandedModel
 from deadtime.experiments import FlightNoise
 

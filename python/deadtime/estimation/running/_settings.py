@@ -11,7 +11,7 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime._base.validation import interval, non_negative
 from deadtime.estimation.likelihood._disturbances import Disturbance, disturbances_of
-from deadtime.estimation.likelihood._search import PlantModel
+from deadtime.estimation.likelihood._flight import PlantModel
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 

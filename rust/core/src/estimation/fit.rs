@@ -7,7 +7,7 @@ use super::plant::{MOST_STATES, Plant};
 use super::point::{Point, Quantity, Timing};
 use super::quotients::{Function, Slack, Value, Variable};
 use super::rows::Rows;
-use super::search::minimise;
+use super::search::{Accuracy, minimise};
 use super::variables::{Free, SHORTEST_LAG, Slot, Variables, mean_slots, put};
 use super::waves::{Waves, waves};
 use crate::{Error, Task};
@@ -301,7 +301,14 @@ impl Model {
         tolerance: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
-        self.fit_near(start, held, searched, tolerance, &mut None, task)
+        refuse_if!(
+            !(tolerance.is_finite() && tolerance > 0.0),
+            "a tolerance of {tolerance}: give a finite number above zero"
+        );
+        let mut accuracy = Accuracy::of(tolerance);
+        // The numbers of the mean alone are those of least squares on whitened rows.
+        accuracy.takes_known |= searched == Search::Mean;
+        self.fit_near(start, held, searched, accuracy, &mut None, task)
     }
 
     /// The same from the inverse Hessian of a search near by, if there was one, which becomes that of
@@ -311,15 +318,11 @@ impl Model {
         start: &Point,
         held: Option<Quantity>,
         searched: Search,
-        tolerance: f64,
+        accuracy: Accuracy,
         near: &mut Option<Vec<f64>>,
         task: &Task,
     ) -> Result<Fit, Error> {
         self.check(start)?;
-        refuse_if!(
-            !(tolerance.is_finite() && tolerance > 0.0),
-            "a tolerance of {tolerance}: give a finite number above zero"
-        );
         let by = Variables {
             runs: &self.runs,
             free: &self.free,
@@ -341,7 +344,7 @@ impl Model {
             kept: vec![None; self.runs.len()],
             task,
         };
-        let found = minimise(&variables, tolerance, near, sum)?;
+        let found = minimise(&variables, accuracy, near, sum)?;
         let mut point = start.clone();
         for (slot, value) in slots.iter().zip(&found.place) {
             put(&mut point, *slot, *value);

@@ -13,6 +13,7 @@
 mod disturbance;
 mod family;
 mod fit;
+mod flight;
 mod kept;
 mod kicks;
 mod likelihood;
@@ -28,6 +29,7 @@ mod propagation;
 mod quotients;
 mod rows;
 mod search;
+pub mod statistics;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -41,6 +43,12 @@ pub use family::{
     Question, Record, Triple, Verdict, fit_family,
 };
 pub use fit::{Fit, Model, Search};
+pub use flight::{
+    Asked, Cause, Finding, FlightFit, FlightPlant, FlightProfile, FlightRun, Judgement,
+    KnownQuantity, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, SEARCHED_ROWS, SHORTEST_LAG,
+    Scatter, Whiteness, beside_noise, colour_factors, excited_part, fit_flight, judge,
+    least_squares, scatter_of, unseen_lag, whiteness,
+};
 pub use likelihood::{Evaluation, Noise};
 pub use online::{Answer, Known, Lags, Online, Settings, online};
 pub use path::held_response;

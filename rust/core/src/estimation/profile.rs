@@ -1,7 +1,9 @@
 //! The profile of the likelihood over one quantity, and the ends of an interval.
 
 use super::fit::{Fit, Model, Search};
+use super::likelihood::Noise;
 use super::point::{Point, Quantity, Timing};
+use super::search::Accuracy;
 use super::variables::SHORTEST_LAG;
 use crate::{Error, Task};
 
@@ -16,6 +18,15 @@ const WIDEST: f64 = 0.25;
 
 /// Accuracy of −2 ln L where a quantity is held.
 const RISE_TOLERANCE: f64 = 2e-3;
+
+/// The same on the way to an end: what the known slopes lack moves it by less than `TOLERANCE`.
+const ON_THE_WAY: Accuracy = Accuracy {
+    tolerance: RISE_TOLERANCE,
+    takes_known: true,
+};
+
+/// Farthest guess beyond what was seen of a profile, as a multiple of it.
+const BEYOND: f64 = 2.0;
 
 /// A lag of at most so many times the shortest is none; a second search starts at this one, in rows.
 const AT_LEAST: f64 = 2.0;
@@ -43,7 +54,60 @@ impl Limits {
     }
 }
 
+/// What was seen of a profile on one side.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    inverse: Option<Vec<f64>>,
+    other: Option<Fit>,
+}
+
 impl Quantity {
+    /// Where the line through two points of a profile has the quantity at this value: straight in
+    /// times and gain, and in the logarithms of lags and of the numbers of the noise.
+    fn guess(self, near: &Point, before: &Point, value: f64) -> Point {
+        let own = self.value(near);
+        let share = (value - own) / (own - self.value(before));
+        if !(share.abs() <= BEYOND) || near.lags.len() != before.lags.len() {
+            return near.clone();
+        }
+        let straight = |near: f64, before: f64| near + share * (near - before);
+        let curved = |near: f64, before: f64| {
+            let moved = near * (near / before).powf(share);
+            if moved.is_finite() && near != 0.0 {
+                moved
+            } else {
+                near
+            }
+        };
+        let lags = near.lags.iter().zip(&before.lags);
+        let noise = near.noise.iter().zip(&before.noise);
+        let lags: Vec<f64> = lags.map(|(near, before)| curved(*near, *before)).collect();
+        let zero = straight(near.zero, before.zero);
+        let timing = match near.timing {
+            Timing::Delay(delay) => Timing::Delay(straight(delay, before.delay())),
+            Timing::Total(total) => {
+                let least = lags.iter().sum::<f64>() - zero;
+                Timing::Total(straight(total, before.total()).max(least))
+            }
+        };
+        Point {
+            timing,
+            lags,
+            zero,
+            gain: straight(near.gain, before.gain),
+            noise: noise
+                .map(|(near, before)| Noise {
+                    air_time: curved(near.air_time, before.air_time),
+                    air: curved(near.air, before.air),
+                    sensor_time: curved(near.sensor_time, before.sensor_time),
+                    sensor: curved(near.sensor, before.sensor),
+                    stamps: curved(near.stamps, before.stamps),
+                    arrivals: curved(near.arrivals, before.arrivals),
+                })
+                .collect(),
+        }
+    }
+
     /// A point with the quantity at this value and the others near where they were.
     fn held(self, point: &Point, value: f64, model: &Model) -> Point {
         let mut held = point.clone();
@@ -103,28 +167,35 @@ impl Model {
         value: f64,
         task: &Task,
     ) -> Result<Fit, Error> {
-        self.held_near(near, quantity, value, &mut None, task)
+        let start = quantity.held(&near.point, value, self);
+        self.held_from(
+            start,
+            quantity,
+            Accuracy::of(RISE_TOLERANCE),
+            &mut None,
+            task,
+        )
     }
 
-    /// The same from the inverse Hessian of a search near by, as in `fit_near`.
-    fn held_near(
+    /// The same from a point with that value and the inverse Hessian of a search near by, as in
+    /// `fit_near`.
+    fn held_from(
         &self,
-        near: &Fit,
+        start: Point,
         quantity: Quantity,
-        value: f64,
+        accuracy: Accuracy,
         inverse: &mut Option<Vec<f64>>,
         task: &Task,
     ) -> Result<Fit, Error> {
-        let lags = near.point.lags.len();
+        let lags = start.lags.len();
         if let Quantity::Lag(i) = quantity {
             refuse_if!(
                 i >= lags,
                 "lag {i} of {lags}: give the number of one of them, from zero"
             );
         }
-        let start = quantity.held(&near.point, value, self);
         let (held, all) = (Some(quantity), Search::All);
-        let found = self.fit_near(&start, held, all, RISE_TOLERANCE, inverse, task)?;
+        let found = self.fit_near(&start, held, all, accuracy, inverse, task)?;
         // A search does not come back from a lag of zero.
         let least = AT_LEAST * SHORTEST_LAG * self.row_time;
         let vanished = |(i, lag): &(usize, &f64)| {
@@ -135,7 +206,7 @@ impl Model {
         };
         let mut start = found.point.clone();
         start.lags[i] = (SECOND_LAG * self.row_time).copysign(start.lags[i]);
-        let second = self.fit(&start, held, all, RISE_TOLERANCE, task)?;
+        let second = self.fit_near(&start, held, all, accuracy, &mut None, task)?;
         Ok(if second.objective < found.objective {
             second
         } else {
@@ -158,6 +229,20 @@ impl Model {
         reach: f64,
         rise: f64,
         limits: Limits,
+        task: &Task,
+    ) -> Result<(f64, Fit), Error> {
+        let seen = &mut Seen::default();
+        self.end_near(best, quantity, (reach, rise), limits, seen, task)
+    }
+
+    /// The same for this reach and rise, from what was seen of the profile at the other end.
+    pub(super) fn end_near(
+        &self,
+        best: &Fit,
+        quantity: Quantity,
+        (reach, rise): (f64, f64),
+        limits: Limits,
+        seen: &mut Seen,
         task: &Task,
     ) -> Result<(f64, Fit), Error> {
         let Limits { floor, lower } = limits;
@@ -184,14 +269,20 @@ impl Model {
         let centre = quantity.value(&best.point);
         let mut lowest = best.clone();
         let mut near = best.clone();
-        let mut inverse = None;
+        let mut before = seen.other.take();
+        let inverse = &mut seen.inverse;
+        let mut held_at = |value: f64, near: &Fit, before: Option<&Fit>| {
+            let guess = before.map(|before| quantity.guess(&near.point, &before.point, value));
+            let start = quantity.held(guess.as_ref().unwrap_or(&near.point), value, self);
+            self.held_from(start, quantity, ON_THE_WAY, inverse, task)
+        };
         let (mut inner, mut inner_rise) = (centre, 0.0);
         let mut outer = centre + reach;
         let mut bracket = None;
         let mut width = reach;
         while width.abs() <= farthest {
             outer = (centre + width).max(floor);
-            let next = self.held_near(&near, quantity, outer, &mut inverse, task)?;
+            let next = held_at(outer, &near, before.as_ref())?;
             if next.objective < lowest.objective {
                 lowest = next.clone();
             }
@@ -200,10 +291,11 @@ impl Model {
                 return Ok((outer, lowest));
             }
             if found >= rise {
+                seen.other = Some(next);
                 bracket = Some(found);
                 break;
             }
-            near = next;
+            before = Some(std::mem::replace(&mut near, next));
             if outer <= floor {
                 return Ok((floor, lowest));
             }
@@ -230,7 +322,7 @@ impl Model {
                 0.5
             };
             let middle = inner + (outer - inner) * share;
-            let next = self.held_near(&near, quantity, middle, &mut inverse, task)?;
+            let next = held_at(middle, &near, before.as_ref())?;
             if next.objective < lowest.objective {
                 lowest = next.clone();
             }
@@ -246,7 +338,8 @@ impl Model {
                 (outer, high) = (middle, found);
                 low *= 0.5;
             } else {
-                (inner, low, near) = (middle, found, next);
+                (inner, low) = (middle, found);
+                before = Some(std::mem::replace(&mut near, next));
                 high *= 0.5;
             }
         }
@@ -256,7 +349,6 @@ impl Model {
 
 #[cfg(test)]
 mod tests {
-    use super::super::likelihood::Noise;
     use super::super::plant::Plant;
     use super::super::tests::recorded;
     use super::super::variables::Free;

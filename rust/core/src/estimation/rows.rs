@@ -38,6 +38,33 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Rows that are all used, from an output at the start that is unknown, and commands from their
+    /// times on.
+    ///
+    /// # Errors
+    ///
+    /// As for `checked`.
+    pub fn new(
+        (time, output): (Vec<f64>, Vec<f64>),
+        (command_time, command): (Vec<f64>, Vec<f64>),
+    ) -> Result<Self, Error> {
+        let rows = Self {
+            used: vec![true; time.len()],
+            time,
+            output,
+            speed: Vec::new(),
+            commands: Commands {
+                time: command_time,
+                value: command,
+                unknown: Vec::new(),
+                uncertain: Vec::new(),
+            },
+            offset: true,
+            trim: false,
+        };
+        rows.checked()
+    }
+
     /// The rows, checked.
     ///
     /// # Errors

@@ -44,13 +44,32 @@ pub(super) struct Minimum {
     pub(super) value: f64,
 }
 
-/// Search from the starting point until a step promises less than `tolerance`.
+/// How close to the minimum a search goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Accuracy {
+    /// The search ends where a step promises less.
+    pub(super) tolerance: f64,
+    /// Are the known slopes taken as they are? What they lack costs difference quotients.
+    pub(super) takes_known: bool,
+}
+
+impl Accuracy {
+    /// What the known slopes lack is less than a coarse tolerance.
+    pub(super) fn of(tolerance: f64) -> Self {
+        Self {
+            tolerance,
+            takes_known: tolerance >= WORTHWHILE,
+        }
+    }
+}
+
+/// Search from the starting point until a step promises less than the tolerance.
 ///
 /// `known_inverse` is the inverse of the Hessian at the end of a search near by, if there was one, and then
 /// that of this one: neighbours need fewer steps with it.
 pub(super) fn minimise(
     variables: &[Variable],
-    tolerance: f64,
+    accuracy: Accuracy,
     known_inverse: &mut Option<Vec<f64>>,
     mut function: impl Function,
 ) -> Result<Minimum, Error> {
@@ -59,7 +78,7 @@ pub(super) fn minimise(
         .map(|v| v.start.clamp(v.low, v.high))
         .collect();
     keep_within(variables, &mut place, &function);
-    let mut start = |x: Vec<f64>| descend(variables, x, tolerance, known_inverse, &mut function);
+    let mut start = |x: Vec<f64>| descend(variables, x, accuracy, known_inverse, &mut function);
     let (found, is_stuck) = start(place)?;
     if is_stuck {
         return Ok(start(found.place)?.0);
@@ -71,7 +90,10 @@ pub(super) fn minimise(
 fn descend(
     variables: &[Variable],
     mut x: Vec<f64>,
-    tolerance: f64,
+    Accuracy {
+        tolerance,
+        takes_known,
+    }: Accuracy,
     known_inverse: &mut Option<Vec<f64>>,
     function: &mut impl Function,
 ) -> Result<(Minimum, bool), Error> {
@@ -79,13 +101,19 @@ fn descend(
     let mut found = values.swap_remove(0);
     let (n, known) = (x.len(), found.slope.len());
     let mut steps: Vec<f64> = variables.iter().map(|v| v.step).collect();
+    let is_all = takes_known && n == known;
+    let enough = if is_all {
+        tolerance
+    } else {
+        tolerance.max(WORTHWHILE)
+    };
     for _ in 0..FIRST_ITERATIONS {
         let Some(inverse) = inverse_of_positive(&found.curvature, known, RIDGE) else {
             break;
         };
         let slack = function.slack(&x);
         let step = direction(variables, &x, &inverse, &found.slope, slack.as_ref());
-        if promised(&step, &found.slope) <= tolerance.max(WORTHWHILE) {
+        if promised(&step, &found.slope) <= enough {
             break;
         }
         let line = Line {
@@ -99,16 +127,15 @@ fn descend(
         };
         let decrease = found.value - next.value;
         found = next;
-        if decrease <= tolerance.max(WORTHWHILE) {
+        if decrease <= enough {
             break;
         }
     }
-    // What the known slopes lack is less than a coarse tolerance.
-    if n == 0 || (n == known && tolerance >= WORTHWHILE) {
+    if n == 0 || is_all {
         let value = found.value;
         return Ok((Minimum { place: x, value }, false));
     }
-    let mut near = Near::new(variables, &mut steps, &x, &found, function)?;
+    let mut near = Near::new(variables, &mut steps, &x, &found, takes_known, function)?;
     // Are the gradient, and the Hessian, quotients made here?
     let (mut exact, mut fresh) = (true, true);
     if let Some(known) = known_inverse.take_if(|known| known.len() == n * n) {
@@ -148,7 +175,7 @@ fn descend(
             if !is_poor || fresh {
                 shorten(&variables[known..], &others.curvature, &mut steps[known..]);
                 near.follow(&moved, &found.slope, others.slope);
-                (exact, fresh) = (known == 0, false);
+                (exact, fresh) = (known == 0 || takes_known, false);
                 continue;
             }
         } else if fresh {
@@ -156,7 +183,7 @@ fn descend(
             break;
         }
         // What was gathered on the way misleads here.
-        near = Near::new(variables, &mut steps, &x, &found, function)?;
+        near = Near::new(variables, &mut steps, &x, &found, takes_known, function)?;
         (exact, fresh) = (true, true);
     }
     *known_inverse = Some(near.inverse);
@@ -218,34 +245,42 @@ impl Near {
     /// by each of the others alone; by each of all where the known one is not positive.
     ///
     /// Mixed derivatives by the others are left to the update: where two of them have almost the same
-    /// effect, steps of Newton's run along the valley, past minima.
+    /// effect, steps of Newton's run along the valley, past minima. A coarse search takes the known
+    /// slopes as they are, where their curvature is positive.
     fn new(
         variables: &[Variable],
         steps: &mut [f64],
         x: &[f64],
         found: &Value,
+        takes_known: bool,
         function: &mut impl Function,
     ) -> Result<Self, Error> {
         let (n, known) = (x.len(), found.slope.len());
-        let mut quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
-        if shorten(variables, &quotients.curvature, steps) {
-            quotients = Quotients::new(variables, steps, x, found, 0..n, function)?;
+        let first = inverse_of_positive(&found.curvature, known, RIDGE);
+        let from = if takes_known && first.is_some() {
+            known
+        } else {
+            0
+        };
+        let mut quotients = Quotients::new(variables, steps, x, found, from..n, function)?;
+        if shorten(&variables[from..], &quotients.curvature, &mut steps[from..]) {
+            quotients = Quotients::new(variables, steps, x, found, from..n, function)?;
         }
+        let mut gradient = found.slope[..from].to_vec();
+        gradient.extend(quotients.slope);
         let mut inverse = vec![0.0; n * n];
         for (i, bend) in quotients.curvature.iter().enumerate() {
-            inverse[i * n + i] = 1.0 / bend;
+            inverse[(from + i) * (n + 1)] = 1.0 / bend;
         }
-        if let Some(first) = inverse_of_positive(&found.curvature, known, RIDGE) {
-            for (to, from) in inverse
-                .chunks_exact_mut(n)
-                .zip(first.chunks_exact(known.max(1)))
-            {
-                to[..known].copy_from_slice(from);
-            }
+        let rows = first
+            .iter()
+            .flat_map(|first| first.chunks_exact(known.max(1)));
+        for (to, from) in inverse.chunks_exact_mut(n).zip(rows) {
+            to[..known].copy_from_slice(from);
         }
         Ok(Self {
-            lacking: difference(&quotients.slope, &found.slope),
-            gradient: quotients.slope,
+            lacking: difference(&gradient[..known], &found.slope),
+            gradient,
             inverse,
         })
     }

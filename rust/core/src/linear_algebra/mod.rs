@@ -1,8 +1,9 @@
 //! Dense linear algebra: the one copy of each factorisation.
 //!
 //! * Real: `lu` solves and inverts, `cholesky` inverts what is positive definite, `triangle` is R of
-//!   X = Q R, `balance` scales a matrix to a small norm, `eigenvalues` finds those of the form of
-//!   `hessenberg` by the double-shift QR algorithm.
+//!   X = Q R, `singular` has singular values and `symmetric` eigenvalues of small matrices, `balance`
+//!   scales a matrix to a small norm, `eigenvalues` finds those of the form of `hessenberg` by the
+//!   double-shift QR algorithm.
 //! * `block_triangular` splits a matrix by its pattern of zeros.
 //! * Complex: `elimination` factors and inverts `rows`, `banded` has factors near the diagonal.
 //!
@@ -19,5 +20,7 @@ pub(crate) mod elimination;
 mod hessenberg;
 pub(crate) mod lu;
 pub(crate) mod rows;
+pub(crate) mod singular;
+pub(crate) mod symmetric;
 pub(crate) mod triangle;
 pub(crate) mod vectors;

@@ -82,6 +82,13 @@ function commandsOf(rows, loop) {
   });
 }
 
+// Why a fit does not explain its recording.
+function whyNot(found) {
+  if (found.white < 0.01) return "what is left is not white noise";
+  if (found.further < 0.05) return "the plant lacks a lag";
+  return "the noise or the delay is not what the model takes it for";
+}
+
 class RecordingView {
   constructor(elements, kernels, state, take) {
     Object.assign(this, elements);
@@ -155,7 +162,7 @@ class RecordingView {
       found.reliable
         ? "The model explains the recording."
         : "The model does not explain the recording: " +
-            (found.white < 0.01 ? "what is left is not white noise" : "the plant lacks a lag") +
+            whyNot(found) +
             ". The loop of this page stays as it was.",
     );
     this.result.replaceChildren(

@@ -6,8 +6,8 @@ use super::loop_view::Seen;
 use super::minima::Minimum;
 use super::model::Point;
 use super::noise::{Coefficients, Noise};
-use super::quantiles::{beyond, student};
 use super::tolerances::EVIDENCE;
+use crate::estimation::statistics::{chi_squared_beyond, student_reach};
 use crate::linear_algebra::cholesky::inverse_of_positive;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::vectors::dot;
@@ -96,7 +96,7 @@ impl Candidate {
             values: Vec::new(),
             covariance: Vec::new(),
             dispersion: factor,
-            quantile: student(level, freedom),
+            quantile: student_reach(level, freedom),
             deviance: found.deviance,
             bic: found.bic,
             parameters: model.parameters(),
@@ -265,5 +265,5 @@ fn whiteness(residual: &[f64], searched: usize) -> f64 {
         sum += correlation * correlation / (count - lag) as f64;
     }
     let rows = count as f64;
-    beyond(rows * (rows + 2.0) * sum, (lags - searched) as f64)
+    chi_squared_beyond(rows * (rows + 2.0) * sum, (lags - searched) as f64)
 }

@@ -21,7 +21,6 @@ mod minima;
 mod model;
 mod noise;
 mod projection;
-mod quantiles;
 mod response;
 mod rows;
 mod search;

@@ -20,7 +20,7 @@ fn a_curved_valley_is_followed_to_its_minimum() {
     let rosenbrock =
         |x: &[f64], _| unknown((1.0 - x[0]).powi(2) + 10.0 * (x[1] - x[0] * x[0]).powi(2));
     let around = [variable(-0.5, -9.0, 9.0), variable(0.5, -9.0, 9.0)];
-    let found = minimise(&around, 1e-12, &mut None, rosenbrock);
+    let found = minimise(&around, Accuracy::of(1e-12), &mut None, rosenbrock);
     assert!(found.is_ok_and(|found| (found.place[0] - 1.0).abs() < 1e-3 && found.value < 1e-6));
 }
 
@@ -35,7 +35,7 @@ fn the_inverse_of_a_search_near_by_saves_evaluations_and_changes_no_minimum() {
             longest: 1.0,
             ..one
         });
-        minimise(&around, 1e-9, near, |x: &[f64], _| {
+        minimise(&around, Accuracy::of(1e-9), near, |x: &[f64], _| {
             evaluations.set(evaluations.get() + 1);
             let (a, b) = (x[0] + x[1] - place, x[0] - x[1] + 0.3);
             unknown(50.0 * a * a + 0.5 * b * b + 0.01 * a.powi(4))
@@ -60,7 +60,7 @@ fn a_minimum_beyond_a_bound_is_found_on_it() {
     let bowl = |x: &[f64], _| unknown((x[0] + 1.0).powi(2) + (x[1] - x[0] - 2.0).powi(2));
     let found = minimise(
         &[variable(1.0, 0.0, 9.0), variable(1.5, -9.0, 9.0)],
-        1e-12,
+        Accuracy::of(1e-12),
         &mut None,
         bowl,
     );
@@ -112,7 +112,7 @@ fn parts(start: (f64, f64), function: impl Fn(f64, f64) -> f64) -> (f64, f64) {
         ..variable(part.ln(), -9.0, 9.0)
     };
     let around = [variable(rest + part, 0.0, 9.0), logarithm];
-    let found = minimise(&around, 1e-12, &mut None, Parts(function)).unwrap();
+    let found = minimise(&around, Accuracy::of(1e-12), &mut None, Parts(function)).unwrap();
     let part = found.place[1].exp();
     (found.place[0] - part, part)
 }
@@ -166,11 +166,21 @@ fn a_known_slope_saves_evaluations_and_what_it_lacks_is_found() {
         longest: 10.0,
         ..variable(start, -9.0, 9.0)
     };
-    let found = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, function);
-    let from_nothing = minimise(&[free(0.0), free(2.0)], 1e-10, &mut None, |x: &[f64], _| {
-        let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
-        unknown(line * line + curve * curve + 0.1 * x[0])
-    });
+    let found = minimise(
+        &[free(0.0), free(2.0)],
+        Accuracy::of(1e-10),
+        &mut None,
+        function,
+    );
+    let from_nothing = minimise(
+        &[free(0.0), free(2.0)],
+        Accuracy::of(1e-10),
+        &mut None,
+        |x: &[f64], _| {
+            let (line, curve) = (x[0] + 2.0 * x[1] - 3.0, 10.0 * (x[1] - 0.1 * x[0] * x[0]));
+            unknown(line * line + curve * curve + 0.1 * x[0])
+        },
+    );
     let (Ok(found), Ok(expected)) = (found, from_nothing) else {
         unreachable!("the function has a value everywhere")
     };

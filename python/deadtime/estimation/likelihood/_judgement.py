@@ -1,0 +1,123 @@
+"""What the tests of a fit say, in words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from deadtime._base.digits import stated
+from deadtime.estimation._native import FlightFinding, judge
+from deadtime.estimation.fit._residuals import Whiteness
+from deadtime.estimation.likelihood._profile import LEVEL, LikelihoodProfile
+from deadtime.estimation.likelihood._rows import is_long
+
+#: What speaks against a fit, by the kernel's name of it, with its sizes.
+WORDS = {
+    "colour": (
+        "the residuals are not white beside the fitted noise (lag-1 autocorrelation {0:.2f})"
+    ),
+    "lag": "a further lag of {0:.3g} s makes the recording likelier: the plant lacks it",
+    "lag moves": (
+        "a further lag of {0:.3g} s would move delay and lag together to {1:.3g} s, out of their "
+        "interval"
+    ),
+    "overshoot": (
+        "a further lag of {0:.3g} s with a zero of {1:.3g} s makes the recording likelier: the "
+        "plant lacks them"
+    ),
+    "below zero": (
+        "the delay is at zero, and below zero the recording would be likelier: the plant lags more "
+        "than the vehicle, or lacks something"
+    ),
+    "change": (
+        "the delay is not constant over the window{where}: it changes by {time} (standard "
+        "deviation)"
+    ),
+    "speed": (
+        "the noise grows with the speed of the output{where}, as where time stamps are not the "
+        "times of the samples"
+    ),
+    "restless air": (
+        "the air found{where} changes within a row and moves the output {0:.2g} times the noise of "
+        "the sensor, as no air does: it stands for something else"
+    ),
+    "moving air": (
+        "what is taken for air{where} moves the output more while the vehicle moves than while it "
+        "rests: the plant lacks something"
+    ),
+    "gains": "the recordings contradict one another: {name} {values}",
+    "totals": "the recordings contradict one another: {name} {times}",
+}
+
+#: The kernel's name of what recordings contradict one another about.
+CONTRADICTED = {"gains": "gain", "totals": "total"}
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """What the tests say.
+
+    Attributes
+    ----------
+    whiteness : Whiteness
+        Of the whitened residuals.
+    reasons : tuple of str
+        Why the model is not adequate; empty where it is.
+    plant_lacks : bool
+        Whether one of them is that the plant lacks something: a lag, or what the air stands for.
+    coloured : bool
+        Whether the whitened residuals have a colour that is there while the vehicle rests, too:
+        then the intervals have to be made valid for it.
+    """
+
+    whiteness: Whiteness
+    reasons: tuple[str, ...]
+    plant_lacks: bool = False
+    coloured: bool = False
+
+
+def adequacy_of(profile: LikelihoodProfile) -> Adequacy:
+    """Test a fit."""
+    found = judge(
+        profile.fit.native,
+        list(profile.names.values()),
+        commands_given=profile.commands_given,
+        widens=type(profile) is LikelihoodProfile,
+        total=_interval_of_total(profile),
+    )
+    against = [one for one in found.findings if one.is_against]
+    return Adequacy(
+        Whiteness(*found.whiteness),
+        tuple(_in_words(one, profile) for one in against),
+        any(one.plant_lacks for one in against),
+        found.is_coloured,
+    )
+
+
+def unseen_in_words(lag: float) -> str:
+    """The further lag that would not be seen, up to the verb."""
+    if math.isinf(lag):
+        return "no further lag would"
+    return f"a further lag below {lag:.2g} s would not"
+
+
+def _interval_of_total(profile: LikelihoodProfile) -> tuple[float, float] | None:
+    """The interval of delay and lags together, if it is one of a profile."""
+    name = next((name for name in profile.names if name.startswith("delay+")), None)
+    if name is None or not profile.commands_given or is_long(profile.fit.runs):
+        return None
+    return profile.interval(name, 0.0, 0.0, LEVEL)
+
+
+def _in_words(found: FlightFinding, profile: LikelihoodProfile) -> str:
+    several = found.run is not None and len(profile.fit.runs) > 1
+    pairs = list(zip(found.sizes[::2], found.sizes[1::2], strict=False))
+    about = CONTRADICTED.get(found.cause)
+    return WORDS[found.cause].format(
+        *found.sizes,
+        where=f" in recording {found.run + 1}" if several and found.run is not None else "",
+        time=stated(found.sizes[0], math.nan, "s") if found.cause == "change" else "",
+        name=next((name for name, kernel in profile.names.items() if kernel == about), ""),
+        values=", ".join(stated(value, error, "") for value, error in pairs),
+        times=", ".join(stated(value, error, "s") for value, error in pairs),
+    )

@@ -1,0 +1,279 @@
+//! Plant and noise that make recordings likeliest, and Akaike's criterion of them.
+
+use std::sync::{Arc, OnceLock};
+
+use super::super::fit::{Fit, Model, Search};
+use super::super::likelihood::{Evaluation, Noise};
+use super::super::point::{Point, Timing};
+use super::super::rows::Rows;
+use super::median::median_step;
+use super::plant::FlightPlant;
+use super::tolerances::PRICES;
+use crate::{Error, Task};
+
+/// One recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlightRun {
+    /// Its rows.
+    pub rows: Rows,
+    /// Median time between rows, s.
+    pub row_time: f64,
+    /// The step to which the output is rounded; zero where it is not.
+    pub rounding: f64,
+}
+
+impl FlightRun {
+    /// Checked rows, and the step to which their output is rounded.
+    pub fn new(rows: Rows, rounding: f64) -> Self {
+        Self {
+            row_time: median_step(&rows.time),
+            rows,
+            rounding,
+        }
+    }
+
+    /// The same with other marks of use.
+    pub(super) fn with_used(&self, used: Vec<bool>) -> Self {
+        let rows = Rows {
+            used,
+            ..self.rows.clone()
+        };
+        Self { rows, ..*self }
+    }
+
+    /// The same with slopes of the response, by which a scatter of the times of its rows counts.
+    pub(super) fn with_speed(&self, speed: Vec<f64>) -> Self {
+        let rows = Rows {
+            speed,
+            ..self.rows.clone()
+        };
+        Self { rows, ..*self }
+    }
+
+    /// Number of rows that are used.
+    pub fn count(&self) -> usize {
+        self.rows.used.iter().filter(|used| **used).count()
+    }
+}
+
+/// Plant and noise that make recordings likeliest.
+#[derive(Debug, Clone)]
+pub struct FlightFit {
+    /// What was fitted.
+    pub plant: FlightPlant,
+    /// The recordings.
+    pub runs: Arc<[FlightRun]>,
+    /// Is there a constant input besides the command?
+    pub trim: bool,
+    /// The numbers, and −2 ln L there.
+    pub fit: Fit,
+    /// The gain, where it is not that of least squares on the rows of one recording.
+    pub given_gain: Option<f64>,
+    model: Arc<Model>,
+    parts: OnceLock<Vec<Evaluation>>,
+}
+
+impl FlightFit {
+    /// The numbers of a fit to recordings.
+    ///
+    /// # Errors
+    ///
+    /// As for `Model::new`.
+    pub fn new(
+        plant: FlightPlant,
+        runs: Arc<[FlightRun]>,
+        trim: bool,
+        fit: Fit,
+        given_gain: Option<f64>,
+    ) -> Result<Self, Error> {
+        let rows = runs.iter().map(|run| run.rows.clone()).collect();
+        let model = plant.model(rows, trim)?;
+        let found = Self::of(plant, runs, trim, fit, model);
+        Ok(Self {
+            given_gain,
+            ..found
+        })
+    }
+
+    /// The same with the likelihood of these recordings.
+    pub(super) fn of(
+        plant: FlightPlant,
+        runs: Arc<[FlightRun]>,
+        trim: bool,
+        fit: Fit,
+        model: Model,
+    ) -> Self {
+        Self {
+            plant,
+            runs,
+            trim,
+            fit,
+            given_gain: None,
+            model: Arc::new(model),
+            parts: OnceLock::new(),
+        }
+    }
+
+    /// Is the gain that of least squares on the rows?
+    pub(super) fn gain_is_eliminated(&self) -> bool {
+        self.plant.free.gain && self.runs.len() == 1
+    }
+
+    /// The likelihood that was maximised.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// The likelihood of each recording at the numbers.
+    ///
+    /// # Errors
+    ///
+    /// As for `Model::at`.
+    pub fn parts(&self, task: &Task) -> Result<&[Evaluation], Error> {
+        if let Some(parts) = self.parts.get() {
+            return Ok(parts);
+        }
+        let each = (0..self.runs.len()).map(|run| self.model.at(run, &self.fit.point, task));
+        let parts = each.collect::<Result<Vec<_>, Error>>()?;
+        Ok(self.parts.get_or_init(|| parts))
+    }
+
+    /// Akaike's criterion, from the plain likelihood: fits with and without trim compare.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn criterion(&self, task: &Task) -> Result<f64, Error> {
+        let mut total = 0.0;
+        let noises = &self.fit.point.noise;
+        for ((run, part), noise) in self.runs.iter().zip(self.parts(task)?).zip(noises) {
+            let count = run.count() as f64;
+            let price = |is: bool, price: f64| if is { price } else { 0.0 };
+            total += count * (part.variance * part.freedom as f64 / count).ln() + part.log_det;
+            total += price(noise.sensor > 0.0, PRICES.sensor) + price(self.trim, PRICES.trim);
+            total += price(noise.stamps > 0.0, PRICES.scatter);
+            total += price(noise.arrivals > 0.0, PRICES.scatter);
+        }
+        Ok(total)
+    }
+
+    /// The gain.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn gain(&self, task: &Task) -> Result<f64, Error> {
+        match self.given_gain {
+            Some(gain) => Ok(gain),
+            None => Ok(self.parts(task)?.first().map_or(f64::NAN, |part| part.gain)),
+        }
+    }
+
+    /// The numbers with the gain, which is not searched in a single recording.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn with_gain(&self, task: &Task) -> Result<Fit, Error> {
+        let mut fit = self.fit.clone();
+        fit.point.gain = self.gain(task)?;
+        Ok(fit)
+    }
+
+    /// The same at other numbers, with the same likelihood.
+    #[must_use]
+    pub fn moved(&self, fit: Fit) -> Self {
+        Self {
+            plant: self.plant.clone(),
+            runs: Arc::clone(&self.runs),
+            trim: self.trim,
+            fit,
+            given_gain: self.given_gain,
+            model: Arc::clone(&self.model),
+            parts: OnceLock::new(),
+        }
+    }
+
+    /// The same numbers on other rows.
+    ///
+    /// # Errors
+    ///
+    /// As for `Model::new`.
+    pub fn on(&self, runs: Arc<[FlightRun]>) -> Result<Self, Error> {
+        let fit = self.fit.clone();
+        Self::new(self.plant.clone(), runs, self.trim, fit, self.given_gain)
+    }
+
+    /// The maximum from a starting point, to this accuracy of −2 ln L.
+    ///
+    /// # Errors
+    ///
+    /// As for `Model::at`.
+    pub fn fitted(&self, start: &Point, tolerance: f64, task: &Task) -> Result<Fit, Error> {
+        fitted(&self.model, start, tolerance, task)
+    }
+
+    /// The rows of the recordings.
+    pub(super) fn rows(&self) -> Vec<Rows> {
+        self.runs.iter().map(|run| run.rows.clone()).collect()
+    }
+
+    /// The noise of each recording.
+    pub fn noises(&self) -> &[Noise] {
+        &self.fit.point.noise
+    }
+
+    /// Delay and lags less the zero, with the lag of the known part, s.
+    pub fn total(&self) -> f64 {
+        self.fit.point.total() + self.plant.own_lag
+    }
+}
+
+/// The maximum of a likelihood from a starting point, to this accuracy of −2 ln L.
+pub(super) fn fitted(
+    model: &Model,
+    start: &Point,
+    tolerance: f64,
+    task: &Task,
+) -> Result<Fit, Error> {
+    let start = model.timed(start.clone());
+    model.fit(&start, None, Search::All, tolerance, task)
+}
+
+/// The likeliest of the maxima from these starts.
+pub(super) fn likeliest(
+    model: &Model,
+    starts: &[Point],
+    tolerance: f64,
+    task: &Task,
+) -> Result<Option<Fit>, Error> {
+    let mut best: Option<Fit> = None;
+    for start in starts {
+        let found = fitted(model, start, tolerance, task)?;
+        if best
+            .as_ref()
+            .is_none_or(|best| found.objective < best.objective)
+        {
+            best = Some(found);
+        }
+    }
+    Ok(best)
+}
+
+/// The same numbers of the plant under other noise.
+pub(super) fn with_noise(point: &Point, noise: Vec<Noise>) -> Point {
+    Point {
+        timing: Timing::Delay(point.delay()),
+        noise,
+        ..point.clone()
+    }
+}
+
+/// The same with another delay and other lags.
+pub(super) fn with_times(point: &Point, delay: f64, lags: Vec<f64>) -> Point {
+    Point {
+        timing: Timing::Delay(delay),
+        lags,
+        ..point.clone()
+    }
+}

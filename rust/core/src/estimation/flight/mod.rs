@@ -1,0 +1,35 @@
+//! A whole fit of a named plant to recordings: starts, noise, outliers, and intervals.
+//!
+//! The likelihood has local minima over the delay, and others where air takes the place of what the
+//! plant lacks. Least squares on a grid over delay and lag gives the first start (`start`); the same
+//! grid in strong air gives others (`search`). Trim, air, coloured sensor noise and scattered times are
+//! kept where Akaike's criterion asks for them, outliers are left out (`rounds`), and intervals are
+//! those of the profile (`intervals`). Tests say whether the fit is adequate (`judge`).
+
+mod covariance;
+mod fit;
+mod grid;
+mod intervals;
+mod judge;
+mod median;
+mod noise_known;
+mod outliers;
+mod plant;
+mod rounds;
+mod search;
+mod start;
+#[cfg(test)]
+mod tests;
+mod tolerances;
+
+pub use fit::{FlightFit, FlightRun};
+pub use intervals::{FlightProfile, Known as KnownQuantity};
+pub use judge::{
+    Asked, Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge, unseen_lag,
+    whiteness,
+};
+pub use plant::FlightPlant;
+pub use rounds::{beside_noise, fit_flight};
+pub use search::{Scatter, scatter_of};
+pub use start::{excited_part, least_squares};
+pub use tolerances::{LAG_FACTORS, LONGEST_DELAY, SEARCHED_ROWS, SHORTEST_LAG};
