@@ -16,7 +16,7 @@ const LEVEL: f64 = 0.95;
 /// the lists of times, outputs, command times and commands. The answer: delay, lag, sum and gain, each
 /// with the ends of its interval; the deviation of the white noise; whether there are air and trim; the
 /// probability of such residuals if they are white, and of such a further lag if there is none;
-/// whether the fit is adequate; then the fitted outputs.
+/// whether the fit holds; then the fitted outputs.
 pub(crate) fn estimate(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let task = Task::new();
     let mut list = || request.list().map(<[f64]>::to_vec);

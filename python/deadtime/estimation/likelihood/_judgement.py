@@ -62,7 +62,7 @@ class Adequacy:
     whiteness : Whiteness
         Of the whitened residuals.
     reasons : tuple of str
-        Why the model is not adequate; empty where it is.
+        Why the model does not hold; empty where it is.
     plant_lacks : bool
         Whether one of them is that the plant lacks something: a lag, or what the air stands for.
     coloured : bool

@@ -411,7 +411,12 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
         adequacy,
     )
     plain = begun.names.are_common and type(profile) is LikelihoodProfile
-    if plain and not is_long(begun.rows) and estimate.verdict == "reliable" and rounding_is_all(profile.fit):
+    if (
+        plain
+        and not is_long(begun.rows)
+        and estimate.verdict == "reliable"
+        and rounding_is_all(profile.fit)
+    ):
         repeated = [np.empty(0, int) if one is None else one.repeated for one in begun.checks]
         return read_as_intervals(estimate, begun.models, begun.rows, repeated)
     return estimate

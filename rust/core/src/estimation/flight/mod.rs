@@ -4,7 +4,7 @@
 //! plant lacks. Least squares on a grid over delay and lag gives the first start (`start`); the same
 //! grid in strong air gives others (`search`). Trim, air, coloured sensor noise and scattered times are
 //! kept where Akaike's criterion asks for them, outliers are left out (`rounds`), and intervals are
-//! those of the profile (`intervals`). Tests say whether the fit is adequate (`judge`).
+//! those of the profile (`intervals`). Tests say whether the fit holds (`judge`).
 
 mod covariance;
 mod fit;

@@ -35,7 +35,7 @@ pub struct Judgement {
     /// Do the whitened residuals have a colour that is there while the vehicle rests, too? Then the
     /// intervals have to be made valid for it.
     pub is_coloured: bool,
-    /// What each test says; none speaks against a fit that is adequate.
+    /// What each test says; none speaks against a fit that holds.
     pub findings: Vec<Finding>,
 }
 

@@ -1,4 +1,4 @@
-//! Is a fit adequate? Tests under the noise of a flight, at the 1 % level by default.
+//! Does a fit hold? Tests under the noise of a flight, at the 1 % level by default.
 //!
 //! Beside the whiteness of the whitened residuals, these are tested:
 //!
