@@ -166,10 +166,8 @@ def command(
             "initial_output": initial_output, "check": check or None,
         }  # fmt: skip
         _refuse_given(loops_only, "is for a loop whose controller is named: give --kp, or leave it")
-        if len(files) > 1:
-            raise ValueError(f"{len(files)} files are fitted together in a loop: give --kp")
         columns["command"] = command or "auto"
-        asked = Asked(files[0], columns, windows[0], {**known, "plant": plant}, plot)
+        asked = Asked(files, columns, windows, {**known, "plant": plant}, plot)
         estimate_plant(asked, as_json)
         return
     _refuse_given(known, "is for a recording without a named controller: leave it or --kp out")

@@ -24,18 +24,21 @@ NOT_TOLD = 3
 class Asked:
     """What the command line says of a recording without a controller."""
 
-    file: Path
+    files: Sequence[Path]
     columns: Mapping[str, Any]
-    window: OpenRange | None
+    windows: Sequence[OpenRange | None]
     known: Mapping[str, Any]
     plot: Path | None
 
     def again(self, more: Mapping[str, Any] | None = None, plot: str | None = None) -> str:
         """The command that asks this, with more options."""
         options = {**self.known, **(more or {})}
-        window = options.pop("window", self.window)
-        ends = ":".join("" if end is None else f"{end:.10g}" for end in window or ())
-        words: list[object] = ["deadtime", "estimate", f"{self.file}@{ends}" if ends else self.file]
+        window = options.pop("window", None)
+        windows = self.windows if window is None else [window] * len(self.files)
+        words: list[object] = ["deadtime", "estimate"]
+        for file, given in zip(self.files, windows, strict=True):
+            ends = ":".join("" if end is None else f"{end:.10g}" for end in given or ())
+            words.append(f"{file}@{ends}" if ends else file)
         for name, column in self.columns.items():
             if column is not None and column != "auto":
                 words += [f"--{name}", column]
@@ -64,10 +67,10 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
             f"--plant {plant}: without --kp it is one of {', '.join(map(repr, PLANTS))}; a formula "
             "needs --kp"
         )
-    recording = read_recording(asked.file, **asked.columns)
+    recordings = [read_recording(file, **asked.columns) for file in asked.files]
     with stages(1, quiet=as_json) as begin:
         begin("comparing plants")
-        fit = estimate_delay(recording, window=asked.window, **asked.known)
+        fit = estimate_delay(recordings, window=list(asked.windows), **asked.known)
     if asked.plot is not None:
         figure, axes = new_figure(7.0, 4.6, rows=2)
         fit.plot(axes)
@@ -97,7 +100,7 @@ def next_command(fit: PlantEstimate, asked: Asked) -> str:
         return _design(fit, advice.controller)
     if advice.options:
         return asked.again(advice.options)
-    return asked.again(plot=f"{asked.file.stem}.png") if advice.draw else ""
+    return asked.again(plot=f"{asked.files[0].stem}.png") if advice.draw else ""
 
 
 def _design(fit: PlantEstimate, controller: str) -> str:

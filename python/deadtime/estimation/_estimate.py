@@ -73,12 +73,12 @@ def estimate_delay(
 
 @overload
 def estimate_delay(
-    recording: Recording,
+    recording: Recordings,
     loop: None = None,
     *,
-    window: OpenRange | None = None,
+    window: Windows = None,
     plant: str | None = None,
-    controller: Controller | None = None,
+    controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
@@ -96,7 +96,7 @@ def estimate_delay(
     free: Sequence[str] = FREE,
     window: Any = None,
     plant: str | None = None,
-    controller: Controller | None = None,
+    controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
@@ -114,8 +114,8 @@ def estimate_delay(
     ----------
     recording : Recording or list of Recording
         Reference, output and command over time, as logged where the controller runs. Without
-        `loop` it has a command, and needs no reference. Several recordings of one vehicle are
-        fitted together, by ``"output_error"`` and ``"waveform"``.
+        `loop` it has a command, and needs no reference. Several recordings of one plant are fitted
+        together: without `loop`, or by ``"output_error"`` and ``"waveform"``.
     loop : ControlLoop or list of ControlLoop, optional
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
         One for all recordings, or one each.
@@ -159,9 +159,10 @@ def estimate_delay(
         ``"integrator"``, ``"integrator, lag"``, ``"integrator, two lags"``, or one that ends in
         ``"lag, zero"`` or ``"two lags, zero"``. Whether another explains the recording clearly
         better is said.
-    controller : Controller, optional
-        Without `loop`: the controller that computes the command from the output, if it is known.
-        The command of a P controller need not be logged.
+    controller : Controller or list of them, optional
+        Without `loop`: the controller that computes the command from the output, if it is known;
+        one for all recordings, or a list with one each. The command of a P controller need not be
+        logged, and is moved where it was logged a row late or early.
     limit : float, optional
         Largest size of the command of `controller`.
     closed_loop : bool, optional
@@ -259,12 +260,6 @@ def estimate_delay(
     if loop is None:
         if method != "auto" or free is not FREE:
             raise ValueError("method and free are for a loop: give the loop, or leave them out")
-        if not isinstance(recording, Recording):
-            if not recording:
-                raise ValueError("no recording was given: give one")
-            raise TypeError(
-                "without a loop one Recording is taken, not a list: give the loop to fit several"
-            )
         return estimate_by_evidence(
             recording, window=window, between=between, progress=progress, **known
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -12,7 +12,7 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import OpenRange, open_interval, positive
+from deadtime._base.validation import OpenRange, is_range, open_interval, positive
 from deadtime.loops import Controller, ControlLoop, Integrator, P
 from deadtime.recordings import Columns, Recording
 
@@ -57,6 +57,10 @@ class Question(ReadOnlyArrays):
         The controller in the loop, where it is known.
     window : (low, high) or None
         The window as it was given, s.
+    shift : int
+        Rows by which the command was moved to those of its controller: above zero to later ones.
+    others : tuple of Question
+        Further recordings of the same plant; only what is of one recording counts in them.
     """
 
     recording: Recording
@@ -68,6 +72,13 @@ class Question(ReadOnlyArrays):
     plant: str | None = None
     controller: Controller | None = None
     window: OpenRange | None = None
+    shift: int = 0
+    others: tuple[Question, ...] = ()
+
+    @property
+    def each(self) -> tuple[Question, ...]:
+        """The question for each recording."""
+        return (self, *self.others)
 
     def answer(
         self,
@@ -76,15 +87,16 @@ class Question(ReadOnlyArrays):
         progress: Callable[[int], object] | None = None,
     ) -> native.FamilyFit:
         """Ask the kernel; every interval of the answer has this level."""
+        records = [
+            (one.recording.time, one.command, one.recording.output, one.earlier)
+            for one in self.each
+        ]
         return native.fit_family(
-            self.recording.time,
-            self.command,
-            self.recording.output,
+            records,
             kind=self.between,
             controller=self.closed_loop,
             at_rest=self.at_rest,
             largest_delay=self.largest_delay,
-            earlier=self.earlier,
             plant=self.plant,
             level=level,
             omega=tuple(omega),
@@ -97,8 +109,11 @@ class Question(ReadOnlyArrays):
 
     def options(self) -> dict[str, Any]:
         """What was given besides the recording, as arguments of `estimate_delay`."""
-        names = ("window", "controller", "at_rest", "largest_delay", "plant")
+        names = ("at_rest", "largest_delay", "plant")
         found = {name: getattr(self, name) for name in names}
+        for name in ("window", "controller"):
+            own = [getattr(one, name) for one in self.each]
+            found[name] = own[0] if own.count(own[0]) == len(own) else own
         if self.between != "undecided":
             found["between"] = self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):
@@ -121,22 +136,50 @@ class Question(ReadOnlyArrays):
         return self.recording.command
 
 
+def questions_of(
+    recording: Recording | Sequence[Recording],
+    window: OpenRange | Sequence[OpenRange | None] | None,
+    controller: Controller | Sequence[Controller] | None,
+    limit: float | None,
+    closed_loop: bool | None,
+    known: Mapping[str, Any],
+) -> Question:
+    """The question about one recording, or about several of one plant."""
+    recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    if not recordings:
+        raise ValueError("no recording was given: give one, or a list of them")
+    number = len(recordings)
+    single = window is None or (len(window) == 2 and is_range(window))
+    windows = [window] * number if single else list(window)
+    one_for_all = controller is None or isinstance(controller, Controller)
+    controllers = [controller] * number if one_for_all else list(controller)
+    for name, given in (("window", windows), ("controller", controllers)):
+        if len(given) != number:
+            raise ValueError(
+                f"{number} recordings and {len(given)} of `{name}`: give one for all, or one each"
+            )
+    first, *others = [
+        question_of(one, ends, closed_loop, own, limit, known)
+        for one, ends, own in zip(recordings, windows, controllers, strict=True)
+    ]
+    in_loop = any(one.closed_loop for one in (first, *others))
+    return replace(first, closed_loop=in_loop, others=tuple(others))
+
+
 def question_of(
     recording: Recording,
     window: OpenRange | None,
     closed_loop: bool | None,
-    at_rest: bool | None,
-    largest_delay: float | None,
-    between: Between,
-    plant: str | None,
-    controller: Controller | None = None,
-    limit: float | None = None,
+    controller: Controller | None,
+    limit: float | None,
+    known: Mapping[str, Any],
 ) -> Question:
-    """Check what the caller has given."""
+    """Check what the caller has given of one recording."""
     if not isinstance(recording, Recording):
         raise TypeError(f"recording must be a Recording, got {type(recording).__name__}")
+    shift = 0
     if controller is not None:
-        recording = _with_command(recording, controller, limit)
+        recording, shift = _with_command(recording, controller, limit)
     elif limit is not None:
         raise ValueError(f"limit={limit!r} is that of a controller: give the controller too")
     if recording.command is None:
@@ -149,6 +192,7 @@ def question_of(
             "the commands of this recording have times of their own, which is not possible without "
             "a loop: give the loop, or the command of each row"
         )
+    plant, largest_delay = known.get("plant"), known.get("largest_delay")
     if plant is not None and plant not in PLANTS:
         raise ValueError(f"plant={plant!r} is not one of {', '.join(map(repr, PLANTS))}")
     if largest_delay is not None:
@@ -159,22 +203,45 @@ def question_of(
     if closed_loop is None:
         closed_loop = controller is not None or shows_controller(part)
     return Question(
-        part, rows.start, closed_loop, at_rest, largest_delay, between, plant, controller, window
+        part,
+        rows.start,
+        closed_loop,
+        controller=controller,
+        window=window,
+        shift=shift,
+        **known,
     )
 
 
-def _with_command(recording: Recording, controller: Controller, limit: float | None) -> Recording:
-    """The recording with the command that its controller computes, where none was logged."""
+#: Rows by which a command has to be moved that is one row late or early, by the finding.
+MOVED = {"late": -1, "early": 1}
+
+
+def _with_command(
+    recording: Recording, controller: Controller, limit: float | None
+) -> tuple[Recording, int]:
+    """The recording with the command of its controller on its rows, and by how many it was moved."""
     loop = ControlLoop(Integrator(), controller, limit=limit)
-    if recording.command is not None:
-        return recording
-    if not (isinstance(controller, P) and recording.has_reference):
+    has_law = isinstance(controller, P) and recording.has_reference
+    if recording.command is None and not has_law:
         raise RecordingError(
             "the recording has no command; only that of a P controller follows from reference and "
             "output: name the column of the command"
         )
+    shift = 0
+    if recording.command is not None:
+        shift = MOVED.get(recording.check(loop).law, 0) if has_law else 0
+        if not shift:
+            return recording, 0
     columns = Columns(recording.time, recording.reference, recording.output, None)
-    return replace(recording, command=columns.commands(loop))
+    computed = columns.commands(loop)
+    if shift and recording.command is not None:
+        moved = np.roll(recording.command, shift)
+        # The row that the move leaves empty has the command of the controller.
+        empty = 0 if shift > 0 else -1
+        moved[empty] = computed[empty]
+        computed = moved
+    return replace(recording, command=computed), shift
 
 
 def shows_controller(recording: Recording) -> bool:

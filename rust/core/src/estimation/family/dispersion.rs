@@ -5,6 +5,7 @@
 //! block has much leverage, the jackknife takes its place: gᵀ(I − A)⁻²g (m − 1)/m.
 
 use super::projection::Projection;
+use super::quantiles::beyond;
 use super::tolerances::BLOCKS;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::lu::Lu;
@@ -50,6 +51,11 @@ pub(super) fn dispersion(
         corrected
     };
     let factor = sum / (p.max(1) as f64 * variance);
+    if beyond(factor * freedom, freedom) > BLOCKS.chance {
+        // As the model says, whose own scatter then counts as more blocks would.
+        let weight = 1.0 + BLOCKS.prior;
+        return (((factor + BLOCKS.prior) / weight).max(1.0), weight * freedom);
+    }
     (if factor > 1.0 { factor } else { 1.0 }, freedom)
 }
 
