@@ -101,6 +101,45 @@ def test_a_command_of_unknown_kind_has_the_intervals_of_both():
     assert both.candidates[0].deviance == pytest.approx(least, abs=0.01)
 
 
+def test_a_command_that_jumps_is_held():
+    record = made.slow_window(3)
+    found = fit(record, kind="undecided")
+    assert (found.kind, found.kind_decided) == ("held", True)
+    held = fit(record)
+    assert found.hull == held.hull
+
+
+def test_no_zero_imitates_another_kind():
+    time, command, output = table(PROCESS / "loop.csv", "Time (s)", "OP", "PV")
+    part = time < 600.0
+    found = fit_rows(time[part], command[part], output[part] + 0.01 * time[part], controller=True)
+    best = found.candidates[0]
+    for one in found.candidates:
+        zero = dict(zip(one.names, one.values, strict=True)).get("zero", 0.0)
+        assert abs(zero) < 0.3 * time[part][-1] or one.bic > best.bic
+    assert not best.limit
+
+
+def test_the_number_at_its_limit_is_named():
+    random = np.random.default_rng(4)
+    time, command = np.arange(300.0), np.repeat(random.choice([-1.0, 1.0], 30), 10)
+    output = np.cumsum(command) * 0.1 + random.normal(0.0, 0.02, 300)
+    # An integrator is a lag without an end.
+    found = fit_rows(time, command, output, plant="lag")
+    assert found.candidates[0].limit == "lag"
+    assert found.reason in ("lag at its limit", "too few told")
+
+
+def test_other_levels_need_no_second_fit():
+    record = made.slow_window(2)
+    found, wide = fit(record), fit(record, level=0.99)
+    for name, ends in wide.hull.items():
+        assert found.hull_at(0.99)[name] == pytest.approx(ends, rel=1e-9)
+    assert found.hull_at(0.95) == found.hull
+    with pytest.raises(ValueError, match=r"level 1\.5"):
+        found.hull_at(1.5)
+
+
 def test_an_output_without_noise_keeps_an_interval():
     time = np.arange(300) * 0.05
     command = np.repeat([0.0, 1.0, -1.0], 100)
@@ -154,6 +193,8 @@ def test_a_process_in_a_loop_with_a_step_of_the_load():
     rows = table(PROCESS / "loop.csv", "Time (s)", "OP", "PV")
     found = fit_rows(*rows, controller=True)
     assert found.verdict in ("reliable", "indication")
+    # A zero of the length of the record would make an integrator of it.
+    assert not found.candidates[0].integrating
     # White noise alone takes a shorter delay than coloured noise needs.
     assert found.reason != "delay at its limit"
     truth = made.Made(*[np.zeros(1)] * 3, (1.8,), (40.0, 1.0), 12.0, True)

@@ -4,7 +4,6 @@ import os
 import time
 from dataclasses import dataclass, field
 
-import made_records as made
 import numpy as np
 from deadtime.estimation import _native
 
@@ -94,8 +93,8 @@ class Survey:
         hits, ratios = np.mean(self.hits, axis=0), np.median(self.ratios, axis=0)
         return (
             f"{kind}: {self.cases} records, wrong kind {self.wrong}, reliable {self.reliable}; "
-            f"largest gain, gain and phase at crossover held {np.round(hits, 3).tolist()}, width over"
-            f" that of the right plant {np.round(ratios, 2).tolist()}, "
+            f"largest gain, gain and phase at crossover held {np.round(hits, 3).tolist()}, "
+            f"width over that of the right plant {np.round(ratios, 2).tolist()}, "
             f"CPU {np.median(self.cpu):.2f} s"
         )
 

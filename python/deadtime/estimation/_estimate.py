@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, overload
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._base.validation import OpenRange
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import estimate_by_evidence

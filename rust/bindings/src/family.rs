@@ -1,7 +1,8 @@
 //! Bindings of the family of plants of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Between, Candidate, Class, Family, FamilyNoise, Grade, Named, Question, Record, fit_family as fit,
+    Between, Candidate, Class, Family, FamilyNoise, Grade, Named, Question, Record,
+    fit_family as fit,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -237,7 +238,9 @@ impl FamilyFit {
                 "frequency {wrong} rad/s: give frequencies above 0"
             )));
         }
-        let found = run_here(py, |task| self.core.at(&omega, level.unwrap_or(self.level), task))?;
+        let found = run_here(py, |task| {
+            self.core.at(&omega, level.unwrap_or(self.level), task)
+        })?;
         let out = PyDict::new(py);
         for (name, of) in [("gain", 0), ("phase", 1), ("delay", 2)] {
             let parts = |part: fn(&(f64, f64, f64)) -> f64| {

@@ -95,9 +95,7 @@ def _is_one_step(question: Question) -> bool:
     return not question.others and np.count_nonzero(np.diff(question.command)) == 1
 
 
-def _run(
-    question: Question, first: native.FamilyCandidate | None, place: int
-) -> FittedRecording:
+def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:
     """One of the recordings with what the likeliest plant explains of it."""
     if first is None:
         unknown = np.full(len(question.recording), math.nan)

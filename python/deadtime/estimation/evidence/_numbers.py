@@ -276,4 +276,3 @@ class FoundPlant(ReadOnlyArrays):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_native": []}
-

@@ -148,22 +148,26 @@ def questions_of(
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
     if not recordings:
         raise ValueError("no recording was given: give one, or a list of them")
-    number = len(recordings)
-    single = window is None or (len(window) == 2 and is_range(window))
-    windows = [window] * number if single else list(window)
-    one_for_all = controller is None or isinstance(controller, Controller)
-    controllers = [controller] * number if one_for_all else list(controller)
-    for name, given in (("window", windows), ("controller", controllers)):
-        if len(given) != number:
-            raise ValueError(
-                f"{number} recordings and {len(given)} of `{name}`: give one for all, or one each"
-            )
+    is_list = isinstance(window, (tuple, list)) and not (len(window) == 2 and is_range(window))
+    windows = _each("window", window, not is_list, len(recordings))
+    is_list = isinstance(controller, (tuple, list))
+    controllers = _each("controller", controller, not is_list, len(recordings))
     first, *others = [
-        question_of(one, ends, closed_loop, own, limit, known)
-        for one, ends, own in zip(recordings, windows, controllers, strict=True)
+        question_of(its, ends, closed_loop, own, limit, known)
+        for its, ends, own in zip(recordings, windows, controllers, strict=True)
     ]
-    in_loop = any(one.closed_loop for one in (first, *others))
+    in_loop = any(asked.closed_loop for asked in (first, *others))
     return replace(first, closed_loop=in_loop, others=tuple(others))
+
+
+def _each(name: str, given: Any, is_one: bool, number: int) -> list[Any]:
+    """What was given for all recordings, or one each, as a list."""
+    out = [given] * number if is_one else list(given)
+    if len(out) != number:
+        raise ValueError(
+            f"{number} recordings and {len(out)} of `{name}`: give one for all, or one each"
+        )
+    return out
 
 
 def question_of(
@@ -220,7 +224,7 @@ MOVED = {"late": -1, "early": 1}
 def _with_command(
     recording: Recording, controller: Controller, limit: float | None
 ) -> tuple[Recording, int]:
-    """The recording with the command of its controller on its rows, and by how many it was moved."""
+    """The recording with the command of its controller, and by how many rows it was moved."""
     loop = ControlLoop(Integrator(), controller, limit=limit)
     has_law = isinstance(controller, P) and recording.has_reference
     if recording.command is None and not has_law:
@@ -235,6 +239,7 @@ def _with_command(
             return recording, 0
     columns = Columns(recording.time, recording.reference, recording.output, None)
     computed = columns.commands(loop)
+    assert computed is not None
     if shift and recording.command is not None:
         moved = np.roll(recording.command, shift)
         # The row that the move leaves empty has the command of the controller.

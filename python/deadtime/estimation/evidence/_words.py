@@ -105,7 +105,9 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool) -> str:
     sentences: Mapping[str, str] = {
         "": "",
         "too few told": "the command moves too little: the recording determines "
-        f"{determined} of the {asked} numbers of the plant",
+        f"{determined} of the {asked} numbers of the plant"
+        if determined < asked
+        else "the command is one sine, which determines gain and phase at its frequency alone",
         "classes contradict": "plants of different kinds explain the recording alike and differ "
         "where a loop crosses over",
         "residuals not white": "what the plant leaves unexplained is no noise of a sensor: there "

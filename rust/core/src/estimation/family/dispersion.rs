@@ -54,7 +54,10 @@ pub(super) fn dispersion(
     if beyond(factor * freedom, freedom) > BLOCKS.chance {
         // As the model says, whose own scatter then counts as more blocks would.
         let weight = 1.0 + BLOCKS.prior;
-        return (((factor + BLOCKS.prior) / weight).max(1.0), weight * freedom);
+        return (
+            ((factor + BLOCKS.prior) / weight).max(1.0),
+            weight * freedom,
+        );
     }
     (if factor > 1.0 { factor } else { 1.0 }, freedom)
 }

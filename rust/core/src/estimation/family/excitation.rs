@@ -32,7 +32,12 @@ fn power(part: &Part, omega: f64) -> f64 {
 
 /// The largest peaks of the spectrum of the command, rad/s, in order.
 pub(super) fn excited(rows: &Rows) -> Vec<f64> {
-    let power = |omega: f64| rows.parts.iter().map(|part| power(part, omega)).sum::<f64>();
+    let power = |omega: f64| {
+        rows.parts
+            .iter()
+            .map(|part| power(part, omega))
+            .sum::<f64>()
+    };
     let unit = TAU / rows.span;
     let most = MULTIPLES.min((0.5 * rows.span / rows.row) as usize);
     let powers: Vec<f64> = (0..=most)

@@ -152,12 +152,15 @@ pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Resul
     let kinds: &[bool] = match question.between {
         Between::Held => &[false],
         Between::Straight => &[true],
+        Between::Undecided if records.iter().all(Record::jumps) => &[false],
         Between::Undecided => &[false, true],
     };
     let mut found: Vec<Family> = Vec::with_capacity(kinds.len());
     for straight in kinds {
         let known = found.first();
-        found.push(one_kind(records, question, &starts, *straight, known, task)?);
+        found.push(one_kind(
+            records, question, &starts, *straight, known, task,
+        )?);
     }
     let out = joined(found, task)?;
     moved(records, question, &starts, &out, task).map(|moved| moved.unwrap_or(out))
@@ -183,7 +186,10 @@ fn joined(mut found: Vec<Family>, task: &Task) -> Result<Family, Error> {
             out.hull = hull(&turning(&out.minima, task)?, out.largest_delay);
         }
         for candidate in other.candidates {
-            let is_known = out.candidates.iter().any(|own| own.class == candidate.class);
+            let is_known = out
+                .candidates
+                .iter()
+                .any(|own| own.class == candidate.class);
             if !is_known {
                 out.candidates.push(candidate);
             }
@@ -250,7 +256,9 @@ fn asked(question: &Question) -> (Vec<Class>, Vec<Noise>) {
         Some(class) => vec![class],
         None => Class::all().filter(may_be).collect(),
     };
-    let noises = question.noise.map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
+    let noises = question
+        .noise
+        .map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
     (classes, noises)
 }
 

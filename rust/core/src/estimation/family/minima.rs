@@ -37,10 +37,10 @@ impl<'a> Minimum<'a> {
         let zero = || x[1 + class.order].abs() >= RANGES.slowest_zero * rows.span;
         if x[0] >= rows.largest_delay {
             Some("delay")
-        } else if class.order > 0 && x[1] >= log(RANGES.slowest * rows.span) {
-            Some("lag")
         } else if class.has_zero && zero() {
             Some("zero")
+        } else if class.order > 0 && x[1] >= log(RANGES.slowest * rows.span) {
+            Some("lag")
         } else {
             None
         }
@@ -105,13 +105,15 @@ fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
     let mut out: Vec<Minimum<'_>> = Vec::new();
     for found in sorted {
         let model = |one: &Minimum<'_>| (one.model.noise, one.model.level);
-        let own = || out.iter().filter(|one| one.model.class == found.model.class);
+        let own = || {
+            out.iter()
+                .filter(|one| one.model.class == found.model.class)
+        };
         let Some(best) = own().next() else {
             out.push(found);
             continue;
         };
-        let is_simpler =
-            |one: &Minimum<'_>| one.model.parameters() < best.model.parameters();
+        let is_simpler = |one: &Minimum<'_>| one.model.parameters() < best.model.parameters();
         let is_new = if is_simpler(&found) {
             found.bic < best.bic + EVIDENCE.reach && !own().any(is_simpler)
         } else {
@@ -119,7 +121,9 @@ fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
             let x = &found.point.x;
             model(&found) == model(best)
                 && alike.clone().count() < best.model.class.starts(STARTS.kept)
-                && alike.clone().all(|one| are_apart(&found.model, &one.point.x, x))
+                && alike
+                    .clone()
+                    .all(|one| are_apart(&found.model, &one.point.x, x))
         };
         if is_new {
             out.push(found);
@@ -200,7 +204,8 @@ fn on<'a>(rows: &'a Rows, model: &Model<'_>) -> Model<'a> {
 /// Points of the minima of this class that are known.
 fn seeded(model: &Model<'_>, plan: &Plan<'_>) -> Vec<Vec<f64>> {
     let own = plan.seeds.iter().filter(|(class, _)| *class == model.class);
-    own.map(|(_, numbers)| model.point_of(numbers, &[])).collect()
+    own.map(|(_, numbers)| model.point_of(numbers, &[]))
+        .collect()
 }
 
 fn most_likely(found: &[Minimum<'_>]) -> f64 {

@@ -138,7 +138,11 @@ impl Model<'_> {
     }
 
     /// A column that is zero outside one record.
-    fn column_of(&self, own: impl Iterator<Item = f64>, place: &std::ops::Range<usize>) -> Vec<f64> {
+    fn column_of(
+        &self,
+        own: impl Iterator<Item = f64>,
+        place: &std::ops::Range<usize>,
+    ) -> Vec<f64> {
         let mut out = vec![0.0; self.rows.count()];
         for (entry, value) in out[place.clone()].iter_mut().zip(own) {
             *entry = value;
@@ -263,11 +267,13 @@ impl Model<'_> {
     /// −2 ln L.
     pub(super) fn deviance(&self, point: &Point) -> f64 {
         let sizes = point.parts.iter().zip(&self.rows.weights);
-        let own = sizes.zip(&self.rows.parts).map(|((squares, weight), part)| {
-            let count = part.used.len() as f64;
-            let variance = squares / (count * weight * weight);
-            count * (log(variance) + 1.0 + log(std::f64::consts::TAU))
-        });
+        let own = sizes
+            .zip(&self.rows.parts)
+            .map(|((squares, weight), part)| {
+                let count = part.used.len() as f64;
+                let variance = squares / (count * weight * weight);
+                count * (log(variance) + 1.0 + log(std::f64::consts::TAU))
+            });
         own.sum()
     }
 

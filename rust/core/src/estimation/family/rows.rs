@@ -3,6 +3,10 @@
 use super::tolerances::{REST, SEARCH};
 use crate::Error;
 
+/// Share of the changes of a command that another follows in the next row, up to which it jumps: more
+/// takes ramps of a row or two for jumps.
+const JUMPS: f64 = 0.1;
+
 /// One record.
 #[derive(Debug, Clone)]
 pub struct Record {
@@ -71,6 +75,21 @@ impl Record {
         let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+    }
+
+    /// Does the command jump from one held value to the next? A straight one would need rows to get there.
+    pub(super) fn jumps(&self) -> bool {
+        let changes = |at: usize| {
+            let next = self.command.get(at + 1);
+            next.is_some_and(|next| *next != self.command[at])
+        };
+        let all = (0..self.command.len()).filter(|at| changes(*at));
+        let (mut count, mut together) = (0, 0);
+        for at in all {
+            count += 1;
+            together += usize::from(changes(at + 1));
+        }
+        count > 0 && together as f64 <= JUMPS * count as f64
     }
 
     /// Does the record begin with rows in which neither the command nor the output moves?
@@ -252,7 +271,9 @@ impl Rows {
         Self {
             weights: vec![1.0; parts.len()],
             straight,
-            row: parts.iter().fold(f64::INFINITY, |row, part| row.min(part.row)),
+            row: parts
+                .iter()
+                .fold(f64::INFINITY, |row, part| row.min(part.row)),
             span: parts.iter().fold(0.0, |span, part| part.span.max(span)),
             largest_delay,
             in_loop,
