@@ -100,7 +100,7 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
 }
 
 /// Of each class the minima of its best model, and the best of a simpler one that may be true too;
-/// without those that only a zero at its limit explains, if there are others.
+/// without those whose zero is at its limit, if there are others that are not hopeless beside them.
 fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
     let mut out: Vec<Minimum<'_>> = Vec::new();
     for found in sorted {
@@ -129,8 +129,9 @@ fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
             out.push(found);
         }
     }
-    if out.iter().any(|one| one.limit() != Some("zero")) {
-        out.retain(|one| one.limit() != Some("zero"));
+    let inside = out.iter().find(|one| one.limit() != Some("zero"));
+    if let Some(dear) = inside.map(|one| one.bic - EVIDENCE.hopeless) {
+        out.retain(|one| one.limit() != Some("zero") || one.bic < dear);
     }
     out
 }
