@@ -99,8 +99,7 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
     Ok(kept(out))
 }
 
-/// Of each class the minima of its best model, and the best of a simpler one that may be true too;
-/// without those whose zero is at its limit, if there are others that are not hopeless beside them.
+/// Of each class the minima of its best model, and the best of a simpler one that may be true too.
 fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
     let mut out: Vec<Minimum<'_>> = Vec::new();
     for found in sorted {
@@ -129,11 +128,15 @@ fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
             out.push(found);
         }
     }
-    let inside = out.iter().find(|one| one.limit() != Some("zero"));
-    if let Some(dear) = inside.map(|one| one.bic - EVIDENCE.hopeless) {
-        out.retain(|one| one.limit() != Some("zero") || one.bic < dear);
-    }
     out
+}
+
+/// Leave out minima whose zero is at its limit, if there are others that are not hopeless beside them.
+pub(super) fn leave_out_imitations(found: &mut Vec<Minimum<'_>>) {
+    let inside = found.iter().find(|one| one.limit() != Some("zero"));
+    if let Some(dear) = inside.map(|one| one.bic - EVIDENCE.hopeless) {
+        found.retain(|one| one.limit() != Some("zero") || one.bic < dear);
+    }
 }
 
 /// The minimum without a level, where that may be: the output is zero where the command is.
