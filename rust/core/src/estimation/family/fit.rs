@@ -4,7 +4,7 @@ use super::candidate::Candidate;
 use super::class::{Class, Numbers};
 use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, Triple, at, hull, turning};
-use super::minima::{Minimum, Plan, leave_out_imitations, minima, without_plant};
+use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Part, Record, Rows, Start};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
@@ -319,7 +319,7 @@ fn one_kind(
             noises: &noises,
             seeds: &seeds,
         };
-        let mut found = minima(&plan, task)?;
+        let found = minima(&plan, task)?;
         // Coloured noise may need a longer delay than the white noise of the first pass.
         if room < largest && longest_delay(&found) >= room {
             room = largest.min(2.0 * room);
@@ -333,7 +333,6 @@ fn one_kind(
             continue;
         }
         let silent = without_plant(&plan, task)?;
-        leave_out_imitations(&mut found);
         let mut out = answer(&found, silent, question, largest, task)?;
         (out.room, out.weights) = (room, weights);
         return Ok(out);

@@ -37,10 +37,10 @@ impl<'a> Minimum<'a> {
         let zero = || x[1 + class.order].abs() >= RANGES.slowest_zero * rows.span;
         if x[0] >= rows.largest_delay {
             Some("delay")
-        } else if class.has_zero && zero() {
-            Some("zero")
         } else if class.order > 0 && x[1] >= log(RANGES.slowest * rows.span) {
             Some("lag")
+        } else if class.has_zero && zero() {
+            Some("zero")
         } else {
             None
         }
@@ -99,7 +99,8 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
     Ok(kept(out))
 }
 
-/// Of each class the minima of its best model, and the best of a simpler one that may be true too.
+/// Of each class the minima of its best model, and the best of a simpler one that may be true too;
+/// without those that a zero at its limit alone explains, if there are others.
 fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
     let mut out: Vec<Minimum<'_>> = Vec::new();
     for found in sorted {
@@ -128,15 +129,10 @@ fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
             out.push(found);
         }
     }
-    out
-}
-
-/// Leave out minima whose zero is at its limit, if there are others that are not hopeless beside them.
-pub(super) fn leave_out_imitations(found: &mut Vec<Minimum<'_>>) {
-    let inside = found.iter().find(|one| one.limit() != Some("zero"));
-    if let Some(dear) = inside.map(|one| one.bic - EVIDENCE.hopeless) {
-        found.retain(|one| one.limit() != Some("zero") || one.bic < dear);
+    if out.iter().any(|one| one.limit() != Some("zero")) {
+        out.retain(|one| one.limit() != Some("zero"));
     }
+    out
 }
 
 /// The minimum without a level, where that may be: the output is zero where the command is.
