@@ -721,15 +721,16 @@ class FamilyCandidate:
     ar: Final[list[float]]
     ma: Final[list[float]]
     noise_std: Final[float]
+    noise_stds: Final[list[float]]
     innovation_std: Final[float]
     deviance: Final[float]
     bic: Final[float]
     parameters: Final[int]
     told: Final[int]
     whiteness: Final[float]
-    residuals: Final[_Reals]
-    fitted: Final[_Reals]
-    at_limit: Final[bool]
+    residuals: Final[list[_Reals]]
+    fitted: Final[list[_Reals]]
+    limit: Final[str]
 
 @final
 class FamilyFit:
@@ -741,7 +742,7 @@ class FamilyFit:
     kind: Final[str]
     kind_decided: Final[bool]
     rows: Final[int]
-    first_row: Final[int]
+    first_rows: Final[list[int]]
     at_rest: Final[bool]
     told: Final[int]
     asked: Final[int]
@@ -753,18 +754,19 @@ class FamilyFit:
     gain_at_crossover: Final[float]
     phase_at_crossover: Final[float]
     delay_at_crossover: Final[float]
-    def at(self, omega: Sequence[float]) -> dict[str, tuple[_Reals, _Reals, _Reals]]: ...
+    def hull_at(self, level: float) -> dict[str, _Pair]: ...
+    def pieces_at(self, level: float) -> dict[str, list[_Pair]]: ...
+    def at(
+        self, omega: Sequence[float], level: float | None = None
+    ) -> dict[str, tuple[_Reals, _Reals, _Reals]]: ...
 
 def fit_family(
-    time: _Reals,
-    command: _Reals,
-    output: _Reals,
+    records: Sequence[tuple[_Reals, _Reals, _Reals, int]],
     *,
     kind: str = "held",
     controller: bool = False,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
-    earlier: int = 0,
     plant: str | None = None,
     noise: str | None = None,
     level: float = 0.95,

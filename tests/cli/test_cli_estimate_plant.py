@@ -56,6 +56,21 @@ def test_a_bump_test_is_answered_in_one_go(files):
     assert following.stdout.startswith("PI: Kp")
 
 
+def test_several_files_of_one_plant_are_fitted_together(files, tmp_path):
+    time, command, output = bump(7)
+    write(tmp_path / "other.csv", {"Time (s)": time, "PV": output + 3.0, "OP": command})
+    asked = ("estimate", files / "bump.csv", tmp_path / "other.csv")
+    result = run(*asked, "--output", "PV", "--command", "OP", cwd=tmp_path)
+    assert verdict_of(result) == "reliable"
+    said = " ".join(result.stdout.split())
+    assert "of recording 2" in said
+    assert pasted(result, tmp_path).returncode == 0
+    told = found(*asked, cwd=tmp_path)
+    assert len(told["recordings"]) == 2
+    low, high = told["interval_95"]["delay"]
+    assert low < DEAD < high
+
+
 def test_json_has_the_same_answer(files):
     told = found("estimate", "bump.csv", cwd=files)
     assert told["verdict"] == "reliable"

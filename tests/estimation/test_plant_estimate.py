@@ -51,6 +51,54 @@ def test_a_wider_level_has_a_wider_interval(fit):
     assert lower < low < high < higher
 
 
+def test_an_interval_is_of_one_piece_where_one_minimum_is_left(fit):
+    assert fit.pieces("gain") == (fit.ci(0.95, "gain"),)
+    assert fit.pieces("lag", 0.8) == (fit.ci(0.8, "lag"),)
+    with pytest.raises(ValueError, match="'zeros' has no interval"):
+        fit.pieces("zeros")
+
+
+def test_delays_a_period_apart_are_pieces():
+    # A square wave whose period varies by little, through a delay alone.
+    rng = np.random.default_rng(0)
+    halves = 10 + (rng.random(14) < 0.1)
+    command = np.repeat((-1.0) ** np.arange(14), halves)[:130].astype(float)
+    output = np.r_[np.zeros(6), command[:-6]] + rng.normal(0.0, 0.8, 130)
+    recording = dtm.Recording(0.1 * np.arange(130), None, output, command)
+    found = dtm.estimate_delay(recording, plant="delay", between="held", largest_delay=3.5)
+    if found.verdict != "none":
+        pieces = found.pieces()
+        assert pieces[0][0] == found.ci()[0]
+        assert pieces[-1][1] == found.ci()[1]
+        assert any(low <= 0.6 <= high for low, high in pieces)
+
+
+def loop_logged(late, seed=1, rows=400, step=0.065):
+    """A height under P control, with the command logged `late` rows late."""
+    vehicle = dtm.ControlLoop(
+        dtm.Integrator(0.9, 0.3), dtm.P(1.2), delay=0.2, sample_time=step, limit=1.0
+    )
+    rng = np.random.default_rng(seed)
+    reference = np.repeat(rng.choice([0.0, 0.3, 0.8], rows // 40), 40)
+    time = step * np.arange(rows)
+    flown = vehicle.simulate(time, reference, reference_time=time)
+    output = flown.outputs + rng.normal(0.0, 0.004, rows)
+    command = np.clip(1.2 * (reference - output), -1.0, 1.0)
+    return dtm.Recording(time, reference, output, np.roll(command, late))
+
+
+@pytest.mark.parametrize(("late", "words"), [(0, None), (1, "late"), (-1, "early")])
+def test_a_command_that_is_a_row_late_or_early_is_moved(late, words):
+    controller = dtm.P(1.2)
+    right = dtm.estimate_delay(loop_logged(0), controller=controller, plant="integrator, lag")
+    found = dtm.estimate_delay(loop_logged(late), controller=controller, plant="integrator, lag")
+    assert found.shift == -late
+    assert found.delay == pytest.approx(right.delay, abs=0.01)
+    line = [line for line in found.summary().splitlines() if "row" in line and "moved" in line]
+    assert bool(line) == (words is not None)
+    assert words is None or f"1 row {words}" in line[0]
+
+
 def test_the_loop_has_the_plant_and_its_dead_time(fit):
     loop = fit.loop(dtm.PI(0.5, 0.01), sample_time=1.0, limit=100.0)
     assert loop.plant == fit.plant
@@ -186,8 +234,8 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
     loop = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0))
     with pytest.raises(ValueError, match="at_rest is for a recording without a loop"):
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
-    with pytest.raises(TypeError, match="without a loop one Recording"):
-        dtm.estimate_delay([fit.recording])
+    with pytest.raises(ValueError, match="no recording was given"):
+        dtm.estimate_delay([])
     with pytest.raises(ValueError, match="omega=-1 rad/s is not above zero"):
         fit.at([-1.0])
     with pytest.raises(ValueError, match="'zeros' has no interval"):

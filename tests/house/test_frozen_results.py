@@ -95,6 +95,7 @@ MADE = {
     ),
     "FirstOrder": lambda: dtm.FirstOrder(1.0, 0.3),
     "FlightNoise": lambda: dtm.experiments.FlightNoise(0.01, air=0.1, air_time=0.3),
+    "FittedRecording": lambda: found_plant().runs[0],
     "FittedRun": lambda: dtm.estimate_delay(
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ).runs[0],

@@ -148,13 +148,17 @@ def cut(made, first):
     return replace(made, **rows)
 
 
-def slow_window(seed):
-    """Ten seconds cut out of a binary sequence through e^(−0.3 s)/(5 s + 1), not at rest."""
+def slow_run(seed):
+    """A binary sequence of 40 s through e^(−0.3 s)/(5 s + 1)."""
     random = np.random.default_rng(seed)
     signs = np.repeat((-1.0) ** np.arange(100), random.integers(10, 60, 100))
     noise = random.normal(0.0, 0.003, 801)
-    made = simulated([1.0], [5.0, 1.0], 0.3, 0.05, 801, lambda row, _: signs[row], noise, False)
-    return cut(made, 600)
+    return simulated([1.0], [5.0, 1.0], 0.3, 0.05, 801, lambda row, _: signs[row], noise, False)
+
+
+def slow_window(seed):
+    """The last ten seconds of it, cut out, not at rest."""
+    return cut(slow_run(seed), 600)
 
 
 def lone_sine(seed):

@@ -50,7 +50,7 @@ def command(
     )  # fmt: skip
     known = {"at_rest": at_rest, "closed_loop": closed_loop, "largest_delay": largest_delay}
     if is_answered(loop):
-        asked = Asked(files[0], columns, windows[0], {**known, "plant": plant}, plot, loop)
+        asked = Asked(files, columns, windows, {**known, "plant": plant}, plot, loop)
         estimate_plant(asked, as_json)
         return
     for name, value in known.items():

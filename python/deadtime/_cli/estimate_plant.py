@@ -31,9 +31,9 @@ SAMPLES = 0.05
 class Asked:
     """What the command line says of a recording whose plant is not named."""
 
-    file: Path
+    files: Sequence[Path]
     columns: Mapping[str, Any]
-    window: OpenRange | None
+    windows: Sequence[OpenRange | None]
     known: Mapping[str, Any]
     plot: Path | None
     loop: NamedLoop
@@ -41,14 +41,18 @@ class Asked:
     def again(self, more: Mapping[str, Any] | None = None, plot: str | None = None) -> str:
         """The command that asks this, with more options."""
         options = {**self.known, **(more or {})}
-        window = options.pop("window", self.window)
-        ends = ":".join("" if end is None else f"{end:.10g}" for end in window or ())
-        words: list[object] = ["deadtime", "estimate", f"{self.file}@{ends}" if ends else self.file]
+        window = options.pop("window", None)
+        windows = self.windows if window is None else [window] * len(self.files)
+        words: list[object] = ["deadtime", "estimate"]
+        for file, given in zip(self.files, windows, strict=True):
+            ends = ":".join("" if end is None else f"{end:.10g}" for end in given or ())
+            words.append(f"{file}@{ends}" if ends else file)
         for name, column in self.columns.items():
             if column is not None:
                 words += [f"--{name}", column]
-        for name, gain in self.loop.gains.items():
-            words += _option(name, None if gain is None else gain[0])
+        for name, gains in self.loop.gains.items():
+            for gain in gains or ():
+                words += _option(name, gain)
         for name in ("sample_time", "limit"):
             words += _option(name, getattr(self.loop, name))
         for name, value in options.items():
@@ -70,7 +74,7 @@ def _option(name: str, value: Any) -> list[object]:
 
 def is_answered(loop: NamedLoop) -> bool:
     """Whether the recording is to show the plant: none is named, and the commands are known."""
-    if len(loop.files) > 1 or set(loop.named) - {"--plant"}:
+    if set(loop.named) - {"--plant"}:
         return False
     if loop.gains["kp"] is None:
         return True
@@ -78,9 +82,11 @@ def is_answered(loop: NamedLoop) -> bool:
         return False
     if loop.columns["command"] is not None:
         return True
-    recording = read_recording(loop.files[0], **loop.columns)
-    controller = replace(loop, plant=None).loops()[0].controller
-    return isinstance(controller, P) and _at_samples(recording, loop.sample_time)
+    loops = replace(loop, plant=None).loops()
+    if not all(isinstance(one.controller, P) for one in loops):
+        return False
+    recordings = (read_recording(file, **loop.columns) for file in loop.files)
+    return all(_at_samples(one, loop.sample_time) for one in recordings)
 
 
 def _at_samples(recording: Recording, sample_time: float | None) -> bool:
@@ -103,21 +109,20 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
     findings: list[dict[str, Any]] = []
     known = dict(asked.known)
     if has_loop:
-        named = replace(loop, plant=None).loops()[0]
-        known |= {"controller": named.controller, "limit": loop.limit}
-        recording = read_recording(asked.file, **columns)
-        findings = grave_findings([asked.file], loop.checks([recording], [named]))
+        named = replace(loop, plant=None).loops()
+        known |= {"controller": [one.controller for one in named], "limit": loop.limit}
+        recordings = [read_recording(file, **columns) for file in asked.files]
+        findings = grave_findings(asked.files, loop.checks(recordings, named))
         for finding in findings:
             if finding["severity"] == "refused":
                 raise NotIdentifiableError(finding["message"])
     else:
         _refuse_loop(loop)
-        recording = read_recording(
-            asked.file, **{**columns, "command": columns["command"] or "auto"}
-        )
+        columns["command"] = columns["command"] or "auto"
+        recordings = [read_recording(file, **columns) for file in asked.files]
     with stages(1, quiet=as_json) as begin:
         begin("comparing plants")
-        fit = estimate_delay(recording, window=asked.window, **known)
+        fit = estimate_delay(recordings, window=list(asked.windows), **known)
     if asked.plot is not None:
         figure, axes = new_figure(7.0, 4.6, rows=2)
         fit.plot(axes)
@@ -164,7 +169,7 @@ def next_command(fit: PlantEstimate, asked: Asked) -> str:
         return _design(fit, advice.controller)
     if advice.options:
         return asked.again(advice.options)
-    return asked.again(plot=f"{asked.file.stem}.png") if advice.draw else ""
+    return asked.again(plot=f"{asked.files[0].stem}.png") if advice.draw else ""
 
 
 def _design(fit: PlantEstimate, controller: str) -> str:

@@ -43,7 +43,7 @@ from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
 from deadtime.estimation.evidence._candidate import PlantCandidate
 from deadtime.estimation.evidence._estimate import PlantEstimate
-from deadtime.estimation.evidence._numbers import LoopView
+from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
 from deadtime.estimation.evidence._words import Advice
 from deadtime.estimation.fit._profile import unit_of as unit_of
@@ -87,6 +87,7 @@ __all__ = [
     "Decrement",
     "DelayEstimate",
     "DelayTrack",
+    "FittedRecording",
     "FittedRun",
     "Frequency",
     "Graphical",

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, overload
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime._base.validation import OpenRange
 from deadtime.estimation._findings import bound, command_on_its_row, loop_as_seen
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._estimate import PlantEstimate
@@ -75,12 +74,12 @@ def estimate_delay(
 
 @overload
 def estimate_delay(
-    recording: Recording,
+    recording: Recordings,
     loop: None = None,
     *,
-    window: OpenRange | None = None,
+    window: Windows = None,
     plant: str | None = None,
-    controller: Controller | None = None,
+    controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
@@ -98,7 +97,7 @@ def estimate_delay(
     free: Sequence[str] = FREE,
     window: Any = None,
     plant: str | None = None,
-    controller: Controller | None = None,
+    controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
@@ -116,8 +115,8 @@ def estimate_delay(
     ----------
     recording : Recording or list of Recording
         Reference, output and command over time, as logged where the controller runs. Without
-        `loop` it has a command, and needs no reference. Several recordings of one vehicle are
-        fitted together, by ``"output_error"`` and ``"waveform"``.
+        `loop` it has a command, and needs no reference. Several recordings of one plant are fitted
+        together: without `loop`, or by ``"output_error"`` and ``"waveform"``.
     loop : ControlLoop or list of ControlLoop, optional
         What is known: plant, controller gains, sample time, limit; the delay is None or a guess.
         One for all recordings, or one each.
@@ -161,9 +160,10 @@ def estimate_delay(
         ``"integrator"``, ``"integrator, lag"``, ``"integrator, two lags"``, or one that ends in
         ``"lag, zero"`` or ``"two lags, zero"``. Whether another explains the recording clearly
         better is said.
-    controller : Controller, optional
-        Without `loop`: the controller that computes the command from the output, if it is known.
-        The command of a P controller need not be logged.
+    controller : Controller or list of them, optional
+        Without `loop`: the controller that computes the command from the output, if it is known;
+        one for all recordings, or a list with one each. The command of a P controller need not be
+        logged, and is moved where it was logged a row late or early.
     limit : float, optional
         Largest size of the command of `controller`.
     closed_loop : bool, optional
@@ -262,12 +262,6 @@ def estimate_delay(
     if loop is None:
         if method != "auto" or free is not FREE:
             raise ValueError("method and free are for a loop: give the loop, or leave them out")
-        if not isinstance(recording, Recording):
-            if not recording:
-                raise ValueError("no recording was given: give one")
-            raise TypeError(
-                "without a loop one Recording is taken, not a list: give the loop to fit several"
-            )
         return estimate_by_evidence(
             recording, window=window, between=between, progress=progress, **known
         )

@@ -11,12 +11,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from deadtime._base.digits import shown
 from deadtime.estimation._result import REASONS, DelayEstimate
+from deadtime.estimation.data._on_its_row import on_its_row, rows_off
 from deadtime.estimation.methods._method import Run
-from deadtime.recordings import Columns, Finding, Recording
+from deadtime.recordings import Finding
 
 #: Share of the 95 % interval of the delay by which a finding may move it unsaid. Larger: intervals
 #: hold the truth less often than they say; smaller: answers that hold are doubted.
@@ -24,9 +23,6 @@ WORTH = 0.25
 
 #: Findings that concern a fit of the loop, and not one of the response to a logged command.
 OF_THE_LOOP = ("command_differs", "command_gain", "command_offset", "output_range", "rows_repeated")
-
-#: Rows further apart than so many times the usual are not neighbours.
-NEIGHBOURS = 1.5
 
 
 def command_on_its_row(run: Run) -> Run:
@@ -37,35 +33,16 @@ def command_on_its_row(run: Run) -> Run:
     assert run.check is not None
     if run.recording.sent is not None:
         return run
-    ways = {"command_late": ("late", 1), "command_early": ("early", -1)}
-    for code in (finding.code for finding in run.check.findings):
-        if code not in ways:
-            continue
-        way, rows = ways[code]
-        said = (
-            f"the command was logged one row {way}, as the law of the controller shows, and was "
-            f"moved by {shown(run.check.row_time, math.nan, 's')}"
-        )
-        recording = _moved(run, rows)
-        check = recording.check(run.loop, run.window)
-        return run._replace(recording=recording, check=check, corrected=(*run.corrected, said))
-    return run
-
-
-def _moved(run: Run, rows: int) -> Recording:
-    """The recording with each command taken so many rows later; by the law where there is none."""
-    recording, check = run.recording, run.check
-    assert recording.command is not None
-    assert check is not None
-    time, command = recording.time, recording.command
-    largest = run.loop.limit or check.limit_seen or float(np.max(np.abs(command)))
-    columns = Columns(time, recording.reference, recording.output, None)
-    law = columns.commands(run.loop.replace(limit=largest))
-    assert law is not None
-    wanted = np.arange(time.size) + rows
-    places = np.clip(wanted, 0, time.size - 1)
-    known = (places == wanted) & (np.abs(time[places] - time) < NEIGHBOURS * check.row_time)
-    return replace(recording, command=np.where(known, command[places], law))
+    rows = rows_off(run.check)
+    if not rows:
+        return run
+    said = (
+        f"the command was logged one row {'late' if rows > 0 else 'early'}, as the law of the "
+        f"controller shows, and was moved by {shown(run.check.row_time, math.nan, 's')}"
+    )
+    recording = on_its_row(run.recording, run.loop, run.check)
+    check = recording.check(run.loop, run.window)
+    return run._replace(recording=recording, check=check, corrected=(*run.corrected, said))
 
 
 def loop_as_seen(run: Run, *, of_loop: bool) -> Run:

@@ -1,7 +1,8 @@
 //! Bindings of the family of plants of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Between, Candidate, Class, Family, FamilyNoise, Grade, Question, Record, fit_family as fit,
+    Between, Candidate, Class, Family, FamilyNoise, Grade, Named, Question, Record,
+    fit_family as fit,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -37,15 +38,18 @@ pub(crate) struct FamilyCandidate {
     ar: Vec<f64>,
     ma: Vec<f64>,
     noise_std: f64,
+    /// Of each record.
+    noise_stds: Vec<f64>,
     innovation_std: f64,
     deviance: f64,
     bic: f64,
     parameters: usize,
     told: usize,
     whiteness: f64,
-    residuals: Array,
-    fitted: Array,
-    at_limit: bool,
+    /// Of each record.
+    residuals: Vec<Array>,
+    fitted: Vec<Array>,
+    limit: &'static str,
 }
 
 impl FamilyCandidate {
@@ -72,15 +76,16 @@ impl FamilyCandidate {
             ar: one.coefficients.ar[..order].to_vec(),
             ma: one.coefficients.ma[..order].to_vec(),
             noise_std: one.deviation,
+            noise_stds: one.deviations.clone(),
             innovation_std: one.innovation,
             deviance: one.deviance,
             bic: one.bic,
             parameters: one.parameters,
             told: one.told,
             whiteness: one.white,
-            residuals: array(&one.residuals),
-            fitted: array(&one.fitted),
-            at_limit: one.at_limit,
+            residuals: one.residuals.iter().map(|own| array(own)).collect(),
+            fitted: one.fitted.iter().map(|own| array(own)).collect(),
+            limit: one.limit.unwrap_or(""),
         }
     }
 }
@@ -90,6 +95,7 @@ impl FamilyCandidate {
 pub(crate) struct FamilyFit {
     core: Family,
     omega: Vec<f64>,
+    level: f64,
     #[pyo3(get)]
     candidates: Vec<Py<FamilyCandidate>>,
 }
@@ -140,8 +146,8 @@ impl FamilyFit {
     }
 
     #[getter]
-    fn first_row(&self) -> usize {
-        self.core.first_row
+    fn first_rows(&self) -> Vec<usize> {
+        self.core.first_rows.clone()
     }
 
     #[getter]
@@ -174,9 +180,19 @@ impl FamilyFit {
 
     #[getter]
     fn hull<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        named(py, &self.core.hull)
+    }
+
+    /// The intervals at another level.
+    fn hull_at<'py>(&self, py: Python<'py>, level: f64) -> PyResult<Bound<'py, PyDict>> {
+        named(py, &run_here(py, |task| self.core.hull_at(level, task))?)
+    }
+
+    /// The pieces of each interval at a level, where it is not one.
+    fn pieces_at<'py>(&self, py: Python<'py>, level: f64) -> PyResult<Bound<'py, PyDict>> {
         let out = PyDict::new(py);
-        for one in &self.core.hull {
-            out.set_item(one.name, (one.low, one.high))?;
+        for one in run_here(py, |task| self.core.hull_at(level, task))? {
+            out.set_item(one.name, one.pieces)?;
         }
         Ok(out)
     }
@@ -207,7 +223,13 @@ impl FamilyFit {
     }
 
     /// Gain, phase and equivalent delay at frequencies; each a list of values, lower and upper ends.
-    fn at<'py>(&self, py: Python<'py>, omega: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
+    #[pyo3(signature = (omega, level=None))]
+    fn at<'py>(
+        &self,
+        py: Python<'py>,
+        omega: Vec<f64>,
+        level: Option<f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         if let Some(wrong) = omega
             .iter()
             .find(|omega| !(omega.is_finite() && **omega > 0.0))
@@ -216,7 +238,9 @@ impl FamilyFit {
                 "frequency {wrong} rad/s: give frequencies above 0"
             )));
         }
-        let found = run_here(py, |task| self.core.at(&omega, task))?;
+        let found = run_here(py, |task| {
+            self.core.at(&omega, level.unwrap_or(self.level), task)
+        })?;
         let out = PyDict::new(py);
         for (name, of) in [("gain", 0), ("phase", 1), ("delay", 2)] {
             let parts = |part: fn(&(f64, f64, f64)) -> f64| {
@@ -236,6 +260,14 @@ impl FamilyFit {
     }
 }
 
+fn named<'py>(py: Python<'py>, all: &[Named]) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    for one in all {
+        out.set_item(one.name, (one.low, one.high))?;
+    }
+    Ok(out)
+}
+
 fn between(kind: &str) -> PyResult<Between> {
     match kind {
         "held" => Ok(Between::Held),
@@ -251,33 +283,36 @@ fn unknown<T>(what: &str, name: &str, found: Option<T>) -> PyResult<T> {
     found.ok_or_else(|| PyValueError::new_err(format!("{what} {name:?} is not known")))
 }
 
-/// Fit the family of plants to the rows of a record.
+/// A record: times, commands, outputs, and how many first rows are used as input only.
+type Columns<'py> = (Floats<'py>, Floats<'py>, Floats<'py>, usize);
+
+/// Fit the family of plants to records of one plant.
 #[pyfunction]
-#[pyo3(signature = (time, command, output, *, kind="held", controller=false, at_rest=None,
-    largest_delay=None, earlier=0, plant=None, noise=None, level=0.95, omega=None, progress=None))]
+#[pyo3(signature = (records, *, kind="held", controller=false, at_rest=None, largest_delay=None,
+    plant=None, noise=None, level=0.95, omega=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "given by name")]
 pub(crate) fn fit_family(
     py: Python<'_>,
-    time: Floats<'_>,
-    command: Floats<'_>,
-    output: Floats<'_>,
+    records: Vec<Columns<'_>>,
     kind: &str,
     controller: bool,
     at_rest: Option<bool>,
     largest_delay: Option<f64>,
-    earlier: usize,
     plant: Option<&str>,
     noise: Option<&str>,
     level: f64,
     omega: Option<Vec<f64>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<FamilyFit> {
-    let record = Record {
-        time: owned(&time)?,
-        command: owned(&command)?,
-        output: owned(&output)?,
-        earlier,
+    let record = |(time, command, output, earlier): &Columns<'_>| {
+        PyResult::Ok(Record {
+            time: owned(time)?,
+            command: owned(command)?,
+            output: owned(output)?,
+            earlier: *earlier,
+        })
     };
+    let records: Vec<Record> = records.iter().map(record).collect::<PyResult<_>>()?;
     let class = plant.map(|name| unknown("plant", name, Class::named(name)));
     let noise = noise.map(|name| unknown("noise", name, FamilyNoise::named(name)));
     let question = Question {
@@ -290,12 +325,14 @@ pub(crate) fn fit_family(
         level,
     };
     let core = run(py, Some(1), progress.as_ref(), |task| {
-        fit(&record.checked()?, &question, task)
+        let records = records.into_iter().map(Record::checked);
+        fit(&records.collect::<Result<Vec<_>, _>>()?, &question, task)
     })?;
     let candidates = core.candidates.iter();
     let candidates = candidates.map(|one| Py::new(py, FamilyCandidate::new(py, one)));
     Ok(FamilyFit {
         candidates: candidates.collect::<PyResult<_>>()?,
+        level,
         omega: omega.unwrap_or_else(|| core.excited.clone()),
         core,
     })

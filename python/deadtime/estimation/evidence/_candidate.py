@@ -67,7 +67,7 @@ class PlantCandidate(ReadOnlyArrays):
             kind += f", after a lag of {' and one of '.join(lags)}"
         elif lags:
             kind += f", time constant{'s' if len(lags) > 1 else ''} {' and '.join(lags)}"
-        if numbers.get("zero"):
+        if "zero" in numbers:
             kind += f", zero {_time(numbers['zero'])}"
         return kind
 

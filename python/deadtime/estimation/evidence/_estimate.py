@@ -50,8 +50,8 @@ class PlantEstimate(FoundPlant, Pictured):
     determined, asked : int
         How many numbers the recording determines, and how many the likeliest plant has.
     shift : int
-        Rows by which the command was moved, because it was logged so much late (above zero) or
-        early.
+        Rows by which the command was moved: below zero where it was logged late, above zero where
+        it was logged early.
     at_rest : bool
         Whether the plant was taken to be at rest at the first row.
     excited : ndarray
@@ -60,6 +60,9 @@ class PlantEstimate(FoundPlant, Pictured):
         The rows that were used, and those before them.
     fitted, residuals : ndarray, shape (n,)
         Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
+    others : tuple of FittedRecording
+        The further recordings of a joint estimate; `recording`, `fitted` and `residuals` are those
+        of the first, `runs` has all.
 
     See Also
     --------
@@ -121,6 +124,7 @@ class PlantEstimate(FoundPlant, Pictured):
             "shift": self.shift,
             "at_rest": self.at_rest,
             "noise_std": self.noise_std,
+            "recordings": [{"noise_std": run.noise_std} for run in self.runs],
         }
         return {name: plain(value) for name, value in found.items()}
 

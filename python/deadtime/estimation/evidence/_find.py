@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -13,29 +13,29 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
-from deadtime.estimation.evidence._question import Between, Question, question_of
+from deadtime.estimation.evidence._numbers import FittedRecording
+from deadtime.estimation.evidence._question import Between, Question, questions_of
 from deadtime.estimation.evidence._words import CLEAR, reason_of
 from deadtime.loops import Controller
 from deadtime.recordings import Recording
 
 
 def estimate_by_evidence(
-    recording: Recording,
+    recording: Recording | Sequence[Recording],
     *,
-    window: OpenRange | None = None,
+    window: OpenRange | Sequence[OpenRange | None] | None = None,
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
     between: Between = "undecided",
     plant: str | None = None,
-    controller: Controller | None = None,
+    controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate:
-    """The plant that a recording shows; what is not given is taken from the recording."""
-    question = question_of(
-        recording, window, closed_loop, at_rest, largest_delay, between, plant, controller, limit
-    )
+    """The plant that recordings show; what is not given is taken from them."""
+    known = {"at_rest": at_rest, "largest_delay": largest_delay, "between": between, "plant": plant}
+    question = questions_of(recording, window, controller, limit, closed_loop, known)
     found = question.answer(progress=progress)
     better = None if plant is None else _clearly_better(question, found)
     return estimate_of(question, found, better)
@@ -55,7 +55,7 @@ def estimate_of(
     answering = [one for one in found.candidates if one.values[one.names.index("gain")] != 0.0]
     candidates = tuple(candidate_of(one, answering[0].bic) for one in answering)
     first, best = (answering[0], candidates[0]) if answering else (None, None)
-    unknown = np.full(len(question.recording), math.nan)
+    runs = [_run(one, first, place) for place, one in enumerate(question.each)]
     numbers: dict[str, Any] = {
         "delay": math.nan if best is None else best.delay,
         "plant": None if best is None else best.plant,
@@ -63,9 +63,7 @@ def estimate_of(
     }
     return PlantEstimate(
         verdict=cast(Verdict, found.verdict),
-        reason=reason_of(
-            found.reason, found.reason_size, found.told, found.asked, numbers["delay"]
-        ),
+        reason=reason_of(found.reason, found, _is_one_step(question)),
         **numbers,
         crossover=found.crossover,
         largest_gain=found.largest_gain,
@@ -73,12 +71,14 @@ def estimate_of(
         intervals={name: (float(low), float(high)) for name, (low, high) in found.hull.items()},
         determined=found.told,
         asked=found.asked,
-        shift=found.shift,
+        shift=found.shift + question.shift,
         at_rest=found.at_rest,
         excited=np.array(found.excited, dtype=float),
         recording=question.recording,
-        fitted=unknown if first is None else np.array(first.fitted),
-        residuals=unknown.copy() if first is None else np.array(first.residuals),
+        fitted=runs[0].fitted,
+        residuals=runs[0].residuals,
+        others=tuple(runs[1:]),
+        _own_noise=runs[0].noise_std,
         _code=found.reason,
         _question=question,
         _better=better,
@@ -89,3 +89,17 @@ def estimate_of(
         ),
         _native=[found],
     )
+
+
+def _is_one_step(question: Question) -> bool:
+    """Whether the command changes once, in one recording."""
+    return not question.others and np.count_nonzero(np.diff(question.command)) == 1
+
+
+def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:
+    """One of the recordings with what the likeliest plant explains of it."""
+    if first is None:
+        unknown = np.full(len(question.recording), math.nan)
+        return FittedRecording(question.recording, unknown, unknown.copy(), math.nan)
+    fitted, residuals = np.array(first.fitted[place]), np.array(first.residuals[place])
+    return FittedRecording(question.recording, fitted, residuals, first.noise_stds[place])

@@ -45,6 +45,26 @@ class LoopView(ReadOnlyArrays):
     delay_ci: Array
 
 
+@dataclass(frozen=True, eq=False)
+class FittedRecording(ReadOnlyArrays):
+    """A further recording of the plant, and what the likeliest plant explains of it.
+
+    Attributes
+    ----------
+    recording : Recording
+        The rows that were used, and those before them.
+    fitted, residuals : ndarray, shape (n,)
+        Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
+    noise_std : float
+        Standard deviation of the residuals, in the unit of the output.
+    """
+
+    recording: Recording
+    fitted: Array
+    residuals: Array
+    noise_std: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FoundPlant(ReadOnlyArrays):
     """The plant that a recording shows, as numbers: the attributes of `PlantEstimate`."""
@@ -66,6 +86,8 @@ class FoundPlant(ReadOnlyArrays):
     recording: Recording
     fitted: Array
     residuals: Array
+    others: tuple[FittedRecording, ...] = ()
+    _own_noise: float = math.nan
     _code: str = ""
     _question: Question = field(kw_only=True)
     _better: PlantCandidate | None = None
@@ -85,8 +107,14 @@ class FoundPlant(ReadOnlyArrays):
         return self._better
 
     @property
+    def runs(self) -> tuple[FittedRecording, ...]:
+        """All recordings with what is explained of each, the first one included."""
+        own = FittedRecording(self.recording, self.fitted, self.residuals, self._own_noise)
+        return (own, *self.others)
+
+    @property
     def noise_std(self) -> float:
-        """Standard deviation of the residuals, in the unit of the output."""
+        """Standard deviation of the residuals of all recordings, in the unit of the output."""
         return self.best.noise_std if self.candidates else math.nan
 
     @property
@@ -128,15 +156,38 @@ class FoundPlant(ReadOnlyArrays):
             If the verdict is ``"none"``, the level is not between 0 and 1, or there is no such
             interval.
         """
+        self._check(level, name)
+        low, high = self.intervals[name] if level == 0.95 else self._answer().hull_at(level)[name]
+        return float(low), float(high)
+
+    def pieces(self, name: str = "delay", level: float = 0.95) -> tuple[tuple[float, float], ...]:
+        """The pieces of an interval, where the values between them are ruled out.
+
+        Parameters
+        ----------
+        name : str
+            As for `ci`, which gives the lowest and the highest end.
+        level : float
+            Between 0 and 1.
+
+        Returns
+        -------
+        tuple of (float, float)
+            In order. There are several where minima of the likelihood are far from each other, such
+            as delays that differ by a period of the command.
+        """
+        self._check(level, name)
+        return tuple((float(a), float(b)) for a, b in self._answer().pieces_at(level)[name])
+
+    def _check(self, level: float, name: str) -> None:
+        """Refuse an interval that there is not."""
         if not 0.0 < level < 1.0:
             raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
         if self.verdict == "none":
             raise ValueError(f"no interval: {self.reason}")
-        found = self.intervals if level == 0.95 else self._question.answer(level).hull
-        if name not in found:
-            raise ValueError(f"{name!r} has no interval, there are those of {', '.join(found)}")
-        low, high = found[name]
-        return float(low), float(high)
+        if name not in self.intervals:
+            names = ", ".join(self.intervals)
+            raise ValueError(f"{name!r} has no interval, there are those of {names}")
 
     def value(self, name: str) -> float:
         """The number that an interval belongs to.

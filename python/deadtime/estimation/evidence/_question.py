@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -12,7 +12,8 @@ import deadtime.estimation._native as native
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import OpenRange, open_interval, positive
+from deadtime._base.validation import OpenRange, is_range, open_interval, positive
+from deadtime.estimation.data._on_its_row import on_its_row, rows_off
 from deadtime.loops import Controller, ControlLoop, Integrator, P
 from deadtime.recordings import Columns, Recording
 
@@ -59,6 +60,10 @@ class Question(ReadOnlyArrays):
         The window as it was given, s.
     limit : float or None
         Largest size of the command of the controller.
+    shift : int
+        Rows by which the command was moved to those of its controller: above zero to later ones.
+    others : tuple of Question
+        Further recordings of the same plant; only what is of one recording counts in them.
     """
 
     recording: Recording
@@ -71,6 +76,13 @@ class Question(ReadOnlyArrays):
     controller: Controller | None = None
     window: OpenRange | None = None
     limit: float | None = None
+    shift: int = 0
+    others: tuple[Question, ...] = ()
+
+    @property
+    def each(self) -> tuple[Question, ...]:
+        """The question for each recording."""
+        return (self, *self.others)
 
     def answer(
         self,
@@ -79,15 +91,16 @@ class Question(ReadOnlyArrays):
         progress: Callable[[int], object] | None = None,
     ) -> native.FamilyFit:
         """Ask the kernel; every interval of the answer has this level."""
+        records = [
+            (one.recording.time, one.command, one.recording.output, one.earlier)
+            for one in self.each
+        ]
         return native.fit_family(
-            self.recording.time,
-            self.command,
-            self.recording.output,
+            records,
             kind=self.between,
             controller=self.closed_loop,
             at_rest=self.at_rest,
             largest_delay=self.largest_delay,
-            earlier=self.earlier,
             plant=self.plant,
             level=level,
             omega=tuple(omega),
@@ -100,8 +113,11 @@ class Question(ReadOnlyArrays):
 
     def options(self) -> dict[str, Any]:
         """What was given besides the recording, as arguments of `estimate_delay`."""
-        names = ("window", "controller", "limit", "at_rest", "largest_delay", "plant")
+        names = ("limit", "at_rest", "largest_delay", "plant")
         found = {name: getattr(self, name) for name in names}
+        for name in ("window", "controller"):
+            own = [getattr(one, name) for one in self.each]
+            found[name] = own[0] if own.count(own[0]) == len(own) else own
         if self.between != "undecided":
             found["between"] = self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):
@@ -124,22 +140,54 @@ class Question(ReadOnlyArrays):
         return self.recording.command
 
 
+def questions_of(
+    recording: Recording | Sequence[Recording],
+    window: OpenRange | Sequence[OpenRange | None] | None,
+    controller: Controller | Sequence[Controller] | None,
+    limit: float | None,
+    closed_loop: bool | None,
+    known: Mapping[str, Any],
+) -> Question:
+    """The question about one recording, or about several of one plant."""
+    recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    if not recordings:
+        raise ValueError("no recording was given: give one, or a list of them")
+    is_list = isinstance(window, (tuple, list)) and not (len(window) == 2 and is_range(window))
+    windows = _each("window", window, not is_list, len(recordings))
+    is_list = isinstance(controller, (tuple, list))
+    controllers = _each("controller", controller, not is_list, len(recordings))
+    first, *others = [
+        question_of(its, ends, closed_loop, own, limit, known)
+        for its, ends, own in zip(recordings, windows, controllers, strict=True)
+    ]
+    in_loop = any(asked.closed_loop for asked in (first, *others))
+    return replace(first, closed_loop=in_loop, others=tuple(others))
+
+
+def _each(name: str, given: Any, is_one: bool, number: int) -> list[Any]:
+    """What was given for all recordings, or one each, as a list."""
+    out = [given] * number if is_one else list(given)
+    if len(out) != number:
+        raise ValueError(
+            f"{number} recordings and {len(out)} of `{name}`: give one for all, or one each"
+        )
+    return out
+
+
 def question_of(
     recording: Recording,
     window: OpenRange | None,
     closed_loop: bool | None,
-    at_rest: bool | None,
-    largest_delay: float | None,
-    between: Between,
-    plant: str | None,
-    controller: Controller | None = None,
-    limit: float | None = None,
+    controller: Controller | None,
+    limit: float | None,
+    known: Mapping[str, Any],
 ) -> Question:
-    """Check what the caller has given."""
+    """Check what the caller has given of one recording."""
     if not isinstance(recording, Recording):
         raise TypeError(f"recording must be a Recording, got {type(recording).__name__}")
+    shift = 0
     if controller is not None:
-        recording = _with_command(recording, controller, limit)
+        recording, shift = _with_command(recording, controller, limit)
     elif limit is not None:
         raise ValueError(f"limit={limit!r} is that of a controller: give the controller too")
     if recording.command is None:
@@ -152,6 +200,7 @@ def question_of(
             "the commands of this recording have times of their own, which is not possible without "
             "a loop: give the loop, or the command of each row"
         )
+    plant, largest_delay = known.get("plant"), known.get("largest_delay")
     if plant is not None and plant not in PLANTS:
         raise ValueError(f"plant={plant!r} is not one of {', '.join(map(repr, PLANTS))}")
     if largest_delay is not None:
@@ -165,28 +214,32 @@ def question_of(
         part,
         rows.start,
         closed_loop,
-        at_rest,
-        largest_delay,
-        between,
-        plant,
-        controller,
-        window,
-        limit,
+        controller=controller,
+        window=window,
+        limit=limit,
+        shift=shift,
+        **known,
     )
 
 
-def _with_command(recording: Recording, controller: Controller, limit: float | None) -> Recording:
-    """The recording with the command that its controller computes, where none was logged."""
+def _with_command(
+    recording: Recording, controller: Controller, limit: float | None
+) -> tuple[Recording, int]:
+    """The recording with the command of its controller, and by how many rows it was moved."""
     loop = ControlLoop(Integrator(), controller, limit=limit)
-    if recording.command is not None:
-        return recording
-    if not (isinstance(controller, P) and recording.has_reference):
+    has_law = isinstance(controller, P) and recording.has_reference
+    if recording.command is None and not has_law:
         raise RecordingError(
             "the recording has no command; only that of a P controller follows from reference and "
             "output: name the column of the command"
         )
-    columns = Columns(recording.time, recording.reference, recording.output, None)
-    return replace(recording, command=columns.commands(loop))
+    if recording.command is None:
+        columns = Columns(recording.time, recording.reference, recording.output, None)
+        return replace(recording, command=columns.commands(loop)), 0
+    check = recording.check(loop) if has_law else None
+    if check is None or not (rows := rows_off(check)):
+        return recording, 0
+    return on_its_row(recording, loop, check), -rows
 
 
 def shows_controller(recording: Recording) -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import deadtime.estimation._native as native
 from deadtime._base.digits import between, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange
@@ -56,6 +57,8 @@ class Advice(ReadOnlyArrays):
         Kind of controller to design, ``"P"`` or ``"PI"``; empty where none can be.
     draw : bool
         Whether to look at the residuals.
+    asked : str
+        The variable of the recording, ``"recordings"`` for several.
     """
 
     words: str
@@ -63,6 +66,7 @@ class Advice(ReadOnlyArrays):
     given: dict[str, Any] = field(default_factory=dict)
     controller: str = ""
     draw: bool = False
+    asked: str = "recording"
 
     @property
     def statement(self) -> str:
@@ -70,7 +74,7 @@ class Advice(ReadOnlyArrays):
         if self.options:
             named = {**self.given, **self.options}
             asked = "".join(f", {name}={_python(value)}" for name, value in named.items())
-            return f"dtm.estimate_delay(recording{asked})"
+            return f"dtm.estimate_delay({self.asked}{asked})"
         if self.controller:
             kind, gains = f"dtm.{self.controller}", ", ".join(["1.0"] * len(self.controller))
             return f"dtm.design(fit.loop({kind}({gains})), controller={kind}, delay=fit.ci())"
@@ -79,23 +83,39 @@ class Advice(ReadOnlyArrays):
 
 def _python(value: Any) -> str:
     """A value as Python writes it where the package is `dtm`."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_python, value))}]"
     return f"dtm.{value!r}" if isinstance(value, Controller) else repr(value)
 
 
-def reason_of(code: str, size: float, determined: int, asked: int, delay: float) -> str:
+#: Reasons that are those of one step, if the command is one.
+FEW_NUMBERS = ("too few told", "classes contradict", "crossover not told")
+
+
+def reason_of(code: str, found: native.FamilyFit, is_one_step: bool) -> str:
     """Why an estimate is not reliable, in a sentence."""
+    size, determined, asked = found.reason_size, found.told, found.asked
+    if is_one_step and code in FEW_NUMBERS:
+        return (
+            "one step does not distinguish two lags from a dead time and a lag, and the largest "
+            "stable gain depends on that"
+        )
     sentences: Mapping[str, str] = {
         "": "",
         "too few told": "the command moves too little: the recording determines "
-        f"{determined} of the {asked} numbers of the plant",
+        f"{determined} of the {asked} numbers of the plant"
+        if determined < asked
+        else "the command is one sine, which determines gain and phase at its frequency alone",
         "classes contradict": "plants of different kinds explain the recording alike and differ "
         "where a loop crosses over",
         "residuals not white": "what the plant leaves unexplained is no noise of a sensor: there "
         "is a disturbance, or the plant is of another kind",
         "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
         "2 ln L), and was moved",
-        "delay at its limit": "a number of the plant is at the limit of what is tried (dead time "
-        f"{delay:.4g} s)",
+        "delay at its limit": f"the dead time, {size:.4g} s, is at the limit of what is tried",
+        "lag at its limit": f"a time constant, {size:.4g} s, is at the limit of what is tried, far "
+        "longer than the recording",
+        "zero at its limit": f"the zero, {size:.4g} s, is at the limit of what is tried",
         "crossover not told": "the largest stable gain is not known to a factor of 2",
         "no response": "the output does not respond to the command",
     }
@@ -181,17 +201,26 @@ def _beside(fit: FoundPlant) -> list[str]:
         lines.append(f"second: {second.in_words()}; {clear}, by {second.behind:.3g} in BIC")
     if fit.shift:
         lines.append(
-            f"the command is {abs(fit.shift)} row {'late' if fit.shift > 0 else 'early'} in the "
+            f"the command is {abs(fit.shift)} row {'early' if fit.shift > 0 else 'late'} in the "
             "recording, and was moved"
         )
-    rows = int((~_isnan(fit.residuals)).sum())
-    if rows:
-        lines.append(f"unexplained: {fit.noise_std:.3g} (standard deviation) in {rows} rows")
+    for place, run in enumerate(fit.runs, 1):
+        rows = int((~_isnan(run.residuals)).sum())
+        where = f" of recording {place}" if fit.others else ""
+        if rows:
+            lines.append(
+                f"unexplained: {run.noise_std:.3g} (standard deviation) in {rows} rows{where}"
+            )
     return lines
 
 
 def advice_on(fit: FoundPlant) -> Advice:
     """What to do next, by why the estimate is not reliable."""
+    advice = _advice_on(fit)
+    return replace(advice, asked="recordings") if fit.others else advice
+
+
+def _advice_on(fit: FoundPlant) -> Advice:
     if fit.verdict == "reliable":
         if fit.best.name == "delay":
             return Advice("nothing: the output is the command, later")
@@ -219,7 +248,7 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
         return Advice(words)
     if fit._code == "no response":
         return Advice("look whether these are the right columns", draw=True)
-    window = _reliable_part(fit._question)
+    window = None if fit.others else _reliable_part(fit._question)
     if window is not None:
         ends = " to ".join(f"{end:g}" for end in window)
         words = f"from {ends} s the recording is explained: use that part"
@@ -242,10 +271,13 @@ def _reliable_part(question: Question) -> OpenRange | None:
 
 def _moves_in(fit: FoundPlant) -> bool:
     """Whether the command changes in the rows that count."""
-    used = ~_isnan(fit.residuals)
-    first = int(used.argmax()) if used.any() else 0
-    command = fit._question.command[max(first - 1, 0) :]
-    return bool((command != command[0]).any())
+    for run, question in zip(fit.runs, fit._question.each, strict=True):
+        used = ~_isnan(run.residuals)
+        first = int(used.argmax()) if used.any() else 0
+        command = question.command[max(first - 1, 0) :]
+        if bool((command != command[0]).any()):
+            return True
+    return False
 
 
 def _isnan(values: Any) -> Any:

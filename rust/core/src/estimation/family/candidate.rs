@@ -40,6 +40,7 @@ pub struct Candidate {
     pub dispersion: f64,
     /// The quantile that goes with the standard errors.
     pub quantile: f64,
+    freedom: f64,
     /// −2 ln L.
     pub deviance: f64,
     /// −2 ln L and ln n for each number.
@@ -48,18 +49,20 @@ pub struct Candidate {
     pub parameters: usize,
     /// How many numbers of the plant the input tells.
     pub told: usize,
-    /// Is a number at the end of its range?
-    pub at_limit: bool,
+    /// The number at the end of its range, if one is.
+    pub limit: Option<&'static str>,
     /// Probability that white residuals are correlated as much.
     pub white: f64,
     /// Standard deviation of the residuals, and of one-step errors.
     pub deviation: f64,
     /// That of one-step errors.
     pub innovation: f64,
-    /// Output less model, NaN where no row counts.
-    pub residuals: Vec<f64>,
-    /// The output of the model, NaN before the first row that counts.
-    pub fitted: Vec<f64>,
+    /// Of each record: output less model, NaN where no row counts.
+    pub residuals: Vec<Vec<f64>>,
+    /// Of each record: the output of the model, NaN where no row counts.
+    pub fitted: Vec<Vec<f64>>,
+    /// Of each record: standard deviation of the residuals.
+    pub deviations: Vec<f64>,
     /// Covariance of ln gain, delay, ln of the numbers of the lags, zero.
     pub(super) inner: Vec<f64>,
     row: f64,
@@ -75,7 +78,7 @@ impl Candidate {
             numbers: model.numbers(&point.x),
         };
         let noise = model.noise.coefficients(&point.x[model.plant_numbers()..]);
-        let count = rows.used.len();
+        let count = rows.count();
         let free = count.saturating_sub(model.parameters()).max(1) as f64;
         let variance = point.squares / free;
         let sensitivities = model.sensitivities(point);
@@ -87,6 +90,9 @@ impl Candidate {
         let inner = covariance(&information, &scales, factor);
         let scatter =
             |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
+        // Of one record the weight is 1, of several their sum of squares is that of white noise of size 1.
+        let weights = &rows.weights;
+        let mean_weight = (dot(weights, weights) / weights.len().max(1) as f64).sqrt();
         let mut out = Self {
             class: model.class,
             numbers: seen.numbers,
@@ -97,26 +103,36 @@ impl Candidate {
             covariance: Vec::new(),
             dispersion: factor,
             quantile: student_reach(level, freedom),
+            freedom,
             deviance: found.deviance,
             bic: found.bic,
             parameters: model.parameters(),
             told: told(&information, scales.len()),
-            at_limit: found.is_at_limit(),
+            limit: found.limit(),
             white: if is_rounding(point) {
                 1.0
             } else {
                 whiteness(&point.whitened, model.noise.searched())
             },
             deviation: scatter(&point.residual),
-            innovation: variance.sqrt(),
-            residuals: vec![f64::NAN; rows.time.len()],
-            fitted: vec![f64::NAN; rows.time.len()],
+            innovation: variance.sqrt() / mean_weight,
+            residuals: Vec::new(),
+            fitted: Vec::new(),
+            deviations: Vec::new(),
             inner,
             row: rows.row,
         };
-        for ((at, residual), output) in rows.used.iter().zip(&point.residual).zip(&rows.output) {
-            out.residuals[*at] = *residual;
-            out.fitted[*at] = output + rows.mean - residual;
+        for (part, place) in rows.parts.iter().zip(rows.places()) {
+            let own = &point.residual[place];
+            let mut residuals = vec![f64::NAN; part.time.len()];
+            let mut fitted = residuals.clone();
+            for ((at, residual), output) in part.used.iter().zip(own).zip(&part.output) {
+                residuals[*at] = *residual;
+                fitted[*at] = output + part.mean - residual;
+            }
+            out.deviations.push(scatter(own));
+            out.residuals.push(residuals);
+            out.fitted.push(fitted);
         }
         out.name_values();
         out
@@ -155,6 +171,14 @@ impl Candidate {
             })
             .map(|(at, factor)| factor * self.inner[at])
             .collect();
+    }
+
+    /// The same with intervals of another level.
+    pub(super) fn at_level(&self, level: f64) -> Self {
+        Self {
+            quantile: student_reach(level, self.freedom),
+            ..self.clone()
+        }
     }
 
     /// Standard errors of the values.
@@ -199,7 +223,7 @@ impl Candidate {
 
 /// Are the residuals smaller than what is taken for the rounding of the output?
 fn is_rounding(point: &Point) -> bool {
-    2.0 * dot(&point.whitened, &point.whitened) < point.squares
+    dot(&point.whitened, &point.whitened) < point.squares
 }
 
 /// WᵀW/σ² in the scale of each number.

@@ -3,6 +3,8 @@
 //! Two lags and a pair of complex poles are one class, by the sum p and the product q of the time
 //! constants, so that nothing ends where the poles meet.
 
+use super::tolerances::STARTS;
+
 /// A class of plants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Class {
@@ -72,6 +74,15 @@ impl Class {
         self.integrating == other.integrating
             && self.order >= other.order
             && (self.has_zero || !other.has_zero)
+    }
+
+    /// How many starts or minima: those given, or more where only the delay is searched.
+    pub(super) fn starts(self, given: usize) -> usize {
+        if self.order == 0 {
+            STARTS.delays_only
+        } else {
+            given
+        }
     }
 
     /// How many numbers are searched: all but the gain.

@@ -5,7 +5,9 @@
 //! block has much leverage, the jackknife takes its place: gᵀ(I − A)⁻²g (m − 1)/m.
 
 use super::projection::Projection;
+
 use super::tolerances::BLOCKS;
+use crate::estimation::statistics::chi_squared_beyond;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::lu::Lu;
 use crate::linear_algebra::vectors::dot;
@@ -50,6 +52,14 @@ pub(super) fn dispersion(
         corrected
     };
     let factor = sum / (p.max(1) as f64 * variance);
+    if chi_squared_beyond(factor * freedom, freedom) > BLOCKS.chance {
+        // As the model says, whose own scatter then counts as more blocks would.
+        let weight = 1.0 + BLOCKS.prior;
+        return (
+            ((factor + BLOCKS.prior) / weight).max(1.0),
+            weight * freedom,
+        );
+    }
     (if factor > 1.0 { factor } else { 1.0 }, freedom)
 }
 

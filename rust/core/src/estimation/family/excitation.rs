@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::projection::Projection;
-use super::rows::{Rows, Start};
+use super::rows::{Part, Rows, Start};
 use crate::elementary::sin_cos;
 use crate::linear_algebra::vectors::dot;
 
@@ -18,18 +18,25 @@ const SHARE: f64 = 0.01;
 /// Parts of a multiple to which a peak is found.
 const PARTS: usize = 16;
 
+/// The power of the command of one record.
+fn power(part: &Part, omega: f64) -> f64 {
+    let mean = part.command.iter().sum::<f64>() / part.command.len() as f64;
+    let (mut real, mut imaginary) = (0.0, 0.0);
+    for (t, u) in part.time.iter().zip(&part.command) {
+        let (sine, cosine) = sin_cos(omega * (t - part.time[0]));
+        real += (u - mean) * cosine;
+        imaginary += (u - mean) * sine;
+    }
+    real * real + imaginary * imaginary
+}
+
 /// The largest peaks of the spectrum of the command, rad/s, in order.
 pub(super) fn excited(rows: &Rows) -> Vec<f64> {
-    let count = rows.command.len() as f64;
-    let mean = rows.command.iter().sum::<f64>() / count;
     let power = |omega: f64| {
-        let (mut real, mut imaginary) = (0.0, 0.0);
-        for (t, u) in rows.time.iter().zip(&rows.command) {
-            let (sine, cosine) = sin_cos(omega * (t - rows.time[0]));
-            real += (u - mean) * cosine;
-            imaginary += (u - mean) * sine;
-        }
-        real * real + imaginary * imaginary
+        rows.parts
+            .iter()
+            .map(|part| power(part, omega))
+            .sum::<f64>()
     };
     let unit = TAU / rows.span;
     let most = MULTIPLES.min((0.5 * rows.span / rows.row) as usize);
@@ -71,7 +78,7 @@ pub(super) fn is_one_sine(rows: &Rows, excited: &[f64]) -> bool {
     let [omega] = excited else {
         return false;
     };
-    if rows.start != Start::Unknown {
+    if rows.parts.iter().any(|part| part.start != Start::Unknown) {
         return false;
     }
     let unit = TAU / rows.span;
@@ -90,19 +97,21 @@ pub(super) fn is_one_sine(rows: &Rows, excited: &[f64]) -> bool {
     least < PURE
 }
 
-/// What a sine and a constant leave of the command, as a share of its deviation.
+/// What a sine and a constant leave of the commands, as a share of their deviation.
 fn left_beside(rows: &Rows, omega: f64) -> f64 {
-    let waves: Vec<(f64, f64)> = rows
-        .time
-        .iter()
-        .map(|t| sin_cos(omega * (t - rows.time[0])))
-        .collect();
-    let ones = vec![1.0; waves.len()];
-    let constant = Projection::new(vec![ones.clone()]);
-    let sine = waves.iter().map(|wave| wave.0).collect();
-    let all = Projection::new(vec![ones, sine, waves.iter().map(|wave| wave.1).collect()]);
-    let (mut moving, mut left) = (rows.command.clone(), rows.command.clone());
-    constant.taken(&mut moving);
-    all.taken(&mut left);
-    (dot(&left, &left) / dot(&moving, &moving)).sqrt()
+    let (mut before, mut after) = (0.0, 0.0);
+    for part in &rows.parts {
+        let wave = |t: &f64| sin_cos(omega * (t - part.time[0]));
+        let waves: Vec<(f64, f64)> = part.time.iter().map(wave).collect();
+        let ones = vec![1.0; waves.len()];
+        let constant = Projection::new(vec![ones.clone()]);
+        let sine = waves.iter().map(|wave| wave.0).collect();
+        let all = Projection::new(vec![ones, sine, waves.iter().map(|wave| wave.1).collect()]);
+        let (mut moving, mut left) = (part.command.clone(), part.command.clone());
+        constant.taken(&mut moving);
+        all.taken(&mut left);
+        before += dot(&moving, &moving);
+        after += dot(&left, &left);
+    }
+    (after / before).sqrt()
 }

@@ -1,13 +1,13 @@
 //! The whole family fitted to one record: rows, minima, intervals, verdict.
 
 use super::candidate::Candidate;
-use super::class::Class;
+use super::class::{Class, Numbers};
 use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, Triple, at, hull, turning};
 use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
-use super::rows::{Record, Rows, Start};
-use super::tolerances::{EVIDENCE, RANGES};
+use super::rows::{Part, Record, Rows, Start};
+use super::tolerances::{EVIDENCE, RANGES, STARTS};
 use super::verdict::{Findings, Verdict, shifted, verdict};
 use crate::{Error, Task};
 
@@ -69,61 +69,101 @@ pub struct Family {
     pub decided: bool,
     /// Was the plant taken to be at rest at the first row?
     pub at_rest: bool,
-    /// Rows that count, and the first of them.
+    /// Rows that count.
     pub rows: usize,
-    /// The first of them.
-    pub first_row: usize,
+    /// The first of them in each record.
+    pub first_rows: Vec<usize>,
     /// Rows by which the command was moved, above 0 to later ones.
     pub shift: i64,
     /// Frequencies at which the command has power, rad/s.
     pub excited: Vec<f64>,
+    /// The largest delay that may be, that was tried in the end, and one over the noise of each record.
+    largest_delay: f64,
+    room: f64,
+    weights: Vec<f64>,
     minima: Vec<Candidate>,
 }
 
 impl Family {
+    /// Classes that are not hopeless, with their numbers.
+    fn seeds(&self) -> Vec<(Class, Numbers)> {
+        let best = self.candidates.first().map_or(0.0, |best| best.bic);
+        let own = self.candidates.iter();
+        own.filter(|one| one.bic <= best + EVIDENCE.hopeless)
+            .map(|one| (one.class, one.numbers))
+            .collect()
+    }
+
     /// Gain, phase and equivalent delay at frequencies, each with its ends.
     ///
     /// # Errors
     /// [`Error::Interrupted`] and [`Error::Memory`].
-    pub fn at(&self, omega: &[f64], task: &Task) -> Result<Vec<[Triple; 3]>, Error> {
-        let turning = turning(&self.minima, task)?;
+    pub fn at(&self, omega: &[f64], level: f64, task: &Task) -> Result<Vec<[Triple; 3]>, Error> {
+        let minima = self.minima_at(level)?;
+        let turning = turning(&minima, task)?;
         Ok(omega.iter().map(|omega| at(&turning, *omega)).collect())
+    }
+
+    /// The intervals at another level.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a level not between 0 and 1, [`Error::Interrupted`], [`Error::Memory`].
+    pub fn hull_at(&self, level: f64, task: &Task) -> Result<Vec<Named>, Error> {
+        let minima = self.minima_at(level)?;
+        Ok(hull(&turning(&minima, task)?, self.largest_delay))
+    }
+
+    fn minima_at(&self, level: f64) -> Result<Vec<Candidate>, Error> {
+        check_level(level)?;
+        Ok(self.minima.iter().map(|one| one.at_level(level)).collect())
     }
 }
 
-/// Fit the family.
+fn check_level(level: f64) -> Result<(), Error> {
+    refuse_if!(
+        !(level > 0.0 && level < 1.0),
+        "level {level}: give one between 0 and 1"
+    );
+    Ok(())
+}
+
+/// Fit the family to records of one plant, each with its own start, level and size of noise.
 ///
 /// # Errors
 /// [`Error::Argument`] for numbers out of range or too few rows, and as a task ends.
-pub fn fit_family(record: &Record, question: &Question, task: &Task) -> Result<Family, Error> {
+pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Result<Family, Error> {
+    let shortest = records
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.span()));
+    refuse_if!(records.is_empty(), "0 records: give at least one");
     if let Some(delay) = question.largest_delay {
         refuse_if!(
-            !(delay > 0.0 && delay <= record.span()),
-            "largest delay {delay} s: give one above 0 and below the length of the record, {} s",
-            record.span()
+            !(delay > 0.0 && delay <= shortest),
+            "largest delay {delay} s: give one above 0 and below the length of the record, {shortest} s"
         );
     }
-    refuse_if!(
-        !(question.level > 0.0 && question.level < 1.0),
-        "level {}: give one between 0 and 1",
-        question.level
-    );
-    let start = match question.at_rest {
+    check_level(question.level)?;
+    let start = |record: &Record| match question.at_rest {
         Some(true) => Start::Rest,
         None if record.begins_at_rest() => Start::Held,
         _ => Start::Unknown,
     };
+    let starts: Vec<Start> = records.iter().map(start).collect();
     let kinds: &[bool] = match question.between {
         Between::Held => &[false],
         Between::Straight => &[true],
+        Between::Undecided if records.iter().all(Record::jumps) => &[false],
         Between::Undecided => &[false, true],
     };
-    let mut found = Vec::with_capacity(kinds.len());
+    let mut found: Vec<Family> = Vec::with_capacity(kinds.len());
     for straight in kinds {
-        found.push(one_kind(record, question, start, *straight, task)?);
+        let known = found.first();
+        found.push(one_kind(
+            records, question, &starts, *straight, known, task,
+        )?);
     }
     let out = joined(found, task)?;
-    moved(record, question, start, &out, task).map(|moved| moved.unwrap_or(out))
+    moved(records, question, &starts, &out, task).map(|moved| moved.unwrap_or(out))
 }
 
 /// The more likely kind of command; where neither is, its intervals are those of both.
@@ -143,33 +183,46 @@ fn joined(mut found: Vec<Family>, task: &Task) -> Result<Family, Error> {
         out.decided = least(&other) - least(&out) > EVIDENCE.likely;
         if !out.decided {
             out.minima.extend(other.minima);
-            out.hull = hull(&turning(&out.minima, task)?);
+            out.hull = hull(&turning(&out.minima, task)?, out.largest_delay);
+        }
+        for candidate in other.candidates {
+            let is_known = out
+                .candidates
+                .iter()
+                .any(|own| own.class == candidate.class);
+            if !is_known {
+                out.candidates.push(candidate);
+            }
         }
     }
+    out.candidates.sort_by(|a, b| a.bic.total_cmp(&b.bic));
     Ok(out)
 }
 
 /// The family with the command a row earlier, where no delay is too much and that is better. In a
 /// closed loop it would be the controller.
 fn moved(
-    record: &Record,
+    records: &[Record],
     question: &Question,
-    start: Start,
+    starts: &[Start],
     found: &Family,
     task: &Task,
 ) -> Result<Option<Family>, Error> {
     let Some(best) = found.candidates.first() else {
         return Ok(None);
     };
-    if question.in_loop || best.numbers.delay > EARLY * record.row() {
+    let row = records.iter().map(Record::row).fold(0.0, f64::max);
+    if question.in_loop || best.numbers.delay > EARLY * row {
         return Ok(None);
     }
-    let mut earlier = record.clone();
-    earlier.command.rotate_left(1);
-    if let [.., before, last] = &mut earlier.command[..] {
-        *last = *before;
+    let mut earlier = records.to_vec();
+    for record in &mut earlier {
+        record.command.rotate_left(1);
+        if let [.., before, last] = &mut record.command[..] {
+            *last = *before;
+        }
     }
-    let mut out = one_kind(&earlier, question, start, found.straight, task)?;
+    let mut out = one_kind(&earlier, question, starts, found.straight, None, task)?;
     let fall = out
         .candidates
         .first()
@@ -196,59 +249,117 @@ fn leave_out_what_adds_nothing(minima: &mut Vec<Candidate>) {
     });
 }
 
-fn one_kind(
-    record: &Record,
-    question: &Question,
-    start: Start,
-    straight: bool,
-    task: &Task,
-) -> Result<Family, Error> {
-    let largest = question
-        .largest_delay
-        .unwrap_or(RANGES.delay_share * record.span());
-    let rows = |largest| Rows::new(record, start, largest, straight, question.in_loop);
-    let classes: Vec<Class> = match question.class {
+/// The classes and noises that are asked for.
+fn asked(question: &Question) -> (Vec<Class>, Vec<Noise>) {
+    let may_be = |class: &Class| !question.in_loop || class.integrating || class.order > 0;
+    let classes = match question.class {
         Some(class) => vec![class],
-        None => Class::all()
-            .filter(|class| !question.in_loop || class.integrating || class.order > 0)
-            .collect(),
+        None => Class::all().filter(may_be).collect(),
     };
-    let noises: Vec<Noise> = question
+    let noises = question
         .noise
         .map_or(Noise::ALL.to_vec(), |noise| vec![noise]);
-    let used = rows(largest);
-    refuse_if!(
-        used.used.len() < FEWEST_ROWS,
-        "{} rows count, those after the largest delay of {largest} s whose output is known; a fit needs \
-         {FEWEST_ROWS}: give more rows, or a smaller largest delay",
-        used.used.len()
-    );
-    let mut room = largest;
-    if start == Start::Unknown && question.largest_delay.is_none() {
+    (classes, noises)
+}
+
+fn one_kind(
+    records: &[Record],
+    question: &Question,
+    starts: &[Start],
+    straight: bool,
+    known: Option<&Family>,
+    task: &Task,
+) -> Result<Family, Error> {
+    let shortest = records
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.span()));
+    let largest = question
+        .largest_delay
+        .unwrap_or(RANGES.delay_share * shortest);
+    let (mut classes, noises) = asked(question);
+    let mut rows = Rows::new(records, starts, largest, straight, question.in_loop);
+    for part in &rows.parts {
+        refuse_if!(
+            part.used.len() < FEWEST_ROWS,
+            "{} rows count, those after the largest delay of {largest} s whose output is known; a fit \
+             needs {FEWEST_ROWS}: give more rows, or a smaller largest delay",
+            part.used.len()
+        );
+    }
+    let (mut room, mut seeds, mut weights);
+    if let Some(known) = known {
+        (room, seeds, weights) = (known.room, known.seeds(), known.weights.clone());
+        classes.retain(|class| seeds.iter().any(|(own, _)| own == class));
+    } else {
+        let thin = rows.thinned(STARTS.thin);
         let white = Plan {
-            rows: &used,
+            rows: &thin,
+            thin: &thin,
             classes: &classes,
             noises: &[Noise::White],
+            seeds: &[],
         };
-        let longest = longest_delay(&minima(&white, task)?);
-        room = room.min(ROOM.0 * longest + ROOM.1 * used.row);
+        let found = minima(&white, task)?;
+        (room, seeds, weights) = (largest, seeds_of(&found), weights_of(&found));
+        if starts.contains(&Start::Unknown) && question.largest_delay.is_none() {
+            room = room.min(ROOM.0 * longest_delay(&found) + ROOM.1 * rows.row);
+        }
     }
+    let mut rounds = 0;
     loop {
-        let used = rows(room);
+        if room < rows.largest_delay {
+            rows = Rows::new(records, starts, room, straight, question.in_loop);
+        }
+        rows.weights.clone_from(&weights);
+        let thin = rows.thinned(STARTS.thin);
         let plan = Plan {
-            rows: &used,
+            rows: &rows,
+            thin: &thin,
             classes: &classes,
             noises: &noises,
+            seeds: &seeds,
         };
         let found = minima(&plan, task)?;
         // Coloured noise may need a longer delay than the white noise of the first pass.
         if room < largest && longest_delay(&found) >= room {
             room = largest.min(2.0 * room);
+            rows = Rows::new(records, starts, room, straight, question.in_loop);
+            continue;
+        }
+        let now = weights_of(&found);
+        if rounds < REWEIGHTED && differ(&now, &weights) {
+            (seeds, weights) = (seeds_of(&found), now);
+            rounds += 1;
             continue;
         }
         let silent = without_plant(&plan, task)?;
-        return answer(&found, silent, question, task);
+        let mut out = answer(&found, silent, question, largest, task)?;
+        (out.room, out.weights) = (room, weights);
+        return Ok(out);
     }
+}
+
+/// Most times that records are weighted anew, and the change of a weight that asks for it.
+const REWEIGHTED: usize = 2;
+const CHANGED: f64 = 0.1;
+
+/// Classes and numbers of minima.
+fn seeds_of(found: &[Minimum<'_>]) -> Vec<(Class, Numbers)> {
+    let numbers = |one: &Minimum<'_>| (one.model.class, one.model.numbers(&one.point.x));
+    found.iter().map(numbers).collect()
+}
+
+/// One over the noise of each record, as the best class leaves it; one record has the weight 1.
+fn weights_of(found: &[Minimum<'_>]) -> Vec<f64> {
+    match found.first() {
+        Some(best) if best.model.rows.parts.len() > 1 => best.model.weights(&best.point),
+        _ => vec![1.0],
+    }
+}
+
+fn differ(new: &[f64], old: &[f64]) -> bool {
+    let mut pairs = new.iter().zip(old);
+    pairs.any(|(new, old)| (new / old - 1.0).abs() > CHANGED)
 }
 
 /// The longest delay of the minima that may be the true one, s.
@@ -282,6 +393,7 @@ fn answer(
     found: &[Minimum<'_>],
     silent: f64,
     question: &Question,
+    largest_delay: f64,
     task: &Task,
 ) -> Result<Family, Error> {
     let rows = found.first().map(|best| best.model.rows);
@@ -310,19 +422,22 @@ fn answer(
         response: silent - found.first().map_or(f64::INFINITY, |best| best.bic),
         is_sine: is_sine && question.class.is_none(),
     };
+    let parts = rows.map_or(&[][..], |rows| &rows.parts);
+    let first = |part: &Part| part.used.first().copied();
     Ok(Family {
         verdict: verdict(&turning(&likely, task)?, &evidence),
-        hull: hull(&turning(&minima, task)?),
+        hull: hull(&turning(&minima, task)?, largest_delay),
         candidates,
         straight: rows.is_some_and(|rows| rows.straight),
         decided: true,
-        at_rest: rows.is_some_and(|rows| rows.start != Start::Unknown),
-        rows: rows.map_or(0, |rows| rows.used.len()),
-        first_row: rows
-            .and_then(|rows| rows.used.first().copied())
-            .unwrap_or(0),
+        at_rest: parts.iter().all(|part| part.start != Start::Unknown),
+        rows: rows.map_or(0, Rows::count),
+        first_rows: parts.iter().filter_map(first).collect(),
         shift: 0,
         excited,
+        largest_delay,
+        room: largest_delay,
+        weights: Vec::new(),
         minima,
     })
 }

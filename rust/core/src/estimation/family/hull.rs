@@ -21,6 +21,8 @@ pub struct Named {
     pub low: f64,
     /// The upper end.
     pub high: f64,
+    /// Its pieces, where minima are so far apart that their intervals do not meet.
+    pub pieces: Vec<(f64, f64)>,
 }
 
 /// A candidate as the best one sees it: classes of the other kind have other signs and turns.
@@ -114,19 +116,25 @@ fn exponential((value, low, high): Triple) -> Triple {
     (exp(value), exp(low), exp(high))
 }
 
-/// Gain, phase and equivalent delay at a frequency, each with its ends, over all of these.
-pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [Triple; 3] {
-    let over = |of: &dyn Fn(&Turning<'_>, &Seen) -> f64| {
-        union(
-            all.iter()
-                .map(|one| one.candidate.interval(|seen| of(one, seen))),
-        )
+/// Gain, phase and equivalent delay of each at a frequency.
+fn parts_at(all: &[Turning<'_>], omega: f64) -> [Vec<Triple>; 3] {
+    let each = |of: &dyn Fn(&Turning<'_>, &Seen) -> f64| -> Vec<Triple> {
+        let parts = all.iter();
+        parts
+            .map(|one| one.candidate.interval(|seen| of(one, seen)))
+            .collect()
     };
+    let gains = each(&|_, seen| seen.log_gain(omega)).into_iter();
     [
-        exponential(over(&|_, seen| seen.log_gain(omega))),
-        over(&|one, seen| one.phase(seen, omega)),
-        over(&|one, seen| one.equivalent_delay(seen, omega)),
+        gains.map(exponential).collect(),
+        each(&|one, seen| one.phase(seen, omega)),
+        each(&|one, seen| one.equivalent_delay(seen, omega)),
     ]
+}
+
+/// The same over all, each with its ends.
+pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [Triple; 3] {
+    parts_at(all, omega).map(|parts| union(parts.into_iter()))
 }
 
 /// The first value with the least and the largest end.
@@ -135,8 +143,45 @@ fn union(parts: impl Iterator<Item = Triple>) -> Triple {
     parts.reduce(join).unwrap_or((f64::NAN, f64::NAN, f64::NAN))
 }
 
-/// The intervals of all quantities; the best candidate comes first.
-pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
+/// The intervals joined where they meet, in order.
+fn pieces(parts: &[Triple]) -> Vec<(f64, f64)> {
+    let mut sorted: Vec<(f64, f64)> = parts.iter().map(|part| (part.1, part.2)).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut out: Vec<(f64, f64)> = Vec::new();
+    for (low, high) in sorted {
+        match out.last_mut() {
+            Some(last) if low <= last.1 => last.1 = last.1.max(high),
+            _ => out.push((low, high)),
+        }
+    }
+    out
+}
+
+impl Named {
+    /// The hull of these parts, the best first.
+    fn new(name: &'static str, parts: Vec<Triple>) -> Self {
+        let (value, low, high) = union(parts.iter().copied());
+        Self {
+            name,
+            value,
+            low,
+            high,
+            pieces: pieces(&parts),
+        }
+    }
+
+    /// Nothing of it below zero, or above the largest.
+    fn within(mut self, largest: f64) -> Self {
+        (self.low, self.high) = (self.low.max(0.0), self.high.min(largest));
+        for (low, high) in &mut self.pieces {
+            (*low, *high) = (low.clamp(0.0, largest), high.clamp(0.0, largest));
+        }
+        self
+    }
+}
+
+/// The intervals of all quantities; the best candidate comes first. No delay is above the largest.
+pub(super) fn hull(all: &[Turning<'_>], largest_delay: f64) -> Vec<Named> {
     let Some(best) = all.first() else {
         return Vec::new();
     };
@@ -145,23 +190,12 @@ pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
         all.iter()
             .filter(|one| one.candidate.class.integrating == kind)
     };
-    let mut out = Vec::new();
-    let mut add = |name, (value, low, high): Triple| {
-        out.push(Named {
-            name,
-            value,
-            low,
-            high,
-        });
-    };
-    let (value, low, high) = union(all.iter().map(Turning::delay));
-    add("delay", (value, low.max(0.0), high));
+    let delays = Named::new("delay", all.iter().map(Turning::delay).collect());
+    let mut out = vec![delays.within(largest_delay)];
     // An integrator beside a slow zero has the gain of neither.
     let alike = same().filter(|one| one.candidate.gain * best.candidate.gain > 0.0);
-    add(
-        "gain",
-        union(alike.map(|one| one.candidate.interval(|seen| seen.gain))),
-    );
+    let gains = alike.map(|one| one.candidate.interval(|seen| seen.gain));
+    out.push(Named::new("gain", gains.collect()));
     if let Some(largest) = best.candidate.numbers.lags().first() {
         let lag = |seen: &Seen| {
             seen.numbers
@@ -171,17 +205,21 @@ pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
                 .unwrap_or(0.5 * seen.numbers.sum)
         };
         let real = same().filter(|one| !one.candidate.numbers.lags().is_empty());
-        let (_, low, high) = union(real.map(|one| one.candidate.interval(lag)));
-        add("lag", (*largest, low.max(0.0), high));
+        let lags = real.map(|one| one.candidate.interval(lag)).collect();
+        let mut lag = Named::new("lag", lags).within(f64::INFINITY);
+        lag.value = *largest;
+        out.push(lag);
     }
     let sign = best.candidate.seen().sign();
-    let (value, low, high) = union(all.iter().map(Turning::largest));
-    let [low, high] = if sign > 0.0 {
-        [low, high]
-    } else {
-        [-high, -low]
+    let signed = |(value, low, high): Triple| {
+        if sign > 0.0 {
+            (value, low, high)
+        } else {
+            (-value, -high, -low)
+        }
     };
-    add("largest_gain", (sign * value, low, high));
+    let largest = all.iter().map(Turning::largest).map(signed);
+    out.push(Named::new("largest_gain", largest.collect()));
     if let Some(omega) = best.crossover() {
         let over = all.iter().filter_map(|one| {
             let turn = one.finite_turn()?;
@@ -189,11 +227,15 @@ pub(super) fn hull(all: &[Turning<'_>]) -> Vec<Named> {
             let log_crossover = |seen: &Seen| log(seen.crossover_near(near, turn));
             Some(exponential(one.candidate.interval(log_crossover)))
         });
-        add("crossover", union(over));
-        let [gain, phase, delay] = at(all, omega);
-        add("gain_at_crossover", gain);
-        add("phase_at_crossover", phase);
-        add("delay_at_crossover", delay);
+        out.push(Named::new("crossover", over.collect()));
+        let names = [
+            "gain_at_crossover",
+            "phase_at_crossover",
+            "delay_at_crossover",
+        ];
+        for (name, parts) in names.into_iter().zip(parts_at(all, omega)) {
+            out.push(Named::new(name, parts));
+        }
     }
     out
 }

@@ -1,9 +1,9 @@
 //! The minima of every class under every noise that may be the true one.
 
-use super::class::Class;
+use super::class::{Class, Numbers};
 use super::model::{Model, Point};
 use super::noise::Noise;
-use super::rows::{Rows, Start};
+use super::rows::{Part, Rows, Start};
 use super::search::minimum;
 use super::starts::{are_apart, grid, nested, noise};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
@@ -22,7 +22,7 @@ pub(super) struct Minimum<'a> {
 impl<'a> Minimum<'a> {
     pub(super) fn new(model: Model<'a>, point: Point) -> Self {
         let deviance = model.deviance(&point);
-        let penalty = log(model.rows.used.len().max(2) as f64);
+        let penalty = log(model.rows.count().max(2) as f64);
         Self {
             model,
             point,
@@ -31,19 +31,31 @@ impl<'a> Minimum<'a> {
         }
     }
 
-    /// Is the delay the largest that is allowed, or a lag the slowest?
-    pub(super) fn is_at_limit(&self) -> bool {
-        let (rows, x) = (self.model.rows, &self.point.x);
-        let slowest = log(RANGES.slowest * rows.span);
-        x[0] >= rows.largest_delay || self.model.class.order > 0 && x[1] >= slowest
+    /// The number at the end of its range, if one is.
+    pub(super) fn limit(&self) -> Option<&'static str> {
+        let (rows, class, x) = (self.model.rows, self.model.class, &self.point.x);
+        let zero = || x[1 + class.order].abs() >= RANGES.slowest_zero * rows.span;
+        if x[0] >= rows.largest_delay {
+            Some("delay")
+        } else if class.order > 0 && x[1] >= log(RANGES.slowest * rows.span) {
+            Some("lag")
+        } else if class.has_zero && zero() {
+            Some("zero")
+        } else {
+            None
+        }
     }
 }
 
 /// What is fitted.
 pub(super) struct Plan<'a> {
     pub(super) rows: &'a Rows,
+    /// Fewer rows, for grids.
+    pub(super) thin: &'a Rows,
     pub(super) classes: &'a [Class],
     pub(super) noises: &'a [Noise],
+    /// Numbers of minima that are known; a grid takes the place of those of a class that has none.
+    pub(super) seeds: &'a [(Class, Numbers)],
 }
 
 /// The minima of all classes, best first; each class under the noise that suits it best.
@@ -70,45 +82,80 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
             break;
         }
     }
+    let mut simpler = Vec::new();
+    let near = least(&out) + EVIDENCE.reach;
     for found in &mut out {
-        if let Some(without) = without_level(found, task)?
-            && without.bic < found.bic
-        {
-            *found = without;
+        let closely = found.bic < near;
+        if let Some(without) = without_level(found, closely, task)? {
+            if without.bic < found.bic {
+                *found = without;
+            } else {
+                simpler.push(without);
+            }
         }
     }
+    out.extend(simpler);
     out.sort_by(|a, b| a.bic.total_cmp(&b.bic));
-    let mut kept: Vec<Minimum<'a>> = Vec::new();
-    for found in out {
-        let own = kept
-            .iter()
-            .filter(|known| known.model.class == found.model.class);
-        let is_new = own.clone().all(|known| {
-            known.model.noise == found.model.noise
-                && are_apart(&found.model, &known.point.x, &found.point.x)
-        });
-        if is_new && own.count() < STARTS.kept {
-            kept.push(found);
+    Ok(kept(out))
+}
+
+/// Of each class the minima of its best model, and the best of a simpler one that may be true too;
+/// without those that a zero at its limit alone explains, if there are others.
+fn kept(sorted: Vec<Minimum<'_>>) -> Vec<Minimum<'_>> {
+    let mut out: Vec<Minimum<'_>> = Vec::new();
+    for found in sorted {
+        let model = |one: &Minimum<'_>| (one.model.noise, one.model.level);
+        let own = || {
+            out.iter()
+                .filter(|one| one.model.class == found.model.class)
+        };
+        let Some(best) = own().next() else {
+            out.push(found);
+            continue;
+        };
+        let is_simpler = |one: &Minimum<'_>| one.model.parameters() < best.model.parameters();
+        let is_new = if is_simpler(&found) {
+            found.bic < best.bic + EVIDENCE.reach && !own().any(is_simpler)
+        } else {
+            let alike = own().filter(|one| model(one) == model(&found));
+            let x = &found.point.x;
+            model(&found) == model(best)
+                && alike.clone().count() < best.model.class.starts(STARTS.kept)
+                && alike
+                    .clone()
+                    .all(|one| are_apart(&found.model, &one.point.x, x))
+        };
+        if is_new {
+            out.push(found);
         }
     }
-    Ok(kept)
+    if out.iter().any(|one| one.limit() != Some("zero")) {
+        out.retain(|one| one.limit() != Some("zero"));
+    }
+    out
 }
 
 /// The minimum without a level, where that may be: the output is zero where the command is.
-fn without_level<'a>(found: &Minimum<'a>, task: &Task) -> Result<Option<Minimum<'a>>, Error> {
+/// Not `closely`, it is searched only if it begins nearly as likely.
+fn without_level<'a>(
+    found: &Minimum<'a>,
+    closely: bool,
+    task: &Task,
+) -> Result<Option<Minimum<'a>>, Error> {
     let model = Model {
         level: false,
         ..found.model
     };
-    if model.rows.start == Start::Rest {
+    let is_at_rest = |part: &Part| part.start == Start::Rest;
+    if model.rows.parts.iter().any(is_at_rest) {
         return Ok(None);
     }
     let start = model.at(found.point.x.clone());
-    // Where a level is plain to see, it is not searched further.
-    if model.deviance(&start) > found.deviance + EVIDENCE.hopeless {
+    if !closely && model.deviance(&start) > found.deviance + EVIDENCE.hopeless {
         return Ok(None);
     }
-    minimum(&model, start, task).map(|point| Some(Minimum::new(model, point)))
+    let hopeless = found.deviance + EVIDENCE.hopeless;
+    minimum(&model, start, hopeless, task).map(|point| Some(Minimum::new(model, point)))
 }
 
 fn least(found: &[Minimum<'_>]) -> f64 {
@@ -128,22 +175,51 @@ fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Err
             responds: true,
             level: true,
         };
-        let mut starts = grid(&model, task)?;
+        let mut starts = seeded(&model, plan);
+        if starts.is_empty() {
+            starts = grid(&on(plan.thin, &model), task)?;
+        }
         for known in &all {
             let numbers = known.model.numbers(&known.point.x);
             let own = nested(&model, known.model.class, &numbers);
             starts.extend(own.iter().map(|numbers| model.point_of(numbers, &[])));
         }
-        all.extend(distinct(&model, starts, task)?);
+        let follow = if plan.seeds.is_empty() {
+            STARTS.followed
+        } else {
+            STARTS.refined
+        };
+        let best = most_likely(&all);
+        all.extend(distinct(&model, starts, (follow, best), task)?);
     }
     all.retain(|found| plan.classes.contains(&found.model.class));
     Ok(all)
 }
 
-/// The minima from these starts, the best first.
+/// The model on other rows.
+fn on<'a>(rows: &'a Rows, model: &Model<'_>) -> Model<'a> {
+    Model { rows, ..*model }
+}
+
+/// Points of the minima of this class that are known.
+fn seeded(model: &Model<'_>, plan: &Plan<'_>) -> Vec<Vec<f64>> {
+    let own = plan.seeds.iter().filter(|(class, _)| *class == model.class);
+    own.map(|(_, numbers)| model.point_of(numbers, &[]))
+        .collect()
+}
+
+fn most_likely(found: &[Minimum<'_>]) -> f64 {
+    found
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.deviance))
+}
+
+/// The minima from these starts, the best first: so many are followed, and −2 ln L of the best class
+/// so far says which are hopeless.
 fn distinct<'a>(
     model: &Model<'a>,
     starts: Vec<Vec<f64>>,
+    (follow, best): (usize, f64),
     task: &Task,
 ) -> Result<Vec<Minimum<'a>>, Error> {
     let mut points: Vec<Point> = Vec::with_capacity(starts.len());
@@ -153,8 +229,10 @@ fn distinct<'a>(
     }
     points.sort_by(|a, b| a.squares.total_cmp(&b.squares));
     let mut found: Vec<Minimum<'a>> = Vec::new();
-    for point in points.into_iter().take(STARTS.followed) {
-        found.push(Minimum::new(*model, minimum(model, point, task)?));
+    for point in points.into_iter().take(model.class.starts(follow)) {
+        let hopeless = best + EVIDENCE.hopeless;
+        let point = minimum(model, point, hopeless, task)?;
+        found.push(Minimum::new(*model, point));
     }
     found.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
     let mut out: Vec<Minimum<'a>> = Vec::new();
@@ -162,7 +240,7 @@ fn distinct<'a>(
         let is_new = out
             .iter()
             .all(|known| are_apart(model, &known.point.x, &one.point.x));
-        if is_new && out.len() < STARTS.kept {
+        if is_new && out.len() < model.class.starts(STARTS.kept) {
             out.push(one);
         }
     }
@@ -187,7 +265,7 @@ fn under<'a>(
             level: true,
         };
         let mut starts = if kind == Noise::Arma11 {
-            grid(&model, task)?
+            grid(&on(plan.thin, &model), task)?
         } else {
             Vec::new()
         };
@@ -211,7 +289,9 @@ fn under<'a>(
         });
         let contained = contained.min_by(|a, b| a.0.total_cmp(&b.0));
         starts.extend(contained.map(|(_, x)| x));
-        all.extend(distinct(&model, starts, task)?);
+        // Richer noise makes no class less likely.
+        let best = most_likely(&all).min(most_likely(before));
+        all.extend(distinct(&model, starts, (STARTS.refined, best), task)?);
     }
     Ok(all)
 }
@@ -234,7 +314,7 @@ pub(super) fn without_plant<'a>(plan: &Plan<'a>, task: &Task) -> Result<f64, Err
         };
         let start = model.at(vec![0.0; model.searched()]);
         let x = noise(&model, &start, &known);
-        let found = Minimum::new(model, minimum(&model, model.at(x), task)?);
+        let found = Minimum::new(model, minimum(&model, model.at(x), f64::INFINITY, task)?);
         known.clone_from(&found.point.x);
         least = least.min(found.bic);
     }

@@ -8,7 +8,7 @@ use super::class::{Class, Numbers};
 use super::noise::{Noise, Whitener};
 use super::projection::Projection;
 use super::response::{Response, free_responses, response};
-use super::rows::{Rows, Start};
+use super::rows::{Part, Rows, Start};
 use super::tolerances::{RANGES, SEARCH};
 use crate::elementary::{exp, log};
 use crate::linear_algebra::vectors::{add_multiple, dot};
@@ -30,8 +30,10 @@ pub(super) struct Model<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Point {
     pub(super) x: Vec<f64>,
-    /// The sum of squares of the whitened residuals, with the floor of rounding.
+    /// The sum of squares of the whitened residuals, not below that of rounding, and that of each
+    /// record.
     pub(super) squares: f64,
+    parts: Vec<f64>,
     /// Coefficients of the linear columns, the gain last.
     pub(super) linear: Vec<f64>,
     /// Whitened residuals.
@@ -59,11 +61,16 @@ impl Model<'_> {
 
     /// How many numbers there are, with the variance of the noise.
     pub(super) fn parameters(&self) -> usize {
-        let free = match self.rows.start {
-            Start::Rest => 1,
-            _ => self.class.order + usize::from(self.class.integrating) + usize::from(self.level),
+        let (class, level) = (self.class, usize::from(self.level));
+        let own = |part: &Part| {
+            let free = match part.start {
+                Start::Rest => 1,
+                _ => class.order + usize::from(class.integrating) + level,
+            };
+            free + 1
         };
-        self.searched() + usize::from(self.responds) + free + 1
+        let own: usize = self.rows.parts.iter().map(own).sum();
+        self.searched() + usize::from(self.responds) + own
     }
 
     pub(super) fn numbers(&self, x: &[f64]) -> Numbers {
@@ -125,77 +132,103 @@ impl Model<'_> {
         }
         if self.class.has_zero {
             let at = 1 + self.class.order;
-            x[at] = x[at].clamp(-RANGES.inverse * rows.span, slowest);
+            let most = RANGES.slowest_zero * rows.span;
+            x[at] = x[at].clamp(-most, most);
         }
     }
 
-    /// The linear columns beside the response, and the responses of the lags among them.
+    /// A column that is zero outside one record.
+    fn column_of(
+        &self,
+        own: impl Iterator<Item = f64>,
+        place: &std::ops::Range<usize>,
+    ) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows.count()];
+        for (entry, value) in out[place.clone()].iter_mut().zip(own) {
+            *entry = value;
+        }
+        out
+    }
+
+    /// The linear columns beside the response, the free responses of the lags last.
     fn beside(&self, free: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let rows = self.rows;
-        let mut columns = Vec::with_capacity(4);
-        if self.level || self.class.integrating {
-            columns.push(vec![1.0; rows.used.len()]);
-        }
-        if rows.start != Start::Rest {
-            if self.class.integrating && self.level {
-                let middle = 0.5 * rows.span;
-                let from = rows.time[0] + middle;
-                let slope = rows.used.iter().map(|at| (rows.time[*at] - from) / middle);
-                columns.push(slope.collect());
+        let mut columns = Vec::with_capacity(2 * self.rows.parts.len() + free.len());
+        for (part, place) in self.rows.parts.iter().zip(self.rows.places()) {
+            if self.level || self.class.integrating {
+                columns.push(self.column_of(std::iter::repeat(1.0), &place));
             }
-            columns.extend(free.iter().cloned());
+            if part.start != Start::Rest && self.class.integrating && self.level {
+                let middle = 0.5 * part.span;
+                let from = part.time[0] + middle;
+                let slope = part.used.iter().map(|at| (part.time[*at] - from) / middle);
+                columns.push(self.column_of(slope, &place));
+            }
         }
+        columns.extend(free.iter().cloned());
         columns
     }
 
     /// The response of unit gain, with that to the command of the first row where no level is free.
     fn response(&self, numbers: &Numbers) -> Response {
-        let rows = self.rows;
-        let mut out = response(rows, self.class, numbers);
-        if !self.level {
-            for (value, at) in out.value.iter_mut().zip(&rows.used) {
-                *value += if self.class.integrating {
-                    rows.base * (rows.time[*at] - rows.time[0])
-                } else {
-                    rows.base
-                };
+        let mut out = Response::default();
+        for part in &self.rows.parts {
+            let mut own = response(part, self.class, numbers);
+            if !self.level {
+                for (value, at) in own.value.iter_mut().zip(&part.used) {
+                    *value += if self.class.integrating {
+                        part.base * (part.time[*at] - part.time[0])
+                    } else {
+                        part.base
+                    };
+                }
             }
+            out.append(own);
         }
         out
     }
 
     /// The output, less its mean where a level is free.
     fn output(&self) -> Vec<f64> {
-        let mean = if self.level || self.class.integrating {
-            0.0
-        } else {
-            self.rows.mean
-        };
-        self.rows.output.iter().map(|y| y + mean).collect()
+        let has_level = self.level || self.class.integrating;
+        self.rows.joined(|part| {
+            let mean = if has_level { 0.0 } else { part.mean };
+            part.output.iter().map(|y| y + mean).collect()
+        })
     }
 
+    /// The free responses of the lags, one column a record and state.
     fn free(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
-        if self.rows.start == Start::Rest {
-            Vec::new()
-        } else {
-            free_responses(self.rows, self.class, numbers)
+        let mut columns = Vec::new();
+        for (part, place) in self.rows.parts.iter().zip(self.rows.places()) {
+            if part.start != Start::Rest {
+                let own = free_responses(part, self.class, numbers).into_iter();
+                columns.extend(own.map(|own| self.column_of(own.into_iter(), &place)));
+            }
+        }
+        columns
+    }
+
+    fn whiteners(&self, noise: &[f64]) -> Whiteners<'_> {
+        let pairs = self.rows.parts.iter().zip(&self.rows.weights);
+        let own = pairs.map(|(part, weight)| Whitener::new(&part.gaps, self.noise, noise, *weight));
+        Whiteners {
+            own: own.collect(),
+            places: self.rows.places(),
         }
     }
 
-    fn whitener(&self, x: &[f64]) -> Whitener<'_> {
-        Whitener::new(&self.rows.gaps, self.noise, &x[self.plant_numbers()..])
+    fn whitener(&self, x: &[f64]) -> Whiteners<'_> {
+        self.whiteners(&x[self.plant_numbers()..])
     }
 
     /// The sum of squares of residuals under other numbers of the noise.
     pub(super) fn squares_of(&self, residual: &[f64], noise: &[f64]) -> f64 {
-        let whitener = Whitener::new(&self.rows.gaps, self.noise, noise);
-        let whitened = whitener.whiten(residual);
+        let whitened = self.whiteners(noise).whiten(residual);
         dot(&whitened, &whitened)
     }
 
     /// The likelihood at a point.
     pub(super) fn at(&self, x: Vec<f64>) -> Point {
-        let rows = self.rows;
         let numbers = self.numbers(&x);
         let (response, free) = if self.responds {
             (self.response(&numbers), self.free(&numbers))
@@ -217,11 +250,11 @@ impl Model<'_> {
         for (column, factor) in raw.iter().zip(&linear) {
             add_multiple(&mut residual, -factor, column);
         }
-        let floor = SEARCH.rounding * rows.deviation * whitener.factor();
-        let squares = dot(&left, &left) + rows.used.len() as f64 * floor * floor;
+        let parts = whitener.squares(&left, self.rows);
         Point {
             x,
-            squares,
+            squares: parts.iter().sum(),
+            parts,
             linear,
             whitened: left,
             residual,
@@ -233,8 +266,23 @@ impl Model<'_> {
 
     /// −2 ln L.
     pub(super) fn deviance(&self, point: &Point) -> f64 {
-        let count = self.rows.used.len() as f64;
-        count * (log(point.squares / count) + 1.0 + log(std::f64::consts::TAU))
+        let sizes = point.parts.iter().zip(&self.rows.weights);
+        let own = sizes
+            .zip(&self.rows.parts)
+            .map(|((squares, weight), part)| {
+                let count = part.used.len() as f64;
+                let variance = squares / (count * weight * weight);
+                count * (log(variance) + 1.0 + log(std::f64::consts::TAU))
+            });
+        own.sum()
+    }
+
+    /// One over the size of the noise of each record, as these residuals show it.
+    pub(super) fn weights(&self, point: &Point) -> Vec<f64> {
+        let sizes = point.parts.iter().zip(&self.rows.weights);
+        let own = sizes.zip(&self.rows.parts);
+        own.map(|((squares, weight), part)| weight * (part.used.len() as f64 / squares).sqrt())
+            .collect()
     }
 
     /// The gain, zero where there is no plant.
@@ -325,5 +373,34 @@ impl Model<'_> {
                 column
             })
             .collect()
+    }
+}
+
+/// The whiteners of all records.
+struct Whiteners<'a> {
+    own: Vec<Whitener<'a>>,
+    places: Vec<std::ops::Range<usize>>,
+}
+
+impl Whiteners<'_> {
+    fn whiten(&self, column: &[f64]) -> Vec<f64> {
+        if let [own] = &self.own[..] {
+            return own.whiten(column);
+        }
+        let pairs = self.own.iter().zip(&self.places);
+        pairs
+            .flat_map(|(own, place)| own.whiten(&column[place.clone()]))
+            .collect()
+    }
+
+    /// The sum of squares of each record, not below that of rounding.
+    fn squares(&self, whitened: &[f64], rows: &Rows) -> Vec<f64> {
+        let parts = self.own.iter().zip(&self.places).zip(&rows.parts);
+        let own = parts.map(|((whitener, place), part)| {
+            let own = &whitened[place.clone()];
+            let floor = part.rounding * whitener.factor;
+            dot(own, own).max(own.len() as f64 * floor * floor)
+        });
+        own.collect()
     }
 }

@@ -8,7 +8,7 @@
 use super::tolerances::RANGES;
 use crate::elementary::{exp, log};
 
-/// Variance of an innovation, less one, below which the filter has settled.
+/// Relative change of the variance of an innovation below which the filter has settled.
 const SETTLED: f64 = 1e-12;
 
 /// Doublings of the time over which the stationary covariance is summed: 2³⁰ rows.
@@ -134,11 +134,13 @@ pub(super) struct Whitener<'a> {
     coefficients: Coefficients,
     /// None for white noise.
     gains: Vec<Gain>,
-    factor: f64,
+    /// What innovations are multiplied by where the filter has settled.
+    pub(super) factor: f64,
 }
 
 impl<'a> Whitener<'a> {
-    pub(super) fn new(gaps: &'a [usize], noise: Noise, x: &[f64]) -> Self {
+    /// `weight` is one over the size of the noise, up to a factor.
+    pub(super) fn new(gaps: &'a [usize], noise: Noise, x: &[f64], weight: f64) -> Self {
         let coefficients = noise.coefficients(x);
         let mut out = Self {
             gaps,
@@ -149,6 +151,7 @@ impl<'a> Whitener<'a> {
         if noise != Noise::White {
             out.prepare();
         }
+        out.factor *= weight;
         out
     }
 
@@ -173,34 +176,43 @@ impl<'a> Whitener<'a> {
             covariance
         };
         let mut covariance = stationary;
-        let mut log_det = 0.0;
+        let mut gain = Gain {
+            second: 0.0,
+            third: 0.0,
+            scale: 1.0,
+        };
+        let (mut log_det, mut log_variance) = (0.0, 0.0);
         self.gains.reserve(self.gaps.len());
-        let mut settled = false;
+        // Of rows at the same distance as those before, whose filter has settled, all is known.
+        let (mut settled, mut known, mut before) = (false, 0, f64::INFINITY);
         for (at, gap) in self.gaps.iter().enumerate() {
+            if settled && *gap == known {
+                log_det += log_variance;
+                self.gains.push(gain);
+                continue;
+            }
             if at > 0 && *gap > LONGEST_GAP {
                 covariance = stationary;
-            } else if at > 0 && !(settled && *gap == 1) {
+            } else if at > 0 {
                 for _ in 0..*gap {
                     covariance = sum(&times(&times(&step, &covariance), &across), &noise);
                 }
             }
             let variance = covariance[0][0];
-            let [second, third] = [covariance[0][1] / variance, covariance[0][2] / variance];
-            settled = (variance - 1.0).abs() < SETTLED;
-            if !settled {
-                log_det += log(variance);
-            }
-            self.gains.push(Gain {
-                second,
-                third,
+            settled = *gap == known && (variance - before).abs() < SETTLED * variance;
+            (known, before) = (*gap, variance);
+            log_variance = log(variance);
+            log_det += log_variance;
+            gain = Gain {
+                second: covariance[0][1] / variance,
+                third: covariance[0][2] / variance,
                 scale: 1.0 / variance.sqrt(),
-            });
-            if !(settled && self.gaps.get(at + 1) == Some(&1)) {
-                let gains = [1.0, second, third];
-                for (row, left) in covariance.iter_mut().zip(gains) {
-                    for (place, right) in row.iter_mut().zip(gains) {
-                        *place -= left * right * variance;
-                    }
+            };
+            self.gains.push(gain);
+            let gains = [1.0, gain.second, gain.third];
+            for (row, left) in covariance.iter_mut().zip(gains) {
+                for (place, right) in row.iter_mut().zip(gains) {
+                    *place -= left * right * variance;
                 }
             }
         }
@@ -210,7 +222,7 @@ impl<'a> Whitener<'a> {
     /// The innovations of a column, scaled.
     pub(super) fn whiten(&self, column: &[f64]) -> Vec<f64> {
         if self.gains.is_empty() {
-            return column.to_vec();
+            return column.iter().map(|entry| entry * self.factor).collect();
         }
         let [first, second] = self.coefficients.ar;
         let mut state = [0.0; 3];
@@ -239,11 +251,6 @@ impl<'a> Whitener<'a> {
         }
         out
     }
-
-    /// What the innovations are multiplied by where the filter has settled.
-    pub(super) fn factor(&self) -> f64 {
-        self.factor
-    }
 }
 
 #[cfg(test)]
@@ -258,7 +265,7 @@ mod tests {
         let phi = Noise::Arma11.coefficients(&x).ar[0];
         let gaps = [1, 1, 3];
         let values = [0.4, -0.3, 1.1];
-        let found = Whitener::new(&gaps, Noise::Arma11, &x).whiten(&values);
+        let found = Whitener::new(&gaps, Noise::Arma11, &x, 1.0).whiten(&values);
         let after = |power: i32| (1.0 - phi.powi(2 * power)) / (1.0 - phi * phi);
         let variances = [1.0 / (1.0 - phi * phi), after(1), after(3)];
         let errors = [0.4, -0.3 - phi * 0.4, 1.1 + phi.powi(3) * 0.3];

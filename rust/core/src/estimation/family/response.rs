@@ -7,7 +7,7 @@
 //! Both hold for one lag with q = 0. Values at a row are those just before it.
 
 use super::class::{Class, Numbers};
-use super::rows::Rows;
+use super::rows::Part;
 use crate::elementary::{exp, sin_cos};
 
 /// Two steps closer than this share of a row are one, and their transition is computed once.
@@ -24,6 +24,15 @@ pub(super) struct Response {
     pub(super) by_delay: Vec<f64>,
     /// The derivative with respect to the zero.
     pub(super) by_zero: Vec<f64>,
+}
+
+impl Response {
+    /// With that of the next record behind it.
+    pub(super) fn append(&mut self, mut next: Self) {
+        self.value.append(&mut next.value);
+        self.by_delay.append(&mut next.by_delay);
+        self.by_zero.append(&mut next.by_zero);
+    }
 }
 
 /// e^(A t) of the last two lengths of a step.
@@ -162,7 +171,7 @@ impl State<'_> {
 }
 
 /// The response of a plant of unit gain that is at rest until the first command arrives.
-pub(super) fn response(rows: &Rows, class: Class, numbers: &Numbers) -> Response {
+pub(super) fn response(rows: &Part, class: Class, numbers: &Numbers) -> Response {
     let (time, command) = (&rows.time, &rows.command);
     let count = rows.used.len();
     let mut out = Response {
@@ -209,7 +218,7 @@ pub(super) fn response(rows: &Rows, class: Class, numbers: &Numbers) -> Response
 }
 
 /// The free responses of the lags from the first row that is used on, one column a state.
-pub(super) fn free_responses(rows: &Rows, class: Class, numbers: &Numbers) -> Vec<Vec<f64>> {
+pub(super) fn free_responses(rows: &Part, class: Class, numbers: &Numbers) -> Vec<Vec<f64>> {
     let mut transitions = Transitions::new(class, numbers, rows.row);
     let start = rows.used.first().map_or(0.0, |row| rows.time[*row]);
     let mut columns = vec![Vec::with_capacity(rows.used.len()); class.order];

@@ -1,7 +1,11 @@
 //! The rows of a record as the family uses them: which count, and where the command is known.
 
-use super::tolerances::REST;
+use super::tolerances::{REST, SEARCH};
 use crate::Error;
+
+/// Share of the changes of a command that another follows in the next row, up to which it jumps: more
+/// takes ramps of a row or two for jumps.
+const JUMPS: f64 = 0.1;
 
 /// One record.
 #[derive(Debug, Clone)]
@@ -73,6 +77,21 @@ impl Record {
         steps.get(steps.len() / 2).copied().unwrap_or(1.0)
     }
 
+    /// Does the command jump from one held value to the next? A straight one would need rows to get there.
+    pub(super) fn jumps(&self) -> bool {
+        let changes = |at: usize| {
+            let next = self.command.get(at + 1);
+            next.is_some_and(|next| *next != self.command[at])
+        };
+        let all = (0..self.command.len()).filter(|at| changes(*at));
+        let (mut count, mut together) = (0, 0);
+        for at in all {
+            count += 1;
+            together += usize::from(changes(at + 1));
+        }
+        count > 0 && together as f64 <= JUMPS * count as f64
+    }
+
     /// Does the record begin with rows in which neither the command nor the output moves?
     pub(super) fn begins_at_rest(&self) -> bool {
         let moves = self.command.iter().position(|u| *u != self.command[0]);
@@ -129,9 +148,9 @@ pub(super) enum Start {
     Unknown,
 }
 
-/// Rows that count, with the whole command.
+/// Rows that count of one record, with the whole command.
 #[derive(Debug, Clone)]
-pub(super) struct Rows {
+pub(super) struct Part {
     pub(super) time: Vec<f64>,
     /// The command less that of the first row.
     pub(super) command: Vec<f64>,
@@ -147,22 +166,13 @@ pub(super) struct Rows {
     /// The output there less its mean, and that mean.
     pub(super) output: Vec<f64>,
     pub(super) mean: f64,
-    /// Standard deviation of the output.
-    pub(super) deviation: f64,
+    /// Residuals are never taken for smaller than this: rounding of the output.
+    pub(super) rounding: f64,
     pub(super) start: Start,
-    pub(super) largest_delay: f64,
-    pub(super) in_loop: bool,
 }
 
-impl Rows {
-    pub(super) fn new(
-        record: &Record,
-        start: Start,
-        largest_delay: f64,
-        straight: bool,
-        in_loop: bool,
-    ) -> Self {
-        let (row, span) = (record.row(), record.span());
+impl Part {
+    fn new(record: &Record, start: Start, largest_delay: f64, straight: bool) -> Self {
         let from = match start {
             Start::Unknown => record.time[0] + largest_delay,
             Start::Rest | Start::Held => record.time[0],
@@ -170,32 +180,138 @@ impl Rows {
         let counts = |at: &usize| {
             *at >= record.earlier && record.time[*at] >= from && record.output[*at].is_finite()
         };
-        let used: Vec<usize> = (0..record.time.len()).filter(counts).collect();
-        let mut gaps = vec![1; used.len()];
-        for (gap, pair) in gaps.iter_mut().skip(1).zip(used.windows(2)) {
-            let rows = (record.time[pair[1]] - record.time[pair[0]]) / row;
-            *gap = (rows.round() as usize).max(1);
-        }
-        let count = used.len().max(1) as f64;
-        let mean = used.iter().map(|at| record.output[*at]).sum::<f64>() / count;
-        let output: Vec<f64> = used.iter().map(|at| record.output[*at] - mean).collect();
-        let deviation = (output.iter().map(|y| y * y).sum::<f64>() / count).sqrt();
         let first = record.command[0];
-        Self {
+        let mut out = Self {
             time: record.time.clone(),
             command: record.command.iter().map(|u| u - first).collect(),
             base: first,
             straight,
-            row,
-            span,
-            used,
-            gaps,
-            output,
-            mean,
-            deviation,
+            row: record.row(),
+            span: record.span(),
+            used: (0..record.time.len()).filter(counts).collect(),
+            gaps: Vec::new(),
+            output: Vec::new(),
+            mean: 0.0,
+            rounding: 0.0,
             start,
+        };
+        let count = out.used.len().max(1) as f64;
+        out.mean = out.used.iter().map(|at| record.output[*at]).sum::<f64>() / count;
+        let off = out.used.iter().map(|at| record.output[*at] - out.mean);
+        out.output = off.collect();
+        let deviation = (out.output.iter().map(|y| y * y).sum::<f64>() / count).sqrt();
+        let step = decimal_step(out.used.iter().map(|at| record.output[*at]));
+        out.rounding = (SEARCH.rounding * deviation).max(step / 12.0_f64.sqrt());
+        out.measure_gaps();
+        out
+    }
+
+    fn measure_gaps(&mut self) {
+        self.gaps = vec![1; self.used.len()];
+        for (gap, pair) in self.gaps.iter_mut().skip(1).zip(self.used.windows(2)) {
+            let rows = (self.time[pair[1]] - self.time[pair[0]]) / self.row;
+            *gap = (rows.round() as usize).max(1);
+        }
+    }
+
+    /// Every so many of the rows that count.
+    fn thinned(&self, every: usize) -> Self {
+        let mut out = self.clone();
+        out.used = self.used.iter().copied().step_by(every).collect();
+        out.output = self.output.iter().copied().step_by(every).collect();
+        out.measure_gaps();
+        out
+    }
+}
+
+/// Digits behind the point to which outputs may have been rounded: more than files have.
+const DIGITS: i32 = 9;
+
+/// Error of a rounded decimal number, as a share of its last digit.
+const DECIMAL: f64 = 1e-4;
+
+/// The step of the last decimal digit of these values; 0 where they are no rounded decimal numbers.
+fn decimal_step(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    for digits in 0..=DIGITS {
+        let scale = 10.0_f64.powi(digits);
+        let is_rounded = |value: f64| (value * scale - (value * scale).round()).abs() < DECIMAL;
+        if values.clone().all(is_rounded) {
+            return 1.0 / scale;
+        }
+    }
+    0.0
+}
+
+/// The records that are explained together, with what they share.
+#[derive(Debug, Clone)]
+pub(super) struct Rows {
+    pub(super) parts: Vec<Part>,
+    /// One over the size of the noise of each, up to a factor.
+    pub(super) weights: Vec<f64>,
+    pub(super) straight: bool,
+    /// Median distance of rows, the least of all, and length of the longest record, s.
+    pub(super) row: f64,
+    pub(super) span: f64,
+    pub(super) largest_delay: f64,
+    pub(super) in_loop: bool,
+}
+
+impl Rows {
+    pub(super) fn new(
+        records: &[Record],
+        starts: &[Start],
+        largest_delay: f64,
+        straight: bool,
+        in_loop: bool,
+    ) -> Self {
+        let pairs = records.iter().zip(starts);
+        let parts: Vec<Part> = pairs
+            .map(|(record, start)| Part::new(record, *start, largest_delay, straight))
+            .collect();
+        Self {
+            weights: vec![1.0; parts.len()],
+            straight,
+            row: parts
+                .iter()
+                .fold(f64::INFINITY, |row, part| row.min(part.row)),
+            span: parts.iter().fold(0.0, |span, part| part.span.max(span)),
             largest_delay,
             in_loop,
+            parts,
+        }
+    }
+
+    /// How many rows count.
+    pub(super) fn count(&self) -> usize {
+        self.parts.iter().map(|part| part.used.len()).sum()
+    }
+
+    /// Where the rows of each part stand in columns of all.
+    pub(super) fn places(&self) -> Vec<std::ops::Range<usize>> {
+        let mut end = 0;
+        let place = |part: &Part| {
+            let start = end;
+            end += part.used.len();
+            start..end
+        };
+        self.parts.iter().map(place).collect()
+    }
+
+    /// One column of all parts.
+    pub(super) fn joined<'a>(&'a self, of: impl Fn(&'a Part) -> Vec<f64>) -> Vec<f64> {
+        if let [part] = &self.parts[..] {
+            return of(part);
+        }
+        self.parts.iter().flat_map(of).collect()
+    }
+
+    /// About so many rows of those that count, to start from.
+    pub(super) fn thinned(&self, most: usize) -> Self {
+        let every = self.count().div_ceil(most.max(1)).max(1);
+        let parts = self.parts.iter().map(|part| part.thinned(every));
+        Self {
+            parts: parts.collect(),
+            ..self.clone()
         }
     }
 }

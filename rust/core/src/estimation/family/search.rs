@@ -9,11 +9,16 @@ use crate::{Error, Task};
 /// Damping added where a number changes nothing, as a share of the largest.
 const FLOOR: f64 = 1e-12;
 
-/// The minimum from a start.
-pub(super) fn minimum(model: &Model<'_>, start: Point, task: &Task) -> Result<Point, Error> {
+/// The minimum from a start; it ends where −2 ln L would not fall to `hopeless` in time.
+pub(super) fn minimum(
+    model: &Model<'_>,
+    start: Point,
+    hopeless: f64,
+    task: &Task,
+) -> Result<Point, Error> {
     let mut best = start;
     let mut damping = SEARCH.damping;
-    let count = model.rows.used.len() as f64;
+    let count = model.rows.count() as f64;
     for _ in 0..SEARCH.steps {
         task.check()?;
         let columns = model.slopes(&best);
@@ -31,7 +36,8 @@ pub(super) fn minimum(model: &Model<'_>, start: Point, task: &Task) -> Result<Po
             }
             damping *= SEARCH.change * SEARCH.change;
         }
-        if fallen.is_none_or(|fall| fall < SEARCH.fall) {
+        let behind = model.deviance(&best) - hopeless;
+        if fallen.is_none_or(|fall| fall < SEARCH.fall || SEARCH.catch_up * fall < behind) {
             break;
         }
     }

@@ -40,7 +40,9 @@ pub(super) fn grid(model: &Model<'_>, task: &Task) -> Result<Vec<Vec<f64>>, Erro
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<Vec<f64>> = Vec::new();
     for (_, x) in points {
-        if out.len() < STARTS.gridded && out.iter().all(|known| are_apart(model, known, &x)) {
+        if out.len() < class.starts(STARTS.gridded)
+            && out.iter().all(|known| are_apart(model, known, &x))
+        {
             out.push(x);
         }
     }

@@ -4,9 +4,10 @@
 pub(super) struct Ranges {
     /// Largest delay as a share of the record where none is given: more rows at the start are left out.
     pub(super) delay_share: f64,
-    /// Most inverse response, as a zero in spans: a slower one is a drift under another name.
-    pub(super) inverse: f64,
-    /// Most time constants and zeros, in spans of the record: slower ones look like integrators.
+    /// Most of a zero, in spans of either sign: a slower one makes a drift of a plant at rest, and a
+    /// plant at rest of one that integrates.
+    pub(super) slowest_zero: f64,
+    /// Most time constants, in spans of the record: slower ones look like integrators.
     pub(super) slowest: f64,
     /// Shortest lag in rows: faster ones look like delays.
     pub(super) fastest: f64,
@@ -22,7 +23,7 @@ pub(super) struct Ranges {
 
 pub(super) const RANGES: Ranges = Ranges {
     delay_share: 0.3,
-    inverse: 0.3,
+    slowest_zero: 0.3,
     slowest: 20.0,
     fastest: 0.05,
     fastest_in_loop: 0.5,
@@ -35,6 +36,9 @@ pub(super) const RANGES: Ranges = Ranges {
 pub(super) struct Search {
     /// Fall of −2 ln L that is still followed: more ends sooner, further from the minimum.
     pub(super) fall: f64,
+    /// Steps of this fall in which a class that is far behind would have to catch up: more follows
+    /// longer what is hopeless.
+    pub(super) catch_up: f64,
     /// Most steps.
     pub(super) steps: usize,
     /// Step of numerical derivatives: more loses curvature, less digits.
@@ -53,7 +57,8 @@ pub(super) struct Search {
 }
 
 pub(super) const SEARCH: Search = Search {
-    fall: 1e-4,
+    fall: 1e-3,
+    catch_up: 10.0,
     steps: 40,
     step: 1e-5,
     damping: 1e-3,
@@ -77,8 +82,14 @@ pub(super) struct Starts {
     pub(super) gridded: usize,
     /// Starts that are followed, of all.
     pub(super) followed: usize,
+    /// The same where minima of the class are known.
+    pub(super) refined: usize,
     /// Minima of a class that are kept.
     pub(super) kept: usize,
+    /// All of these for a class without lags, whose delays may be periods of the command apart.
+    pub(super) delays_only: usize,
+    /// Rows from which searches start: fewer take less time and see less of short responses.
+    pub(super) thin: usize,
     /// Two delays closer than so many rows belong to one minimum.
     pub(super) apart: f64,
 }
@@ -90,7 +101,10 @@ pub(super) const STARTS: Starts = Starts {
     dampings: [0.3, 0.9],
     gridded: 2,
     followed: 4,
+    refined: 3,
     kept: 2,
+    delays_only: 8,
+    thin: 400,
     apart: 0.5,
 };
 
@@ -100,7 +114,7 @@ pub(super) struct Evidence {
     pub(super) reach: f64,
     /// −2 ln L above the best within which a class has to agree with it: more finds more contradictions.
     pub(super) likely: f64,
-    /// BIC from the best beyond which a class is not given ARMA(2,2) after ARMA(1,1): more costs time.
+    /// BIC from the best beyond which a class is not followed closely: more costs time.
     pub(super) hopeless: f64,
     /// Standard errors a combination of numbers must stand from nothing to count.
     pub(super) told: f64,
@@ -157,6 +171,11 @@ pub(super) struct Blocks {
     pub(super) count: usize,
     /// Share of independent scores in p (m − 1): less is a wider quantile.
     pub(super) freedom: f64,
+    /// Probability above which scores scatter as the model says they do: more claims wider errors for
+    /// right models, less narrower ones for wrong ones.
+    pub(super) chance: f64,
+    /// What the model's own scatter then counts for, in multiples of the scores: more is narrower.
+    pub(super) prior: f64,
     /// Leverage of a block at which its score is no longer corrected fully.
     pub(super) most_leverage: f64,
     /// Leverage of each block up to which the jackknife holds.
@@ -166,6 +185,8 @@ pub(super) struct Blocks {
 pub(super) const BLOCKS: Blocks = Blocks {
     count: 8,
     freedom: 0.6,
+    chance: 0.2,
+    prior: 2.0,
     most_leverage: 0.98,
     jackknife: 0.5,
 };

@@ -64,12 +64,13 @@ pub(super) fn verdict(all: &[Turning<'_>], findings: &Findings) -> Verdict {
         let (_, low, high) = best.largest();
         return new(Grade::Indication, "crossover not told", high / low);
     }
-    if candidate.at_limit {
-        return new(
-            Grade::Indication,
-            "delay at its limit",
-            candidate.numbers.delay,
-        );
+    if let Some(number) = candidate.limit {
+        let (reason, size) = match number {
+            "delay" => ("delay at its limit", candidate.numbers.delay),
+            "lag" => ("lag at its limit", candidate.numbers.sum),
+            _ => ("zero at its limit", candidate.numbers.zero),
+        };
+        return new(Grade::Indication, reason, size);
     }
     if candidate.white < EVIDENCE.white {
         return new(Grade::Indication, "residuals not white", candidate.white);
@@ -108,10 +109,11 @@ fn contradiction(all: &[Turning<'_>]) -> Option<f64> {
     };
     let (low, high) = ends(&|| all.iter().map(|one| one.largest().0).collect());
     let agree = high < EVIDENCE.contradiction * low;
-    if low < f64::INFINITY && !agree {
+    let best = all.first()?;
+    // Where the best has no largest gain, delays say whether the others may have none.
+    if best.crossover().is_some() && !agree {
         return Some(high / low);
     }
-    let best = all.first()?;
     let delays = || all.iter().map(Turning::delay);
     let least_end = delays().fold(f64::INFINITY, |least, part| least.min(part.2));
     let most_start = delays().fold(f64::NEG_INFINITY, |most, part| most.max(part.1));
