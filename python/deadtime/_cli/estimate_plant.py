@@ -111,6 +111,8 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
     if has_loop:
         named = replace(loop, plant=None).loops()
         known |= {"controller": [one.controller for one in named], "limit": loop.limit}
+        if loop.sample_time is not None:
+            known["between"] = "held"
         recordings = [read_recording(file, **columns) for file in asked.files]
         findings = grave_findings(asked.files, loop.checks(recordings, named))
         for finding in findings:
@@ -129,8 +131,7 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
         save_figure(figure, asked.plot)
     following = next_command(fit, asked)
     if as_json:
-        told = fit.to_dict() | {"next": following}
-        print_json("plant-estimate", told | {"findings": findings} if has_loop else told)
+        print_json("plant-estimate", fit.to_dict() | {"next": following, "findings": findings})
     else:
         _print(fit, following)
         print_grave_findings(findings)

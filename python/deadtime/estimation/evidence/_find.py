@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -37,15 +38,30 @@ def estimate_by_evidence(
     known = {"at_rest": at_rest, "largest_delay": largest_delay, "between": between, "plant": plant}
     question = questions_of(recording, window, controller, limit, closed_loop, known)
     found = question.answer(progress=progress)
-    better = None if plant is None else _clearly_better(question, found)
-    return estimate_of(question, found, better)
+    if plant is None:
+        return estimate_of(question, found)
+    whole = question.of(None).answer()
+    best, least = whole.candidates[0], found.candidates[0].bic
+    if not least - best.bic > CLEAR:
+        return estimate_of(question, found)
+    better = candidate_of(best, least)
+    named = estimate_of(question, found, better)
+    if named.verdict != "reliable" or not _are_apart(found, whole):
+        return named
+    reason = f"{better.in_words()}, explains the recording clearly better"
+    return replace(named, verdict="indication", reason=reason)
 
 
-def _clearly_better(question: Question, named: native.FamilyFit) -> PlantCandidate | None:
-    """The plant of the whole family that leads the named one clearly, if one does."""
-    best = question.of(None).answer().candidates[0]
-    least = named.candidates[0].bic
-    return candidate_of(best, least) if least - best.bic > CLEAR else None
+def _are_apart(named: native.FamilyFit, whole: native.FamilyFit) -> bool:
+    """Whether gain or angle, where the likeliest plant crosses over, have no value in common."""
+    omega = whole.crossover
+    if not math.isfinite(omega):
+        omega = max(whole.excited, default=math.nan)
+    if not omega > 0.0:
+        return False
+    own, other = named.at([omega]), whole.at([omega])
+    ends = ((own[name], other[name]) for name in ("gain", "phase"))
+    return any(a[1][0] > b[2][0] or b[1][0] > a[2][0] for a, b in ends)
 
 
 def estimate_of(

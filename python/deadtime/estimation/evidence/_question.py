@@ -113,11 +113,12 @@ class Question(ReadOnlyArrays):
 
     def options(self) -> dict[str, Any]:
         """What was given besides the recording, as arguments of `estimate_delay`."""
-        names = ("limit", "at_rest", "largest_delay", "plant")
-        found = {name: getattr(self, name) for name in names}
+        found: dict[str, Any] = {}
         for name in ("window", "controller"):
             own = [getattr(one, name) for one in self.each]
             found[name] = own[0] if own.count(own[0]) == len(own) else own
+        for name in ("limit", "at_rest", "largest_delay", "plant"):
+            found[name] = getattr(self, name)
         if self.between != "undecided":
             found["between"] = self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):

@@ -50,7 +50,8 @@ class Advice(ReadOnlyArrays):
     words : str
         A sentence.
     options : dict of str to object
-        What to give `estimate_delay` besides what was given, if it is to be asked again.
+        What to give `estimate_delay` besides what was given, if it is to be asked again; None for
+        what to leave out.
     given : dict of str to object
         What was given.
     controller : str
@@ -73,7 +74,9 @@ class Advice(ReadOnlyArrays):
         """The line of Python that does it; empty where another recording is needed."""
         if self.options:
             named = {**self.given, **self.options}
-            asked = "".join(f", {name}={_python(value)}" for name, value in named.items())
+            asked = "".join(
+                f", {name}={_python(value)}" for name, value in named.items() if value is not None
+            )
             return f"dtm.estimate_delay({self.asked}{asked})"
         if self.controller:
             kind, gains = f"dtm.{self.controller}", ", ".join(["1.0"] * len(self.controller))
@@ -227,6 +230,10 @@ def _advice_on(fit: FoundPlant) -> Advice:
         kind = "P" if fit.best.integrates else "PI"
         return Advice(
             f"design a {kind} controller for the whole interval of the dead time", controller=kind
+        )
+    if fit._better is not None:
+        return Advice(
+            "leave the plant out: another is likelier", {"plant": None}, fit._question.options()
         )
     if not fit.at_rest and not _moves_in(fit):
         return Advice(
