@@ -73,6 +73,7 @@ ORDER = {
         "gain_crossovers",
         "circle",
         "held_gain",
+        "held_gain_range",
         "held_range",
         "further_delay",
         "held",
