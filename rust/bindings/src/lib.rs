@@ -10,6 +10,8 @@ mod estimation;
 mod family;
 mod fixed_step;
 mod frequency;
+mod least_squares;
+mod literature;
 mod loading;
 mod loops;
 mod matrix;
@@ -55,6 +57,16 @@ mod _deadtime {
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
+    };
+    #[pymodule_export]
+    use super::least_squares::{
+        ChebyshevMisfit, LeastSquares, LeastSquaresMinimum, LinesMisfit, LoopMisfit, fit_covariance,
+    };
+    #[pymodule_export]
+    use super::literature::{
+        arx_losses, correlation_coefficient, correlation_peak, cycle_crossings, cycle_delay_by_lag,
+        cycle_delays, cycle_switches, delay_of_rate, extremes_decay, feedback_test, held_losses,
+        integrator_path, loop_of_extremes, rise_tangent, step_extremes, tail_rate, x_of_overshoot,
     };
     #[pymodule_export]
     use super::loops::{
