@@ -252,6 +252,7 @@ pub(crate) struct LeastSquares {
     axes: Vec<Vec<Vec<f64>>>,
     weights: Vec<f64>,
     common: usize,
+    trade: Option<(usize, usize)>,
 }
 
 /// Where a sum of squares is least.
@@ -327,6 +328,7 @@ impl LeastSquares {
             }
         });
         let mut joint = Joint::new(parts.collect(), self.weights.clone(), self.common);
+        joint.trade = self.trade;
         let found = run_attached(py, |task| work(&mut joint, task));
         match calls.failure.take() {
             Some(error) => Err(error),
@@ -357,7 +359,13 @@ fn polynomials_of<'a>(source: &'a Source, calls: &'a Calls<'_>) -> Option<Finder
 #[pymethods]
 impl LeastSquares {
     #[new]
-    fn new(parts: Vec<FittedPart<'_>>, weights: Vec<f64>, common: usize) -> PyResult<Self> {
+    fn new(
+        parts: Vec<FittedPart<'_>>,
+        weights: Vec<f64>,
+        common: usize,
+        delay: Option<usize>,
+        lag: Option<usize>,
+    ) -> PyResult<Self> {
         let mut made = Self {
             sources: Vec::new(),
             sizes: Vec::new(),
@@ -366,6 +374,7 @@ impl LeastSquares {
             axes: Vec::new(),
             weights,
             common,
+            trade: delay.zip(lag),
         };
         for part in parts {
             made.sources
@@ -421,13 +430,13 @@ impl LeastSquares {
         Ok((weights, LeastSquaresMinimum::of(py, found)?))
     }
 
-    /// The minimum with the lag and the delay (their places) at zero where that fits as well.
+    /// The minimum with the delay and the lag (their places) at zero where that fits as well.
     fn without_vanishing(
         &self,
         py: Python<'_>,
         found: &LeastSquaresMinimum,
-        lag: Option<usize>,
         delay: Option<usize>,
+        lag: Option<usize>,
         size: f64,
     ) -> PyResult<LeastSquaresMinimum> {
         let found = self.minimum(py, found)?;

@@ -104,7 +104,7 @@ class ModelOfOne(Fit):
     @property
     def problem(self) -> LeastSquares:
         """The model as the kernel fits it."""
-        return LeastSquares([self], [1.0], len(self.names))
+        return LeastSquares([self], self.weights, len(self.names), *trading(self.names))
 
     def starts(self) -> list[Array]:
         """The first point at which searches start."""
@@ -159,7 +159,7 @@ class JointModel(Fit):
     @property
     def problem(self) -> LeastSquares:
         """The models as the kernel fits them."""
-        return LeastSquares(self.parts, self.weights, len(self.names))
+        return LeastSquares(self.parts, self.weights, len(self.names), *trading(self.names))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -232,7 +232,11 @@ def place_of(name: str, names: Sequence[str]) -> int | None:
     return names.index(name) if name in names else None
 
 
+def trading(names: Sequence[str]) -> tuple[int | None, int | None]:
+    """The places of the delay and of a lag, which acts like it."""
+    return place_of("delay", names), place_of("lag", names)
+
+
 def without_vanishing(model: Model, found: Minimum) -> Minimum:
     """Set lags and delays to zero where this does not change the cost beyond rounding."""
-    lag, delay = (place_of(name, model.names) for name in ("lag", "delay"))
-    return model.problem.without_vanishing(found, lag, delay, model.size)
+    return model.problem.without_vanishing(found, *trading(model.names), model.size)

@@ -14,8 +14,6 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -100,11 +98,10 @@ def concluded(
     fixed = np.isfinite(close) & at_bound & along
     loose = [i for i, label in enumerate(labels) if label not in held and not fixed[i]]
     residuals = -found.misfit
-    spreads = spread_of(found, labels, loose, model.sizes)
+    white, robust = spreads_of(found, labels, loose, model.sizes)
     whiteness = check_fit(model, found, fitted)
     reliable = whiteness.white or is_exact(model, found, fitted)
-    white = spreads.white
-    spread = white if reliable else spreads.robust
+    spread = white if reliable else robust
     errors, plain = standard_errors(names, spread), standard_errors(names, white)
     freedom = residuals.size - len(loose)
     reason = _why_profile(values, residuals.size, count)
@@ -136,35 +133,17 @@ def concluded(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Spread:
-    """Covariances of all parameters; zero for those at a bound, which are not `loose`."""
-
-    jacobian: Array
-    residuals: Array
-    loose: list[int]
-    count: int
-    sizes: Sequence[int]
-
-    @cached_property
-    def white(self) -> Array:
-        """That for white residuals."""
-        return embedded(white_covariance(self.jacobian, self.residuals), self.loose, self.count)
-
-    @cached_property
-    def robust(self) -> Array:
-        """That for residuals with memory."""
-        cov = robust_covariance(self.jacobian, self.residuals, self.sizes)
-        return embedded(cov, self.loose, self.count)
-
-
-def spread_of(
+def spreads_of(
     found: Minimum, labels: Sequence[str], loose: list[int], sizes: Sequence[int]
-) -> Spread:
-    """The covariances at a minimum; refuses parameters that the recording does not distinguish."""
-    jacobian = found.jacobian[:, loose]
+) -> tuple[Array, Array]:
+    """Covariances at a minimum, for white residuals and for those with memory.
+
+    Zero for parameters that are not `loose`; refuses those that the recording does not distinguish.
+    """
+    jacobian, residuals, count = found.jacobian[:, loose], -found.misfit, len(labels)
     check_distinguishable(jacobian, [labels[i] for i in loose])
-    return Spread(jacobian, -found.misfit, loose, len(labels), sizes)
+    white = embedded(white_covariance(jacobian, residuals), loose, count)
+    return white, embedded(robust_covariance(jacobian, residuals, sizes), loose, count)
 
 
 def check_fit(model: Model, found: Minimum, fitted: Sequence[Run]) -> Whiteness:

@@ -36,7 +36,7 @@ from deadtime.estimation.data._checks import (
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import stiffness_of
 from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, place_of
-from deadtime.estimation.methods._conclusion import OfOne, Read, spread_of
+from deadtime.estimation.methods._conclusion import OfOne, Read, spreads_of
 from deadtime.estimation.methods._method import Run, check_initial_output
 from deadtime.loops import ControlLoop
 
@@ -98,8 +98,8 @@ class CTA(OfOne):
                 "no response of such a loop to this reference; check columns, signs and gains"
             )
         count = len(names)
-        spread = spread_of(found, model.labels, list(range(len(model.labels))), model.sizes)
-        cov = spread.robust[:count, :count]
+        every = list(range(len(model.labels)))
+        cov = spreads_of(found, model.labels, every, model.sizes)[1][:count, :count]
         values = model.values(found.point)
         check_gain(values, standard_errors(names, cov))
         return Read(

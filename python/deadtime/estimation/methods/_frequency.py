@@ -22,7 +22,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -52,6 +52,9 @@ from deadtime.estimation.methods._method import Run
 from deadtime.estimation.models._held import HeldResponse
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
+
+#: The rows, what is fitted, no initial output, and what is known.
+_Asked: TypeAlias = tuple[Recording, tuple[str, ...], float, Mapping[str, float]]
 
 #: Longest delay of the search, as a share of the record or of the periods.
 LONGEST = 0.6
@@ -113,10 +116,10 @@ class Frequency(OfOne):
         top = math.inf if self.highest is None else self.highest
         known = {**loop.parameters, "delay": 0.0 if loop.delay is None else loop.delay}
         if self.period is None:
-            lines = _record_lines(data, names, known, response, top)
+            lines = _record_lines((data, names, 0.0, known), response, top)
         else:
             periods = whole_periods(data, self.period, self.left_out, top)
-            lines = _periodic_lines(data, names, known, command[rows], periods)
+            lines = _periodic_lines((data, names, 0.0, known), command[rows], periods)
         fit = lines.fit()
         values = lines.values(fit.point)
         loose = [i for i, name in enumerate(names) if name != "lag" or values["lag"] > 0.0]
@@ -193,7 +196,7 @@ class _Lines(ModelOfOne):
         row, lag = self.row, place_of("lag", self.names)
         if "delay" not in self.names:
             found = self.problem.solve()
-            return self.problem.without_vanishing(found, lag, None, 0.0)
+            return self.problem.without_vanishing(found, None, lag, 0.0)
         count = int(min(MOST_POINTS, max(2.0, self.longest / row)))
         grid = np.linspace(0.0, self.longest, count + 1)
         guess = np.array([self.known["gain"] if name == "gain" else row for name in self.names])
@@ -206,14 +209,9 @@ class _Lines(ModelOfOne):
         return found
 
 
-def _record_lines(
-    data: Recording,
-    names: tuple[str, ...],
-    known: Mapping[str, float],
-    response: HeldResponse,
-    highest: float,
-) -> _Lines:
+def _record_lines(asked: _Asked, response: HeldResponse, highest: float) -> _Lines:
     """Lines of one record without the mean; white noise has the same size at each."""
+    data, names, *_ = asked
     size = len(data)
     frequencies = np.fft.rfftfreq(size, data.sample_time)
     kept = (frequencies > 0.0) & (frequencies <= highest)
@@ -235,17 +233,12 @@ def _record_lines(
     longest = LONGEST * float(data.time[-1] - data.time[0])
     describe = f"{int(kept.sum())} of one record"
     freedom = real - len(names)
-    return _Lines(data, names, 0.0, known, made, False, freedom, 1.0, longest, describe)
+    return _Lines(*asked, made, False, freedom, 1.0, longest, describe)
 
 
-def _periodic_lines(
-    data: Recording,
-    names: tuple[str, ...],
-    known: Mapping[str, float],
-    command: Array,
-    periods: Periods,
-) -> _Lines:
+def _periodic_lines(asked: _Asked, command: Array, periods: Periods) -> _Lines:
     """Excited lines of periods, over their standard deviations between periods."""
+    data, names, *_ = asked
     freedom = 2 * periods.lines.size - len(names)
     if freedom < 2:
         raise NotIdentifiableError(
@@ -264,7 +257,7 @@ def _periodic_lines(
         samples=periods.samples,
         lines=periods.lines.tolist(),
     )
-    return _Lines(data, names, 0.0, known, made, True, freedom, widening, longest, describe)
+    return _Lines(*asked, made, True, freedom, widening, longest, describe)
 
 
 def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:

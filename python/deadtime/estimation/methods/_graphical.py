@@ -38,7 +38,8 @@ from deadtime.estimation.methods._method import Run, check_choice
 
 Construction = Literal["tangent", "two_point", "first_movement"]
 
-#: Movements below this share of the step count as rounding.
+#: Movements below this share of the step, and delays below this share of the response, count as
+#: rounding.
 LEAST = 1e-9
 
 
@@ -87,7 +88,7 @@ class Graphical(OfOne):
             delay = _two_point(reading, *self.shares)
         elif self.construction == "tangent":
             delay, stderr = _tangent(reading, moved, loop.sample_time)
-        if not delay > 0.0:
+        if not delay > LEAST * float(reading.since[-1]):
             raise NotIdentifiableError(
                 f"the line meets the initial output {-delay:.3g} s before the step: the samples on "
                 "it are too few or too noisy, or there is no delay; use method='waveform'"

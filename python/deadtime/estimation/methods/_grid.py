@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -40,7 +40,7 @@ from deadtime.estimation.methods._conclusion import (
     OfOne,
     Read,
     is_rounding,
-    spread_of,
+    spreads_of,
 )
 from deadtime.estimation.methods._method import Run, check_initial_output
 from deadtime.estimation.methods._waveform import simulated_model
@@ -89,6 +89,7 @@ class Grid(OfOne):
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, model = run.loop, simulated_model(run, names, self.initial_output)
+        model = replace(model, least_lag=0.0)  # where it acts as a delay, a lag is none
         data, labels = model.recording, model.labels
         start, span = start_and_span(data)
         grid = np.array(self.delays) if self.delays is not None else _delays(model.low[0], span)
@@ -110,9 +111,9 @@ class Grid(OfOne):
         check_ends(labels, point, model.low, model.high)
         at_zero = point <= model.low * (1.0 + 1e-6) + 1e-9
         loose = [i for i, name in enumerate(labels) if name != "lag" or not at_zero[i]]
+        plain, robust = spreads_of(found, labels, loose, model.sizes)
         white = whiteness_of(residuals, len(names)).white or is_rounding(residuals, data)
-        spread = spread_of(found, labels, loose, model.sizes)
-        cov = spread.white if white else spread.robust
+        cov = plain if white else robust
         errors = standard_errors(names, cov)
         values = model.values(point)
         check_gain(values, errors)
@@ -139,7 +140,7 @@ class Grid(OfOne):
             },
             recording=data,
             residuals=residuals,
-            crb=CramerRaoBound(labels, FlightNoise(noise), standard_errors(names, spread.white)),
+            crb=CramerRaoBound(labels, FlightNoise(noise), standard_errors(names, plain)),
         )
 
 

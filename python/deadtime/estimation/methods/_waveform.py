@@ -160,6 +160,7 @@ class SimulatedModel(ModelOfOne):
     """The misfit of the simulated loop, bounded where simulations diverge."""
 
     simulated: SimulatedRecording
+    least_lag: float = LEAST_LAG
 
     @property
     def kernel(self) -> LoopMisfit:
@@ -172,7 +173,7 @@ class SimulatedModel(ModelOfOne):
         start, span = start_and_span(recording)
         shortest = lag = shortest_time(recording)
         if loop.is_sampled:
-            shortest, lag = 0.0, LEAST_LAG * recording.sample_time
+            shortest, lag = 0.0, self.least_lag * recording.sample_time
         delays = np.geomspace(0.003, 0.6, DELAY_POINTS) * span
         found = {
             "delay": Ends(shortest, span, delays),

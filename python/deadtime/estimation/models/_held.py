@@ -67,6 +67,21 @@ class PathSlopes(NamedTuple):
     by: dict[str, Array]
 
 
+def _quotient(
+    path: SteppedPath | LimitedPath,
+    times: Array,
+    values: Mapping[str, float],
+    name: str,
+    share: float,
+) -> Array:
+    """Difference quotient of a path by one number, in steps of a share of it."""
+    step = share * abs(values[name])
+    higher, lower = (
+        path.value(times, {**values, name: values[name] + move}) for move in (step, -step)
+    )
+    return np.asarray((higher - lower) / (2.0 * step))
+
+
 class SteppedPath:
     """The simulated output of any other plant."""
 
@@ -87,15 +102,8 @@ class SteppedPath:
         rate = (self.value(times + change, values) - self.value(times - change, values)) / (
             2.0 * change
         )
-        by = {}
-        for name in names:
-            if name in self._plant.parameters and name != "gain":
-                step = STEP * abs(values[name])
-                higher, lower = (
-                    self.value(times, {**values, name: values[name] + sign * step})
-                    for sign in (1.0, -1.0)
-                )
-                by[name] = (higher - lower) / (2.0 * step)
+        own = [name for name in names if name in self._plant.parameters and name != "gain"]
+        by = {name: _quotient(self, times, values, name, STEP) for name in own}
         return PathSlopes(rate, by)
 
 
@@ -115,12 +123,7 @@ class LimitedPath:
         found = self._at(values).slopes(times, values, names)
         for name in RATE_LIMITS:
             if name in names:
-                step = LIMIT_STEP * values[name]
-                higher, lower = (
-                    self.value(times, {**values, name: values[name] + sign * step})
-                    for sign in (1.0, -1.0)
-                )
-                found.by[name] = (higher - lower) / (2.0 * step)
+                found.by[name] = _quotient(self, times, values, name, LIMIT_STEP)
         return found
 
     def _at(self, values: Mapping[str, float]) -> Path:

@@ -17,6 +17,9 @@ use crate::linear_algebra::elimination::Eliminated;
 use crate::linear_algebra::rows::Rows;
 use crate::{Error, Task};
 
+/// Misfit where the modes of the loop are not found: more than that of any loop that is recorded.
+const NO_MODES: f64 = 1e20;
+
 /// Shift of an eigenvalue at which its vectors are found, as a share of it: less may divide by zero.
 const SHIFT: f64 = 1e-13;
 
@@ -64,8 +67,9 @@ impl Chebyshev {
 
 impl Part for Chebyshev {
     fn misfit(&self, point: &[f64], _: &Task) -> Result<Vec<f64>, Error> {
+        // Numbers at which the modes are not found are as far from the minimum as any.
         let Some(found) = self.output_at(point) else {
-            refuse!("the approximated loop has no modes at these numbers")
+            return Ok(vec![NO_MODES; self.output.len()]);
         };
         Ok(found.iter().zip(&self.output).map(|(x, y)| x - y).collect())
     }

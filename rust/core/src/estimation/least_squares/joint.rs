@@ -37,6 +37,8 @@ pub struct Joint<'a> {
     parts: Vec<Fitted<'a>>,
     /// Factor on the residuals of each.
     pub weights: Vec<f64>,
+    /// The places of a delay and a lag, which trade.
+    pub trade: Option<(usize, usize)>,
     common: usize,
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
@@ -54,6 +56,7 @@ impl<'a> Joint<'a> {
         Self {
             parts,
             weights,
+            trade: None,
             common,
             low,
             high,
@@ -271,6 +274,20 @@ impl Space {
             base[*place] = 0.0;
         }
         Self::new(joint, base, places.into_iter().map(unit).collect())
+    }
+
+    /// Does a parameter move here?
+    pub(super) fn moves(&self, place: usize) -> bool {
+        self.moving.contains(&place)
+    }
+
+    /// Does a step end on a bound that it was not on?
+    pub(super) fn cuts(&self, from: &[f64], to: &[f64]) -> bool {
+        let ends = self.low.iter().zip(&self.high);
+        let pairs = from.iter().zip(to).zip(ends);
+        pairs
+            .into_iter()
+            .any(|((from, to), (low, high))| from != to && (to == low || to == high))
     }
 
     pub(super) fn clamp(&self, q: &mut [f64]) {

@@ -62,7 +62,38 @@ pub(super) fn minimise(
 }
 
 /// The same without derivatives at the end, where they were not needed.
+///
+/// To first order a lag acts like a delay: where one of both ends on its bound, the way along which they
+/// trade is level, and the search begins again with half of their sum in each.
 pub(super) fn descend(
+    joint: &Joint<'_>,
+    start: &[f64],
+    space: &Space,
+    tolerance: f64,
+    task: &Task,
+) -> Result<Minimum, Error> {
+    let found = from(joint, start, space, tolerance, task)?;
+    let Some((delay, lag)) = joint.trade.filter(|(_, lag)| space.moves(*lag)) else {
+        return Ok(found);
+    };
+    let total = found.point[delay] + found.point[lag];
+    let on_bound = |place: usize| found.point[place] - joint.low[place] <= SEARCH.on_bound * total;
+    if !(on_bound(delay) || on_bound(lag)) {
+        return Ok(found);
+    }
+    let mut middle = found.point.clone();
+    middle[delay] = 0.5 * total;
+    middle[lag] = 0.5 * total;
+    let other = from(joint, &middle, space, tolerance, task)?;
+    Ok(if other.cost() < found.cost() {
+        other
+    } else {
+        found
+    })
+}
+
+/// A search from one start.
+fn from(
     joint: &Joint<'_>,
     start: &[f64],
     space: &Space,
@@ -85,6 +116,11 @@ pub(super) fn descend(
                 break;
             };
             if promised(&along, &left, &q, &next) <= tolerance * cost {
+                // A step that bounds cut short promises more where it is shorter.
+                if space.cuts(&q, &next) {
+                    damping *= SEARCH.change * SEARCH.change;
+                    continue;
+                }
                 break;
             }
             let there = space.point(&next);

@@ -16,6 +16,9 @@ pub(super) struct Search {
     pub(super) change: f64,
     /// Damping at which the search has come to an end.
     pub(super) most_damping: f64,
+    /// Distance of a delay or lag to its bound, as a share of both, at which the search begins again: more
+    /// finds lower minima, and costs searches.
+    pub(super) on_bound: f64,
 }
 
 pub(super) const SEARCH: Search = Search {
@@ -26,6 +29,7 @@ pub(super) const SEARCH: Search = Search {
     damping: 1e-3,
     change: 5.0,
     most_damping: 1e12,
+    on_bound: 1e-2,
 };
 
 /// Weights of several recordings.
