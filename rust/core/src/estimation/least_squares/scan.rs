@@ -2,7 +2,7 @@
 
 use super::super::damped::stepped;
 use super::joint::{Joint, Space};
-use super::search::{Minimum, minimise};
+use super::search::{Minimum, descend, minimise};
 use super::tolerances::{SEARCH, ZERO};
 use crate::linear_algebra::vectors::dot;
 use crate::{Error, Task};
@@ -95,7 +95,7 @@ pub fn refined(
     let mut best: Option<Minimum> = None;
     for place in places.into_iter().take(SEARCH.refined) {
         let start = &scan.points[place];
-        let found = minimise(joint, start, &all, SEARCH.to_rounding, task)?;
+        let found = descend(joint, start, &all, SEARCH.to_compare, task)?;
         if best.as_ref().is_none_or(|best| found.cost() < best.cost()) {
             best = Some(found);
         }
@@ -103,6 +103,7 @@ pub fn refined(
     let Some(best) = best else {
         refuse!("there is no delay to try")
     };
+    let best = minimise(joint, &best.point, &all, SEARCH.to_rounding, task)?;
     let Some(lag) = lag else { return Ok(best) };
     let mut start = best.point.clone();
     start[0] += best.point[lag] - joint.low[lag];

@@ -45,6 +45,9 @@ pub fn solve(joint: &Joint<'_>, task: &Task) -> Result<Minimum, Error> {
 
 /// A search from `start` over the points of a space, until a step promises less than this share.
 ///
+/// To first order a lag acts like a delay: where one of both ends on its bound, the way along which they
+/// trade is level, and the search begins again with half of their sum in each.
+///
 /// # Errors
 /// As those of the misfit.
 pub(super) fn minimise(
@@ -55,45 +58,30 @@ pub(super) fn minimise(
     task: &Task,
 ) -> Result<Minimum, Error> {
     let mut found = descend(joint, start, space, tolerance, task)?;
+    if let Some((delay, lag)) = joint.trade.filter(|(_, lag)| space.moves(*lag)) {
+        let total = found.point[delay] + found.point[lag];
+        let reach = SEARCH.on_bound * total;
+        if [delay, lag]
+            .iter()
+            .any(|x| found.point[*x] - joint.low[*x] <= reach)
+        {
+            let mut middle = found.point.clone();
+            middle[delay] = 0.5 * total;
+            middle[lag] = 0.5 * total;
+            let other = descend(joint, &middle, space, tolerance, task)?;
+            if other.cost() < found.cost() {
+                found = other;
+            }
+        }
+    }
     if found.slopes.is_empty() {
         found.slopes = joint.slopes(&found.point, task)?;
     }
     Ok(found)
 }
 
-/// The same without derivatives at the end, where they were not needed.
-///
-/// To first order a lag acts like a delay: where one of both ends on its bound, the way along which they
-/// trade is level, and the search begins again with half of their sum in each.
+/// The same from one start, without derivatives at the end where they were not needed.
 pub(super) fn descend(
-    joint: &Joint<'_>,
-    start: &[f64],
-    space: &Space,
-    tolerance: f64,
-    task: &Task,
-) -> Result<Minimum, Error> {
-    let found = from(joint, start, space, tolerance, task)?;
-    let Some((delay, lag)) = joint.trade.filter(|(_, lag)| space.moves(*lag)) else {
-        return Ok(found);
-    };
-    let total = found.point[delay] + found.point[lag];
-    let on_bound = |place: usize| found.point[place] - joint.low[place] <= SEARCH.on_bound * total;
-    if !(on_bound(delay) || on_bound(lag)) {
-        return Ok(found);
-    }
-    let mut middle = found.point.clone();
-    middle[delay] = 0.5 * total;
-    middle[lag] = 0.5 * total;
-    let other = from(joint, &middle, space, tolerance, task)?;
-    Ok(if other.cost() < found.cost() {
-        other
-    } else {
-        found
-    })
-}
-
-/// A search from one start.
-fn from(
     joint: &Joint<'_>,
     start: &[f64],
     space: &Space,
