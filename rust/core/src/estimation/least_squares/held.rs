@@ -1,7 +1,7 @@
 //! The least cost with one quantity held, the others free.
 
 use super::joint::{Joint, Space};
-use super::search::{Minimum, descend};
+use super::search::{Minimum, along_trade};
 use super::tolerances::SEARCH;
 use crate::linear_algebra::lu::Lu;
 use crate::linear_algebra::vectors::dot;
@@ -27,7 +27,7 @@ pub fn least_held(
     let search = |base: &[f64], free: &[Vec<f64>]| {
         let start = linear(best, base, free);
         let space = Space::new(joint, base.to_vec(), free.to_vec());
-        Ok::<_, Error>(descend(joint, &start, &space, SEARCH.to_compare, task)?.cost())
+        Ok::<_, Error>(along_trade(joint, &start, &space, SEARCH.to_hold, task)?.cost())
     };
     let mut least = search(base, free)?;
     let mut base = base.to_vec();

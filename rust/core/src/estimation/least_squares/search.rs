@@ -45,9 +45,6 @@ pub fn solve(joint: &Joint<'_>, task: &Task) -> Result<Minimum, Error> {
 
 /// A search from `start` over the points of a space, until a step promises less than this share.
 ///
-/// To first order a lag acts like a delay: where one of both ends on its bound, the way along which they
-/// trade is level, and the search begins again with half of their sum in each.
-///
 /// # Errors
 /// As those of the misfit.
 pub(super) fn minimise(
@@ -57,30 +54,44 @@ pub(super) fn minimise(
     tolerance: f64,
     task: &Task,
 ) -> Result<Minimum, Error> {
-    let mut found = descend(joint, start, space, tolerance, task)?;
-    if let Some((delay, lag)) = joint.trade.filter(|(_, lag)| space.moves(*lag)) {
-        let total = found.point[delay] + found.point[lag];
-        let reach = SEARCH.on_bound * total;
-        if [delay, lag]
-            .iter()
-            .any(|x| found.point[*x] - joint.low[*x] <= reach)
-        {
-            let mut middle = found.point.clone();
-            middle[delay] = 0.5 * total;
-            middle[lag] = 0.5 * total;
-            let other = descend(joint, &middle, space, tolerance, task)?;
-            if other.cost() < found.cost() {
-                found = other;
-            }
-        }
-    }
+    let mut found = along_trade(joint, start, space, tolerance, task)?;
     if found.slopes.is_empty() {
         found.slopes = joint.slopes(&found.point, task)?;
     }
     Ok(found)
 }
 
-/// The same from one start, without derivatives at the end where they were not needed.
+/// The same without derivatives at the end, where they were not needed.
+///
+/// To first order a lag of zero acts like a delay: where it ends on its bound, the way along which they
+/// trade is level, and the search begins again with half of their sum in each.
+pub(super) fn along_trade(
+    joint: &Joint<'_>,
+    start: &[f64],
+    space: &Space,
+    tolerance: f64,
+    task: &Task,
+) -> Result<Minimum, Error> {
+    let found = descend(joint, start, space, tolerance, task)?;
+    let Some((delay, lag)) = joint.trade.filter(|(_, lag)| space.moves(*lag)) else {
+        return Ok(found);
+    };
+    let total = found.point[delay] + found.point[lag];
+    if found.point[lag] - joint.low[lag] > SEARCH.on_bound * total {
+        return Ok(found);
+    }
+    let mut middle = found.point.clone();
+    middle[delay] = 0.5 * total;
+    middle[lag] = 0.5 * total;
+    let other = descend(joint, &middle, space, tolerance, task)?;
+    Ok(if other.cost() < found.cost() {
+        other
+    } else {
+        found
+    })
+}
+
+/// A search from one start alone.
 pub(super) fn descend(
     joint: &Joint<'_>,
     start: &[f64],

@@ -10,13 +10,16 @@ pub(super) struct Search {
     pub(super) to_rounding: f64,
     /// The same where minima are compared, which are flat: more ends sooner, further away.
     pub(super) to_compare: f64,
+    /// The same where a quantity is held: more moves the ends of intervals, by 3e-4 of them for some
+    /// hundred rows.
+    pub(super) to_hold: f64,
     /// First damping of the steps; more is slower and surer.
     pub(super) damping: f64,
     /// Factor by which damping changes.
     pub(super) change: f64,
     /// Damping at which the search has come to an end.
     pub(super) most_damping: f64,
-    /// Distance of a delay or lag to its bound, as a share of both, at which the search begins again: more
+    /// Distance of a lag to its bound, as a share of delay and lag, at which the search begins again: more
     /// finds lower minima, and costs searches.
     pub(super) on_bound: f64,
 }
@@ -26,6 +29,7 @@ pub(super) const SEARCH: Search = Search {
     evaluations: 200,
     to_rounding: 1e-14,
     to_compare: 1e-6,
+    to_hold: 1e-5,
     damping: 1e-3,
     change: 5.0,
     most_damping: 1e12,
