@@ -788,6 +788,158 @@ def held_response(
     times: _Reals,
 ) -> _Reals: ...
 
+class _SimulatedRows(Protocol):
+    @property
+    def time(self) -> _Reals: ...
+    @property
+    def reference(self) -> _Reals: ...
+    @property
+    def output(self) -> _Reals: ...
+    @property
+    def past(self) -> _Reals: ...
+    @property
+    def row(self) -> float: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def bound(self) -> float: ...
+
+@final
+class LoopMisfit:
+    def __new__(
+        cls,
+        control: Loop,
+        rows: _SimulatedRows,
+        names: Sequence[str],
+        start: float | None,
+        *,
+        is_smooth: bool,
+        polynomials: Any = None,
+    ) -> LoopMisfit: ...
+
+@final
+class ChebyshevMisfit:
+    def __new__(
+        cls,
+        time: _Reals,
+        output: _Reals,
+        steps: Sequence[_Pair],
+        *,
+        known: tuple[float, float, float, float],
+        places: Sequence[int | None],
+        start: float | None,
+        intervals: int,
+        is_late: bool,
+        units: Sequence[float],
+    ) -> ChebyshevMisfit: ...
+
+_LineNumbers: TypeAlias = tuple[Sequence[float], Sequence[int | None], float]
+
+@final
+class LinesMisfit:
+    @staticmethod
+    def of_record(
+        numbers: _LineNumbers,
+        commands: tuple[_Reals, _Reals],
+        time: _Reals,
+        output: _Reals,
+        last: int | None,
+    ) -> LinesMisfit: ...
+    @staticmethod
+    def of_periods(
+        numbers: _LineNumbers,
+        command: _Reals,
+        output: _Reals,
+        samples: int,
+        lines: Sequence[int],
+    ) -> LinesMisfit: ...
+
+class _FittedPart(Protocol):
+    @property
+    def kernel(self) -> Any: ...
+    @property
+    def length(self) -> int: ...
+    @property
+    def low(self) -> _Reals: ...
+    @property
+    def high(self) -> _Reals: ...
+    @property
+    def axes(self) -> list[list[float]]: ...
+
+@final
+class LeastSquaresMinimum:
+    point: Final[_Reals]
+    misfit: Final[_Reals]
+    jacobian: Final[_Reals]
+    def __new__(cls, point: _Reals, misfit: _Reals, jacobian: _Reals) -> LeastSquaresMinimum: ...
+    @property
+    def cost(self) -> float: ...
+
+@final
+class LeastSquares:
+    def __new__(
+        cls,
+        parts: Sequence[_FittedPart],
+        weights: Sequence[float],
+        common: int,
+        delay: int | None,
+        lag: int | None,
+    ) -> LeastSquares: ...
+    def misfit(self, point: _Reals) -> _Reals: ...
+    def jacobian(self, point: _Reals) -> _Reals: ...
+    def solve(self) -> LeastSquaresMinimum: ...
+    def by_scatter(self, first: LeastSquaresMinimum) -> tuple[list[float], LeastSquaresMinimum]: ...
+    def without_vanishing(
+        self, found: LeastSquaresMinimum, delay: int | None, lag: int | None, size: float
+    ) -> LeastSquaresMinimum: ...
+    def least_held(self, best: LeastSquaresMinimum, base: _Reals, free: _Reals) -> float: ...
+    def scan(
+        self, delays: _Reals, guess: _Reals, lag: int | None, rounding: float
+    ) -> tuple[_Reals, list[int], LeastSquaresMinimum]: ...
+
+def fit_covariance(
+    jacobian: _Reals, residuals: _Reals, sizes: Sequence[int] | None, white: bool
+) -> _Reals: ...
+
+_Peak: TypeAlias = tuple[float, float, float, float]
+_Delays: TypeAlias = tuple[int, int]
+
+def step_extremes(since: _Reals, beyond: _Reals, noise: float) -> list[_Peak]: ...
+def extremes_decay(extremes: Sequence[_Peak]) -> bool: ...
+def loop_of_extremes(
+    extremes: Sequence[_Peak], lag: float, sample_time: float | None
+) -> tuple[_Pair, tuple[list[float], list[float]] | None]: ...
+def tail_rate(time: _Reals, left: _Reals, guess: float) -> tuple[float, float, float]: ...
+def delay_of_rate(
+    rate: float, stiffness: float, lag: float, sample_time: float | None
+) -> _Pair: ...
+def x_of_overshoot(overshoot: float) -> float | None: ...
+def rise_tangent(
+    since: _Reals, travelled: _Reals, guess: float, held: float | None, noise: float
+) -> tuple[_Pair | None, tuple[int, float, float] | None]: ...
+def cycle_crossings(time: _Reals, error: _Reals, noise: float) -> _Reals: ...
+def cycle_switches(
+    time: _Reals, signs: _Reals, crossings: _Reals
+) -> tuple[list[int], list[float]]: ...
+def cycle_delays(crossings: _Reals, switches: _Reals) -> tuple[int, float, float]: ...
+def cycle_delay_by_lag(lag: float, half: float) -> float: ...
+def integrator_path(
+    time: _Reals, command: _Reals, times: _Reals, lag: float
+) -> tuple[_Reals, _Reals, _Reals]: ...
+def arx_losses(
+    output: _Reals, command: _Reals, orders: _Delays, delays: _Delays
+) -> tuple[_Reals, float, float]: ...
+def held_losses(
+    response: _Reals, command: _Reals, delays: _Delays
+) -> tuple[float, _Reals, float]: ...
+def correlation_peak(
+    command: _Reals, response: _Reals, weighting: str, shifts: _Delays
+) -> tuple[int, float]: ...
+def correlation_coefficient(command: _Reals, response: _Reals, shift: int) -> _Pair: ...
+def feedback_test(
+    command: _Reals, reference: _Reals, output: _Reals
+) -> tuple[float, int, int] | None: ...
+
 class _LoopSets(Protocol):
     @property
     def values(self) -> dict[str, _Reals]: ...

@@ -7,7 +7,6 @@ from deadtime.estimation import GCC, ARXScan
 from deadtime.estimation.data._input_output import FEEDBACK, feedback_p_value
 from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.methods._arx_scan import F_TEST_LEVEL, _check_response
-from deadtime.estimation.methods._gcc import _whitener
 from deadtime.estimation.models._held import HeldResponse
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import brentq
@@ -82,15 +81,6 @@ def test_other_plants_are_correlated_without_compensation():
     assert "not inverted" in fit.message
     with pytest.raises(ValueError, match="RationalPlant"):
         dtm.estimate_delay(recording, loop, method=ARXScan(fractional=True))
-
-
-def test_the_order_of_a_whitener_is_that_of_akaike():
-    # For white noise his criterion takes no coefficient with a probability of exp(-sum P(X_i >
-    # 2 i)/i) = 0.712, X_i chi-square with i degrees of freedom (Shibata 1976).
-    random = np.random.default_rng(0)
-    orders = [_whitener(random.normal(size=400)).size - 1 for _ in range(200)]
-    # 200 draws: a deviation of 0.032.
-    assert np.mean(np.equal(orders, 0)) == pytest.approx(0.712, abs=0.096)
 
 
 def test_the_mean_command_of_a_continuous_loop_stops_before_a_jump():

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from deadtime.estimation import Frequency
 from deadtime.estimation._estimate import METHODS
-from deadtime.estimation.data._input_output import InputOutput
-from deadtime.estimation.methods import _arx_scan as arx_scan
+from deadtime.estimation._native import arx_losses
 from step_recordings import record_step
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), sample_time=0.065, limit=1.0)
@@ -57,13 +56,15 @@ def test_the_losses_of_an_arx_scan_are_those_of_least_squares_at_every_delay():
     command = random.normal(size=400)
     output = np.cumsum(np.concatenate([np.zeros(7), command])[:401]) * 0.1
     output += random.normal(0.0, 0.2, output.size)
-    read = InputOutput(command, np.diff(output), 0.1, 0.0, "")
-    losses, best, none = arx_scan._scan(output, read, 2, 2, 0)
-    assert losses.size == read.longest > 200
-    late = arx_scan._Delayed(command, output.size)
+    losses, best, none = arx_losses(output, command, (2, 2), (0, 240))
+    assert losses.size == 240
+
+    def late(samples):
+        return np.concatenate([np.zeros(samples), command])[: output.size]
+
     past = [np.concatenate([np.zeros(lag), output])[: output.size] for lag in (1, 2)]
     for place in range(0, losses.size, 7):
-        columns = np.stack([*past, late.at(place + 1), late.at(place + 2)], axis=1)
+        columns = np.stack([*past, late(place + 1), late(place + 2)], axis=1)
         left = output - columns @ np.linalg.lstsq(columns, output, rcond=None)[0]
         assert losses[place] == pytest.approx(float(left @ left), rel=1e-7)
     assert best < none

@@ -4,7 +4,6 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Waveform
-from deadtime.estimation.models._held import FactoredPath, SteppedPath, path_of
 from marks import NIGHTLY
 from vehicles import answer, record_attitude
 
@@ -31,26 +30,6 @@ def test_each_lag_is_recovered_without_noise(integrator):
     assert sorted([found["lag_1"], found["lag_2"]]) == pytest.approx([0.05, 0.15], rel=2e-3)
     assert fit.delay == pytest.approx(0.047, rel=2e-3)
     assert fit.lag == pytest.approx(0.2, rel=1e-3)
-
-
-@pytest.mark.parametrize("zero", [0.0, 0.02])
-def test_one_lag_behind_an_integrator_is_its_simulation(zero):
-    random = np.random.default_rng(5)
-    time, command = np.cumsum(random.uniform(0.01, 0.05, 60)), random.standard_normal(60)
-    plant = dtm.FactoredPlant([0.1], integrator=True)
-    values = {"lag_1": 0.07, "zero": zero}
-    closed, simulated = path_of(plant, time, command), SteppedPath(plant, time, command)
-    assert isinstance(closed, FactoredPath)
-    at = np.sort(random.uniform(time[0], time[-1], 200))
-    np.testing.assert_allclose(
-        closed.value(at, values), simulated.value(at, values), rtol=0, atol=1e-12
-    )
-    for names in ((), ("lag_1",), ("lag_1", "zero"))[: 3 if zero else 2]:
-        exact, differences = (path.slopes(at, values, names) for path in (closed, simulated))
-        np.testing.assert_allclose(exact.rate, differences.rate, rtol=0, atol=1e-5)
-        assert exact.by.keys() == set(names)
-        for name in names:
-            np.testing.assert_allclose(exact.by[name], differences.by[name], rtol=0, atol=1e-5)
 
 
 def test_the_zero_takes_from_the_total_lag():

@@ -4,7 +4,6 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import CTA, Grid
-from deadtime.estimation.methods._cta import chebyshev_differentiation
 from deadtime.estimation.methods._method import paired_runs
 from step_recordings import (
     TS,
@@ -90,13 +89,6 @@ def test_the_curvature_gives_the_spread_for_noise_outside_the_loop():
 
 
 # --- cta ------------------------------------------------------------------------------------
-
-
-def test_the_differentiation_matrix_is_exact_for_polynomials():
-    points = np.cos(np.pi * np.arange(7) / 6)
-    for power in range(7):
-        slope = power * points ** max(0, power - 1)
-        np.testing.assert_allclose(chebyshev_differentiation(6) @ points**power, slope, atol=1e-12)
 
 
 @pytest.mark.parametrize(

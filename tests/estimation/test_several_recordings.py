@@ -74,11 +74,11 @@ def test_coloured_misfit_is_weighted_by_the_size_of_the_step():
 
 def test_the_joint_model_consists_of_the_models_of_its_recordings():
     from deadtime.estimation.methods._method import paired_runs
-    from deadtime.estimation.methods._waveform import _model
+    from deadtime.estimation.methods._waveform import simulated_model
 
     pairs = [record_step(Kp, 0.01, 3) for Kp in (0.8, 2.0)]
     runs = paired_runs([p[0] for p in pairs], [p[1] for p in pairs])
-    parts = tuple(_model(run, ("delay", "gain")) for run in runs)
+    parts = tuple(simulated_model(run, ("delay", "gain")) for run in runs)
     joint = JointModel(parts, (1.0, 0.5))
     assert joint.labels[2:] == tuple(f"initial output of recording {k}" for k in (1, 2))
     point = np.array([0.4, 0.8, 0.01, -0.02])

@@ -6,8 +6,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Decay, Graphical, Overshoot
-from deadtime.estimation.methods._decrement import loop_with_root
-from deadtime.estimation.models._held import held_transfer
+from deadtime.estimation._native import loop_of_extremes
 from hypothesis import given, settings, strategies as st
 from step_recordings import (
     TS,
@@ -21,18 +20,6 @@ from step_recordings import (
 METHODS = ("decrement", "decay", "graphical")
 
 
-# --- the held plant -------------------------------------------------------------------------
-
-
-@settings(max_examples=30)
-@given(st.floats(0.1, 0.4), st.sampled_from([0.0, 0.02, 0.3]), st.floats(0.5, 3.0))
-def test_the_held_plant_has_the_poles_of_the_sampled_loop(delay, lag, Kp):
-    loop = dtm.ControlLoop(dtm.Integrator(0.9, lag), dtm.P(Kp), delay=delay, sample_time=TS)
-    for pole in loop.rightmost().roots:
-        z = np.exp(complex(pole) * TS)
-        assert 1.0 + 0.9 * Kp * held_transfer(z, delay, lag, TS) == pytest.approx(0.0, abs=1e-6)
-
-
 # --- decrement ------------------------------------------------------------------------------
 
 
@@ -42,7 +29,10 @@ def test_the_held_plant_has_the_poles_of_the_sampled_loop(delay, lag, Kp):
 def test_the_rightmost_root_gives_delay_and_gain(ts, lag, x):
     loop = dtm.ControlLoop(dtm.Integrator(1.0, lag), dtm.P(x / 0.36), delay=0.36, sample_time=ts)
     root = max(loop.rightmost().roots, key=lambda root: root.imag)
-    assert loop_with_root(complex(root), lag, ts) == pytest.approx((0.36, x / 0.36), rel=1e-9)
+    half = np.pi / root.imag
+    peaks = [(k * half, np.exp(root.real * k * half), 1e-9, 1e-9) for k in range(1, 4)]
+    _, made = loop_of_extremes(peaks, lag, ts)
+    assert made[0] == pytest.approx((0.36, x / 0.36), rel=1e-9)
 
 
 @pytest.mark.parametrize("ts", [None, TS])

@@ -25,7 +25,7 @@ CORE_ARROWS = {
     "tuning": {"quasipoly", "roots", "dde", "stability", "frequency"},
     "dde": {"linear_algebra", "elementary"},
     "loops": {"linear_algebra", "quasipoly", "dde", "stability", "frequency"},
-    "estimation": {"linear_algebra", "elementary", "quasipoly", "frequency"},
+    "estimation": {"linear_algebra", "elementary", "quasipoly", "frequency", "dde", "loops"},
 }
 
 # Files and folders of a package in order: each uses only those before it.
@@ -129,7 +129,10 @@ ORDER = {
         "profile",
         "flight",
         "online",
+        "damped",
         "family",
+        "least_squares",
+        "literature",
     ],
 }
 

@@ -12,6 +12,8 @@ mod fixed_step;
 mod flight;
 mod frequency;
 mod judgement;
+mod least_squares;
+mod literature;
 mod loading;
 mod loops;
 mod matrix;
@@ -63,6 +65,16 @@ mod _deadtime {
     #[pymodule_export]
     use super::judgement::{
         FlightFinding, FlightJudgement, colour_factors, judge, unseen_lag, whiteness,
+    };
+    #[pymodule_export]
+    use super::least_squares::{
+        ChebyshevMisfit, LeastSquares, LeastSquaresMinimum, LinesMisfit, LoopMisfit, fit_covariance,
+    };
+    #[pymodule_export]
+    use super::literature::{
+        arx_losses, correlation_coefficient, correlation_peak, cycle_crossings, cycle_delay_by_lag,
+        cycle_delays, cycle_switches, delay_of_rate, extremes_decay, feedback_test, held_losses,
+        integrator_path, loop_of_extremes, rise_tangent, step_extremes, tail_rate, x_of_overshoot,
     };
     #[pymodule_export]
     use super::loops::{

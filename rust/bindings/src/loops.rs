@@ -106,7 +106,7 @@ impl Entry<'_> {
 }
 
 /// Numerator and denominator in any entries.
-type Given<T> = (Vec<T>, Vec<T>);
+pub(crate) type Given<T> = (Vec<T>, Vec<T>);
 
 /// Coefficient, powers of the numbers, power of s, and the delay as a constant and slopes.
 type ListedTerm = (f64, Vec<u32>, u32, f64, Vec<f64>);
@@ -172,6 +172,10 @@ impl PyLoop {
             inner,
             linear: OnceLock::new(),
         }
+    }
+
+    pub(crate) fn core(&self) -> &ControlLoop {
+        &self.inner
     }
 
     fn places(&self, names: &[String]) -> PyResult<Vec<Place>> {

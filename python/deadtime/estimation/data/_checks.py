@@ -72,10 +72,12 @@ def integrator_of(loop: ControlLoop, method: str) -> Integrator:
     return loop.plant
 
 
-def check_delay_free(names: Sequence[str], method: str) -> None:
-    """Refuse a known delay, for a method that searches it."""
+def delay_and(free: Sequence[str], loop: ControlLoop, method: str) -> tuple[str, ...]:
+    """The checked names of what is fitted, for a method that searches the delay."""
+    names = checked_names(free, loop)
     if "delay" not in names:
         raise ValueError(f"the {method} method estimates the delay: keep it among `free`")
+    return names
 
 
 def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
@@ -179,6 +181,15 @@ def by_lag(name: str, plant: Plant | None) -> float:
 def check_moves(output: Array, command: Array | None = None) -> None:
     """Refuse a constant command, and a constant output."""
     _refuse(no_motion(output, command))
+
+
+def check_even(data: Recording, share: float, why: str) -> None:
+    """Refuse rows whose distance differs from the median by more than a share of it."""
+    steps, row = np.diff(data.time), data.sample_time
+    if float(np.max(np.abs(steps - row))) > share * row:
+        raise NotIdentifiableError(
+            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: {why}"
+        )
 
 
 def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) -> None:

@@ -21,7 +21,8 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation.data._checks import check_moves
+from deadtime.estimation._native import feedback_test
+from deadtime.estimation.data._checks import check_even, check_moves
 from deadtime.estimation.data._simulated import SimulatedRecording, commands_over_samples
 from deadtime.loops import FirstOrder, Integrator
 from deadtime.recordings import Recording
@@ -37,9 +38,6 @@ LONGEST = 0.6
 
 #: The command is taken to follow the output below this p-value.
 FEEDBACK = 1e-3
-
-#: Past samples in the test.
-PAST = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +76,9 @@ def read_input_output(simulated: SimulatedRecording, method: str) -> InputOutput
     Refuses a constant input or output.
     """
     data, loop = simulated.recording, simulated.loop
-    steps = np.diff(data.time)
     h = data.sample_time
-    if float(np.max(np.abs(steps - h))) > EVEN * h:
-        raise NotIdentifiableError(
-            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: the "
-            f"{method} method needs even ones; use method='output_error' or 'waveform'"
-        )
+    use = "needs even ones; use method='output_error' or 'waveform'"
+    check_even(data, EVEN, f"the {method} method {use}")
     command, _ = commands_over_samples(data, loop)
     if len(data) < FEWEST:
         raise NotIdentifiableError(
@@ -109,7 +103,7 @@ def read_input_output(simulated: SimulatedRecording, method: str) -> InputOutput
 def feedback_p_value(recording: Recording) -> float:
     """P-value of the test that the command does not depend on the output.
 
-    A Granger (1969) F test: whether the output, up to `PAST` samples back, improves the prediction
+    A Granger (1969) F test: whether the output, up to two samples back, improves the prediction
     of the command by the reference and past commands.
     """
     from scipy import special
@@ -117,22 +111,5 @@ def feedback_p_value(recording: Recording) -> float:
     command = recording.command
     if command is None:  # it is then computed from the output
         return 0.0
-    rows = np.arange(PAST, command.size)
-
-    def back(values: Array, first: int) -> list[Array]:
-        return [values[rows - lag] for lag in range(first, PAST + 1)]
-
-    plain = [np.ones(rows.size), *back(command, 1), *back(recording.reference, 0)]
-    full = [*plain, *back(recording.output, 0)]
-    left, ranks = [], []
-    for columns in (plain, full):
-        matrix = np.stack(columns, axis=1)
-        weights, _, rank, _ = np.linalg.lstsq(matrix, command[rows], rcond=1e-10)
-        left.append(float(np.sum((command[rows] - matrix @ weights) ** 2)))
-        ranks.append(int(rank))
-    more, freedom = ranks[1] - ranks[0], rows.size - ranks[1]
-    floor = 1e-20 * float(np.sum((command - command.mean()) ** 2))
-    if more < 1 or freedom < 1 or left[0] <= floor:
-        return 1.0
-    ratio = (left[0] - left[1]) / more / (max(left[1], floor) / freedom)
-    return float(special.fdtrc(more, freedom, max(ratio, 0.0)))
+    found = feedback_test(command, recording.reference, recording.output)
+    return 1.0 if found is None else float(special.fdtrc(found[1], found[2], found[0]))

@@ -1,18 +1,12 @@
-"""Spectra of a periodic experiment: means over the periods, and their covariances.
-
-The DFT of period m at the lines that the reference excites is U_m, Y_m; noise differs from period
-to period, the response to the reference does not. Means over M periods have 1/M of the covariances
-between the periods (Pintelon & Schoukens 2012, section 10.2). The spectrum of the noise is smooth,
-so covariances are also averaged over neighbouring lines, and few periods are enough.
-"""
+"""The whole periods of a periodic experiment, and the lines that its reference excites."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from deadtime._base.arrays import Array, Complex, Indices
+from deadtime._base.arrays import Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.recordings import Recording
@@ -20,47 +14,38 @@ from deadtime.recordings import Recording
 #: A line of the reference counts as excited above this share of the largest line.
 EXCITED = 1e-3
 
-#: Lines to either side over which covariances are averaged. The spectrum of noise in a loop is not
-#: flat: with three lines, standard errors were 10 % too small.
+#: Lines to either side over which the kernel averages covariances.
 NEIGHBOURS = 1
 
 #: Largest deviation of a period from a whole number of samples, in samples.
 WHOLE = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class PeriodicSpectra:
-    """Means over the periods at the excited lines, and their covariances.
+class Periods(NamedTuple):
+    """The whole periods that are used, and the lines of each.
 
     Attributes
     ----------
+    rows : slice
+    samples, repeated : int
+        Samples in a period, and periods.
     lines : ndarray of int
-        Harmonics of the period.
-    samples, periods : int
-        Samples in a period, and periods that were averaged.
-    input, output : ndarray of complex
-        Mean DFT of command and output.
-    input_variance, output_variance, covariance : ndarray
-        Variances and covariance of these means; ``covariance`` is E[n_y n_u*].
-    freedom : float
-        Complex degrees of freedom of each.
+        Harmonics of the period that the reference excites.
     """
 
-    lines: Indices
+    rows: slice
     samples: int
-    periods: int
-    input: Complex
-    output: Complex
-    input_variance: Array
-    output_variance: Array
-    covariance: Complex
-    freedom: float
+    repeated: int
+    lines: Indices
+
+    @property
+    def freedom(self) -> float:
+        """Complex degrees of freedom of the covariances between periods, averaged at the ends."""
+        return max(1.5, float((self.repeated - 1) * min(self.lines.size, 1 + NEIGHBOURS)))
 
 
-def periodic_spectra(
-    data: Recording, command: Array, period: float, left_out: int, highest: float
-) -> PeriodicSpectra:
-    """Spectra of the whole periods after the first `left_out`, up to `highest` Hz."""
+def whole_periods(data: Recording, period: float, left_out: int, highest: float) -> Periods:
+    """The whole periods after the first `left_out`, and their lines up to `highest` Hz."""
     h = data.sample_time
     samples = round(period / h)
     if abs(period / h - samples) > WHOLE or samples < 4:
@@ -77,10 +62,6 @@ def periodic_spectra(
         )
     begin = len(data) - periods * samples  # the last ones, in which the transient has decayed most
 
-    def spectra(values: Array) -> Complex:
-        parts = values[begin:].reshape(periods, samples)
-        return np.asarray(np.fft.rfft(parts, axis=1), dtype=np.complex128)
-
     reference = data.reference[begin:].reshape(periods, samples)
     spread = float(np.max(np.ptp(reference, axis=0)))
     if spread > 1e-6 * float(np.ptp(reference)) or float(np.ptp(reference)) == 0.0:
@@ -93,28 +74,4 @@ def periodic_spectra(
     excited = (power > EXCITED * power.max()) & (np.arange(power.size) / period <= highest)
     lines = np.flatnonzero(excited)
     lines = lines[2 * lines < samples]
-    u, y = spectra(command)[:, lines], spectra(data.output)[:, lines]
-    mean_u, mean_y = u.mean(axis=0), y.mean(axis=0)
-    off_u, off_y = u - mean_u, y - mean_y
-    scale = 1.0 / (periods * (periods - 1.0))
-
-    def averaged(products: Complex) -> Complex:
-        summed = products.sum(axis=0) * scale
-        width = np.ones(2 * NEIGHBOURS + 1)
-        count = np.convolve(np.ones(lines.size), width, "same")
-        if lines.size < width.size:
-            return np.full(lines.size, summed.mean())
-        return np.asarray(np.convolve(summed, width, "same") / count)
-
-    together = min(lines.size, NEIGHBOURS + 1)  # lines that are averaged at the ends
-    return PeriodicSpectra(
-        lines=lines,
-        samples=samples,
-        periods=periods,
-        input=mean_u,
-        output=mean_y,
-        input_variance=averaged(off_u * np.conj(off_u)).real,
-        output_variance=averaged(off_y * np.conj(off_y)).real,
-        covariance=averaged(off_y * np.conj(off_u)),
-        freedom=max(1.5, float((periods - 1) * together)),
-    )
+    return Periods(slice(begin, None), samples, periods, lines)

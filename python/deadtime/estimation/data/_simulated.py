@@ -13,16 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError, RecordingError
-from deadtime.estimation.data._checks import excited, start_and_span
+from deadtime.estimation._native import LoopMisfit
+from deadtime.estimation.data._checks import start_and_span
 from deadtime.loops import ControlLoop, P
 from deadtime.recordings import Recording
-from deadtime.systems import Response
 
 #: A logged command is taken to be the P controller's where the two differ by less than this share
 #: of the command's standard deviation. Larger values accept more noise in the log, and more foreign
@@ -37,16 +37,20 @@ MOST_SAMPLES = 50_000
 #: samples. Shorter ones take long to simulate and cannot be distinguished from zero.
 SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
-#: Relative step of difference quotients: of the parameter, the time between two samples, or the
-#: excitation.
-STEP = 1e-5
+#: Bound of the misfit of simulations that diverge, in units of the excitation.
+LARGEST_MISFIT = 1e3
 
-#: Step of the difference quotient by a delay or lag of zero in a continuous loop, as a share of the
-#: time between two samples. A shorter one makes the loop stiff.
-STEP_FROM_ZERO = 0.25
 
-IN_S = frozenset({"delay", "lag", "start"})
-NOT_NEGATIVE = frozenset({"delay", "lag"})
+class SimulatedRows(NamedTuple):
+    """A window of a recording, with the time between its rows and the bound of the misfit."""
+
+    time: Array
+    reference: Array
+    output: Array
+    past: Array
+    row: float
+    size: float
+    bound: float
 
 
 def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
@@ -134,83 +138,42 @@ class SimulatedRecording:
         self._past = _past_commands(recording, loop, rows.start)
 
     def output(self, values: Mapping[str, float], start: float) -> Array:
-        """Output of the loop with these parameters, from rest at the output `start`."""
-        window, loop = self.recording, self.loop.specification
-        late, phase = self._clock(values)
+        """Output of the loop with these parameters, from rest at the output `start`.
+
+        With `start` among them, the time stamp t of an output was at t - start.
+        """
+        window, loop, period = self.recording, self.loop.specification, self.loop.sample_time
+        late = values.get("start", 0.0)
+        phase = 0.0 if period is None else late % period
         return loop.outputs_at(
-            _of_the_loop(values),
+            {name: value for name, value in values.items() if name != "start"},
             window.time - late,
             (window.reference, window.time),
             start,
-            (self._past, phase),
+            (self._past, 0.0 if phase == period else phase),
         )
 
-    def slopes(self, values: Mapping[str, float], start: float) -> dict[str, Array]:
-        """Derivatives of the output by each of `values` and its start (``initial output``).
+    def misfit(self, names: Sequence[str], start: float | None, size: float) -> LoopMisfit:
+        """The misfit of the kernel over these numbers, and over the output at the start if unknown.
 
-        Exact where the loop has sensitivities, difference quotients elsewhere; the output itself
-        is there as ``output``.
+        `size` is that of the excitation.
         """
-        exact = [name for name in values if name in self._differentiable]
-        loop = self.loop.replace(**_of_the_loop(values))
-        # At zero the derivative by a lag equals that by a delay.
-        no_lag = loop.parameters.get("lag") == 0.0
-        if no_lag and "lag" in exact:
-            exact = [*(name for name in exact if name not in ("lag", "delay")), "delay"]
-        if loop.delay == 0.0 and not loop.is_sampled:
-            exact = [name for name in exact if name != "delay"]
-        run = self._run(values, start, exact)
-        found = {"output": run.outputs, **run.sensitivities}
-        if no_lag and "delay" in found:
-            found["lag"] = found["delay"]
-        for name in values:
-            if name not in found:
-                found[name] = self._quotient(values, start, name)
-        change = STEP * excited(self.recording)
-        found["initial output"] = (self.output(values, start + change) - run.outputs) / change
-        return found
-
-    def _quotient(self, values: Mapping[str, float], start: float, name: str) -> Array:
-        """Difference quotient by one parameter, one-sided where it is at its lower bound."""
-        value = values[name]
-        change = STEP * max(abs(value), self.recording.sample_time if name in IN_S else 0.0)
-        if value == 0.0 and name in NOT_NEGATIVE and not self.loop.is_sampled:
-            change = STEP_FROM_ZERO * self.recording.sample_time
-        low = max(0.0, value - change) if name in NOT_NEGATIVE else value - change
-        higher = self.output({**values, name: value + change}, start)
-        return (higher - self.output({**values, name: low}, start)) / (value + change - low)
-
-    @cached_property
-    def _differentiable(self) -> frozenset[str]:
-        smooth = self.loop.controller._filter
+        window, loop = self.recording, self.loop.specification
+        smooth = loop.controller._filter
         on_samples = smooth is not None and smooth.discretisation is not None
-        if on_samples and self.loop.is_sampled:
-            return frozenset()
-        return frozenset({"delay", *self.loop.parameters})
-
-    def _run(
-        self, values: Mapping[str, float], start: float, sensitivities: Sequence[str] = ()
-    ) -> Response:
-        window = self.recording
-        late, phase = self._clock(values)
-        return self.loop.replace(**_of_the_loop(values)).simulate(
-            window.time - late,
-            window.reference,
-            reference_time=window.time,
-            initial_output=start,
-            command_history=self._past,
-            sample_phase=phase,
-            sensitivities=sensitivities,
+        given = loop.plant._given(loop.plant.parameters) is not None
+        rows = SimulatedRows(
+            window.time, window.reference, window.output, self._past,
+            window.sample_time, size, LARGEST_MISFIT * size,
+        )  # fmt: skip
+        return LoopMisfit(
+            loop.kernel,
+            rows,
+            names,
+            start,
+            is_smooth=not (on_samples and self.loop.is_sampled),
+            polynomials=loop.polynomials_of if given else None,
         )
-
-    def _clock(self, values: Mapping[str, float]) -> tuple[float, float]:
-        """How late the clock of the output is, s, and the time of the first sample.
-
-        The time stamp t of an output was at t - late.
-        """
-        late, period = values.get("start", 0.0), self.loop.sample_time
-        phase = 0.0 if period is None else late % period
-        return late, 0.0 if phase == period else phase
 
     def residuals(self, values: Mapping[str, float], start: float) -> Array:
         """Recorded minus simulated output."""
@@ -221,10 +184,6 @@ def shortest_time(window: Recording) -> float:
     """Shortest delay and lag of a continuous loop that are searched, s."""
     _, span = start_and_span(window)
     return min(SHORTEST_OF_WINDOW * span, SHORTEST_OF_SAMPLE * window.sample_time)
-
-
-def _of_the_loop(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in values.items() if name != "start"}
 
 
 def _check_work(window: Recording, loop: ControlLoop) -> None:

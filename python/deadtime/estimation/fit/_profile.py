@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deadtime._base.arrays import Array
-from deadtime.estimation.fit._directions import Directions, held_directions
-from deadtime.estimation.fit._least_squares import TO_COMPARE, Minimum, Model, minimise
+from deadtime.estimation.fit._directions import held_directions
+from deadtime.estimation.fit._least_squares import Minimum, Model
 
 #: Farthest end of an interval, in multiples of the Gaussian one.
 FARTHEST = 64.0
@@ -119,8 +118,7 @@ class Profile:
 class ProfileCost:
     """Least cost with one quantity held, the others free.
 
-    The search starts from the minimum of the linearised model. `known` holds the parameters that
-    were not fitted, which may be part of a sum.
+    `known` holds the parameters that were not fitted, which may be part of a sum.
     """
 
     model: Model
@@ -130,20 +128,4 @@ class ProfileCost:
     def __call__(self, name: str, value: float) -> float:
         """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
         space = held_directions(self.model, self.best.point, name.split("+"), value, self.known)
-        least = minimise(self.model, self._linear(space), space, TO_COMPARE).cost
-        # A parameter that is zero in the best fit is tried at zero here too.
-        for place in np.flatnonzero(self.best.point < self.model.low):
-            column = np.flatnonzero(space.free[place] == 1.0)
-            if column.size:
-                space.base[place] = self.best.point[place]
-                without = Directions(space.base, np.delete(space.free, column, axis=1))
-                found = minimise(self.model, self._linear(without), without, TO_COMPARE)
-                least = min(least, found.cost)
-        return least
-
-    def _linear(self, space: Directions) -> Array:
-        """Minimum of the linearised model with one quantity held."""
-        jacobian = self.best.jacobian
-        away = jacobian @ (self.best.point - space.base)
-        moved, *_ = np.linalg.lstsq(jacobian @ space.free, away, rcond=None)
-        return np.asarray(space.base + space.free @ moved)
+        return self.model.problem.least_held(self.best, space.base, space.free)

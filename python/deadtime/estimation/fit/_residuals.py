@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation._native import LEVEL_OF_TESTS, whiteness
+from deadtime.estimation._native import LEVEL_OF_TESTS, fit_covariance, whiteness
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,7 @@ def pieces_of(values: Array, sizes: Sequence[int] | None) -> list[Array]:
 
 def white_covariance(jacobian: Array, residuals: Array) -> Array:
     """Covariance of the parameters for white residuals, ``σ² (JᵀJ)⁻¹``."""
-    n, k = jacobian.shape
-    variance = float(residuals @ residuals) / (n - k)
-    return np.asarray(variance * _inverse_information(jacobian))
+    return fit_covariance(jacobian, residuals, None, True)
 
 
 def robust_covariance(
@@ -76,34 +74,4 @@ def robust_covariance(
 
     Recordings, of these `sizes`, are independent of each other.
     """
-    n, k = jacobian.shape
-    spread = np.zeros((k, k))
-    scored = pieces_of(jacobian * residuals[:, None], sizes)
-    for scores, piece in zip(scored, pieces_of(residuals, sizes), strict=True):
-        spread += scores.T @ scores
-        bandwidth = _bandwidth(piece)
-        for lag in range(1, bandwidth + 1):
-            product = scores[lag:].T @ scores[:-lag]
-            spread += (1.0 - lag / (bandwidth + 1)) * (product + product.T)
-    bread = _inverse_information(jacobian)
-    # n/(n-k): the small-sample factor that makes the white case agree with the usual estimate
-    return np.asarray(bread @ spread @ bread * (n / (n - k)))
-
-
-def _bandwidth(residuals: Array) -> int:
-    """Andrews' bandwidth for the Bartlett kernel, residuals taken as an AR(1) process."""
-    n = residuals.size
-    power = float(residuals @ residuals)
-    rho = float(residuals[1:] @ residuals[:-1]) / power if power > 0 else 0.0
-    rho = float(np.clip(rho, -0.97, 0.97))
-    alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
-    return int(min(n // 4, np.ceil(1.1447 * (alpha * n) ** (1 / 3))))
-
-
-def _inverse_information(jacobian: Array) -> Array:
-    """``(JᵀJ)⁻¹`` through a QR decomposition of the scaled columns."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    r = np.linalg.qr(jacobian / scale, mode="r")
-    inverse = np.linalg.inv(r)
-    return np.asarray((inverse @ inverse.T) / np.outer(scale, scale))
+    return fit_covariance(jacobian, residuals, sizes, False)

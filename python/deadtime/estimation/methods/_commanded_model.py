@@ -130,9 +130,15 @@ class CommandedModel(ModelOfOne):
         point[-1] = -float(np.mean(moved.misfit(point)))
         return replace(moved, start=point)
 
-    def starts(self) -> list[Array]:
+    @property
+    def kernel(self) -> CommandedModel:
+        """The model itself."""
+        return self
+
+    @property
+    def axes(self) -> list[list[float]]:
         """The point that the search starts from."""
-        return [self.start]
+        return [[value] for value in self.start.tolist()]
 
     @property
     def _before(self) -> tuple[tuple[float, float], ...]:
@@ -150,24 +156,19 @@ class CommandedModel(ModelOfOne):
     def span(self) -> float:
         return float(self.recording.time[-1] - self.recording.time[0])
 
-    @cached_property
-    def _sample(self) -> float:
-        return self.recording.sample_time
-
     def ends(self, label: str) -> Ends:
         value = self.known.get(label, 1.0)
-        size = abs(value)
         if label.startswith("lag_") and value >= 0.0:
             # A shorter one acts as a delay, and takes ever longer to simulate.
-            return Ends(SHORTEST_LAG * self._sample, self.span, self._sample)
+            return Ends(SHORTEST_LAG * self.recording.sample_time, self.span)
+        positive = Ends(1e-3 * abs(value), 1e3 * abs(value))
         return {
-            "delay": Ends(0.0, LONGEST_DELAY * self.span, self._sample),
-            "lag": Ends(0.0, self.span, self._sample),
-            "time_constant": Ends(1e-3 * size, 1e3 * size, size),
-            "rate": Ends(1e-3 * size, 1e3 * size, size),
-            "rate_of_rate": Ends(1e-3 * size, 1e3 * size, size),
-            "initial output": Ends(-np.inf, np.inf, self.size),
-        }.get(label, Ends(-np.inf, np.inf, size))
+            "delay": Ends(0.0, LONGEST_DELAY * self.span),
+            "lag": Ends(0.0, self.span),
+            "time_constant": positive,
+            "rate": positive,
+            "rate_of_rate": positive,
+        }.get(label, Ends(-np.inf, np.inf))
 
     def misfit(self, point: Array) -> Array:
         values = {**self.known, **self.values(point)}

@@ -12,8 +12,9 @@ loop with the estimated parameters, so they show how well it explains the whole 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,16 +30,20 @@ from deadtime.estimation.data._checks import (
     standard_errors,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording
-from deadtime.estimation.fit._directions import Directions
-from deadtime.estimation.fit._least_squares import Minimum, Model, minimise
+from deadtime.estimation.fit._least_squares import (
+    Minimum,
+    Model,
+    without_vanishing as without_vanishing,
+)
 from deadtime.estimation.fit._profile import Profile, ProfileCost
 from deadtime.estimation.fit._residuals import (
     Whiteness,
+    pieces_of,
     robust_covariance,
     white_covariance,
     whiteness_of,
 )
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import Method, Run
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -49,12 +54,6 @@ FEW = 12
 #: What a message says of residuals that are not white.
 COLOURED = f"{REASONS}the residuals are not white"
 
-#: A delay or lag is set to zero where this raises the cost by less than this share.
-VANISHING = 1e-6
-
-#: Zero is tried only where moving to it multiplies the cost by no more than this (saves fits).
-WORTH_TRYING = 2.0
-
 #: A lag within so many standard errors of zero may be zero. The statistic of the delay is then no
 #: chi-square of one degree of freedom, but at most an even mixture of those with one and two (Self
 #: & Liang 1987), whose 95 % quantile is larger by this factor.
@@ -63,37 +62,6 @@ MIXTURE = 5.138 / 3.841
 
 #: Relative distance to a bound below which a parameter counts as being on it.
 AT_BOUND = 1e-4
-
-
-def without_vanishing(model: Model, found: Minimum) -> Minimum:
-    """Set lags and delays to zero where this does not change the cost beyond rounding.
-
-    To first order a small lag acts like a delay. Next to zero the two cannot be distinguished, and
-    the search stops anywhere along that line. The same holds for a delay next to zero.
-    """
-    kept = np.eye(found.point.size)
-    held: list[int] = []
-    rounding = found.misfit.size * (1e-12 * model.size) ** 2
-    for name in ("lag", "delay"):
-        if name not in model.names:
-            continue
-        place = model.names.index(name)
-        start = found.point.copy()
-        start[place] = 0.0
-        if name == "lag" and "delay" in model.names:
-            start[model.names.index("delay")] += found.point[place]
-        at_end = found.point[place] <= model.low[place] * (1.0 + 1e-6)
-        if (
-            not at_end
-            and float(np.sum(model.misfit(start) ** 2)) > WORTH_TRYING * found.cost + rounding
-        ):
-            continue
-        free = np.delete(kept, [*held, place], axis=1)
-        space = Directions(np.zeros(start.size), free)
-        moved = minimise(model, np.clip(start, model.low, model.high), space)
-        if at_end or moved.cost <= found.cost * (1.0 + VANISHING) + rounding:
-            found, held = moved, [*held, place]
-    return found
 
 
 def concluded(
@@ -129,23 +97,17 @@ def concluded(
     along = np.arange(len(labels)) >= count
     fixed = np.isfinite(close) & at_bound & along
     loose = [i for i, label in enumerate(labels) if label not in held and not fixed[i]]
-    jacobian, residuals = found.jacobian, -found.misfit
-    check_distinguishable(jacobian[:, loose], [labels[i] for i in loose])
+    residuals = -found.misfit
+    white, robust = spreads_of(found, labels, loose, model.sizes)
     whiteness = check_fit(model, found, fitted)
-    exact = is_exact(model, found, fitted)
-    pieces = np.split(residuals, np.cumsum(model.sizes)[:-1])
-    white = embedded(white_covariance(jacobian[:, loose], residuals), loose, len(labels))
-    spread = white
-    if not (whiteness.white or exact):
-        robust = robust_covariance(jacobian[:, loose], residuals, model.sizes)
-        spread = embedded(robust, loose, len(labels))
+    reliable = whiteness.white or is_exact(model, found, fitted)
+    spread = white if reliable else robust
     errors, plain = standard_errors(names, spread), standard_errors(names, white)
     freedom = residuals.size - len(loose)
     reason = _why_profile(values, residuals.size, count)
-    reliable = whiteness.white or exact
     runs = tuple(
-        FittedRun(part.recording, _with(part.loop, values), piece / weight)
-        for part, piece, weight in zip(fitted, pieces, model.weights, strict=True)
+        FittedRun(part.recording, _with(part.loop, values), -misfit)
+        for part, misfit in zip(fitted, _misfits(model, found), strict=True)
     )
     return DelayEstimate(
         method=method,
@@ -171,23 +133,38 @@ def concluded(
     )
 
 
+def spreads_of(
+    found: Minimum, labels: Sequence[str], loose: list[int], sizes: Sequence[int]
+) -> tuple[Array, Array]:
+    """Covariances at a minimum, for white residuals and for those with memory.
+
+    Zero for parameters that are not `loose`; refuses those that the recording does not distinguish.
+    """
+    jacobian, residuals, count = found.jacobian[:, loose], -found.misfit, len(labels)
+    check_distinguishable(jacobian, [labels[i] for i in loose])
+    white = embedded(white_covariance(jacobian, residuals), loose, count)
+    return white, embedded(robust_covariance(jacobian, residuals, sizes), loose, count)
+
+
 def check_fit(model: Model, found: Minimum, fitted: Sequence[Run]) -> Whiteness:
     """Refuse outputs that are hardly better explained than by a constant; test the residuals."""
     count = len(model.names)
     whiteness = whiteness_of(-found.misfit, count, model.sizes)
-    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
-    for part, piece, weight in zip(fitted, pieces, model.weights, strict=True):
-        check_response(part.recording.output, piece / weight, count, whiteness.autocorrelation)
+    for part, misfit in zip(fitted, _misfits(model, found), strict=True):
+        check_response(part.recording.output, misfit, count, whiteness.autocorrelation)
     return whiteness
 
 
 def is_exact(model: Model, found: Minimum, fitted: Sequence[Run]) -> bool:
     """Whether all that is left is rounding."""
-    pieces = np.split(found.misfit, np.cumsum(model.sizes)[:-1])
-    return all(
-        float(np.max(np.abs(piece))) <= ROUNDING * weight * float(np.ptp(part.recording.output))
-        for piece, part, weight in zip(pieces, fitted, model.weights, strict=True)
-    )
+    pairs = zip(fitted, _misfits(model, found), strict=True)
+    return all(is_rounding(misfit, part.recording) for part, misfit in pairs)
+
+
+def _misfits(model: Model, found: Minimum) -> list[Array]:
+    """The misfit of each recording, without weights."""
+    pieces = pieces_of(found.misfit, model.sizes)
+    return [piece / weight for piece, weight in zip(pieces, model.weights, strict=True)]
 
 
 def _with(loop: ControlLoop, values: Mapping[str, float]) -> ControlLoop:
@@ -248,89 +225,92 @@ def is_rounding(residuals: Array, recording: Recording) -> bool:
     return float(np.max(np.abs(residuals))) <= ROUNDING * float(np.ptp(recording.output))
 
 
-def check_delay_alone(method: str, free: Sequence[str]) -> None:
-    """Refuse `free` without the delay; its other names are taken as given."""
-    if "delay" not in free:
-        raise ValueError(
-            f"the {method} method determines the delay alone, and free={tuple(free)!r} does not "
-            "ask for it"
+class Read(NamedTuple):
+    """What a method reads from one recording: numbers, and what is said of them.
+
+    Attributes
+    ----------
+    values : dict of str to float
+    cov : ndarray or float or None
+        Covariance, or the standard error of one number; None where there is none.
+    start : float
+        The output at which the loop was at rest.
+    message, uncalibrated : str
+        How it was read, and why it claims no interval.
+    details : dict
+    recording : Recording, optional
+        The part that was used, with its `residuals`; of the simulated loop where there are none.
+    verdict : str, optional
+        Reliable where the residuals are white or rounding, if not given.
+    """
+
+    values: Mapping[str, float]
+    cov: Array | float | None
+    start: float
+    message: str
+    uncalibrated: str
+    details: Mapping[str, Any]
+    recording: Recording | None = None
+    residuals: Array | None = None
+    crb: CramerRaoBound | None = None
+    verdict: Verdict | None = None
+    profile: Profile | None = None
+
+
+class OfOne(Method):
+    """A method for one recording, which reads the delay alone if it does not say otherwise."""
+
+    def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+        """The numbers that are asked for; the others are taken as given."""
+        if "delay" not in free:
+            raise ValueError(
+                f"the {self.name} method determines the delay alone, and free={tuple(free)!r} does "
+                "not ask for it"
+            )
+        return ("delay",)
+
+    @abstractmethod
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from one recording."""
+
+    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
+        """Read `free` from the one recording."""
+        (run,) = runs
+        found = self.read(run, self.names(free, run.loop))
+        recording, residuals = found.recording, found.residuals
+        if recording is None or residuals is None:
+            recording, residuals = self._simulated(run, found)
+        names = tuple(found.values)
+        cov = np.nan if found.cov is None else found.cov
+        if not isinstance(cov, np.ndarray):
+            cov = np.full((len(names), len(names)), cov**2)
+        whiteness = whiteness_of(residuals, len(names))
+        passes = whiteness.white or is_rounding(residuals, recording)
+        return DelayEstimate(
+            method=self.name,
+            loop=run.loop.replace(**found.values),
+            free=names,
+            stderr=standard_errors(names, cov),
+            cov=cov,
+            crb=found.crb,
+            recording=recording,
+            residuals=residuals,
+            whiteness=whiteness,
+            verdict=found.verdict or verdict_if(passes),
+            message=found.message,
+            uncalibrated=found.uncalibrated,
+            details=found.details,
+            _profile=found.profile,
         )
 
-
-def read_off_estimate(
-    method: str,
-    simulated: SimulatedRecording,
-    values: Mapping[str, float],
-    cov: Array | None,
-    start: float,
-    *,
-    message: str,
-    uncalibrated: str,
-    details: Mapping[str, Any],
-) -> DelayEstimate:
-    """The result for these `values`, with the loop at rest at the output `start`.
-
-    Without a covariance the standard errors are NaN.
-    """
-    try:
-        residuals = simulated.residuals(values, start)
-    except ValueError as error:
-        found = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
-        raise NotIdentifiableError(
-            f"the {method} method reads {found}, and a loop with these values cannot have been "
-            f"recorded ({error}): check gains, signs and units"
-        ) from None
-    return estimate_with_residuals(
-        method,
-        simulated.loop,
-        simulated.recording,
-        values,
-        cov,
-        residuals,
-        message=message,
-        uncalibrated=uncalibrated,
-        details=details,
-    )
-
-
-def estimate_with_residuals(
-    method: str,
-    loop: ControlLoop,
-    recording: Recording,
-    values: Mapping[str, float],
-    cov: Array | None,
-    residuals: Array,
-    *,
-    message: str,
-    uncalibrated: str,
-    details: Mapping[str, Any],
-    crb: CramerRaoBound | None = None,
-    verdict: Verdict | None = None,
-    profile: Profile | None = None,
-) -> DelayEstimate:
-    """The result for these `values` of a method that has its own residuals.
-
-    By default it is reliable where they are white or rounding.
-    """
-    names = tuple(values)
-    if cov is None:
-        cov = np.full((len(names), len(names)), np.nan)
-    whiteness = whiteness_of(residuals, len(names))
-    if verdict is None:
-        verdict = verdict_if(whiteness.white or is_rounding(residuals, recording))
-    return DelayEstimate(
-        method=method,
-        loop=loop.replace(**values),
-        free=names,
-        stderr=standard_errors(names, cov),
-        cov=cov,
-        crb=crb,
-        recording=recording,
-        residuals=residuals,
-        whiteness=whiteness,
-        verdict=verdict,
-        message=message,
-        uncalibrated=uncalibrated,
-        details=details,
-        _profile=profile,
-    )
+    def _simulated(self, run: Run, found: Read) -> tuple[Recording, Array]:
+        """The window and its residuals: how well the loop with the numbers read explains it."""
+        simulated = SimulatedRecording(*run[:3])
+        try:
+            return simulated.recording, simulated.residuals(found.values, found.start)
+        except ValueError as error:
+            values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
+            raise NotIdentifiableError(
+                f"the {self.name} method reads {values}, and a loop with these values cannot have "
+                f"been recorded ({error}): check gains, signs and units"
+            ) from None

@@ -15,16 +15,14 @@ method assumes the gain, an output that ends at the reference, and no disturbanc
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._native import delay_of_rate, tail_rate
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
@@ -32,10 +30,8 @@ from deadtime.estimation.data._step_reading import (
     read_decaying_step,
     stiffness_of,
 )
-from deadtime.estimation.fit._residuals import robust_covariance
-from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
-from deadtime.estimation.methods._method import Method, Run
-from deadtime.estimation.models._held import held_transfer
+from deadtime.estimation.methods._conclusion import OfOne, Read
+from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
 
 #: Fewest samples of a tail, and the smallest share of the step that is not rounding.
@@ -43,7 +39,7 @@ FEWEST, LEAST = 5, 1e-6
 
 
 @dataclass(frozen=True)
-class Decay(Method):
+class Decay(OfOne):
     """Delay from the exponential tail of a step response that does not overshoot.
 
     Parameters
@@ -72,27 +68,25 @@ class Decay(Method):
                 "a number below 1"
             )
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
-        check_delay_alone("decay", free)
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, simulated = run.loop, SimulatedRecording(*run[:3])
         stiffness = stiffness_of(loop, "decay")
-        simulated = SimulatedRecording(recording, loop, window)
         reading, extremes = read_decaying_step(simulated.recording, "decay")
         if extremes:
             raise NotIdentifiableError(
                 "the output overshoots, so the rightmost roots are complex and the tail is no "
                 "exponential: use method='decrement', 'overshoot' or 'waveform'"
             )
-        rate, error, samples = _tail_rate(reading, _begin(reading, loop, self.tail))
+        rate, error, samples = _rate(reading, _begin(reading, loop, self.tail))
         lag = loop.parameters["lag"]
 
-        def delay_of(r: float) -> float:
-            return _delay(r, stiffness, lag, loop.sample_time)
-
-        delay = delay_of(rate)
-        step = 1e-6 * rate
-        slope = (delay_of(rate + step) - delay_of(rate - step)) / (2.0 * step)
+        if lag * rate >= 1.0:
+            raise NotIdentifiableError(
+                f"the tail decays with {rate:.4g} 1/s, faster than possible with a lag of {lag:g} "
+                "s: the lag is smaller than given"
+            )
+        delay, slope = delay_of_rate(rate, stiffness, lag, loop.sample_time)
         stderr = abs(slope) * error
         if delay < 0.0:
             raise NotIdentifiableError(
@@ -107,11 +101,9 @@ class Decay(Method):
                 "1/s, the most without overshoot: K·Td is near or above 1/e; use "
                 "method='decrement' or 'waveform'"
             )
-        return read_off_estimate(
-            "decay",
-            simulated,
+        return Read(
             {"delay": delay},
-            np.array([[stderr**2]]),
+            stderr,
             reading.start,
             message=(
                 f"{samples} samples of the tail decay with {rate:.4g} ± {error:.2g} 1/s: assumes "
@@ -142,10 +134,8 @@ def _begin(reading: StepReading, loop: ControlLoop, share: float) -> float:
     return begin
 
 
-def _tail_rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
+def _rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     """Rate of an exponential from `begin` on, its standard error and the number of samples."""
-    from scipy.optimize import least_squares
-
     rows = reading.since >= begin
     # Errors below rounding hold no information.
     rows &= np.maximum.accumulate((1.0 - reading.travelled)[::-1])[::-1] > LEAST * 1e-3
@@ -160,43 +150,10 @@ def _tail_rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     first = max(2, int(np.argmin(clear)) if not clear.all() else left.size)
     guess = -np.polyfit(time[:first], np.log(np.abs(left[:first]) + LEAST * 1e-6), 1)[0]
 
-    def misfit(point: Array) -> Array:
-        return np.asarray(point[0] * np.exp(-point[1] * time) - left)
-
-    found = least_squares(
-        misfit, [left[0], max(guess, 1e-3)], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=None
-    )
-    height, rate = float(found.x[0]), float(found.x[1])
-    decays = np.exp(-rate * time)
-    jacobian = np.stack([decays, -height * time * decays], axis=1)
-    error = math.sqrt(robust_covariance(jacobian, -found.fun)[1, 1])
+    height, rate, error = tail_rate(time, left, max(guess, 1e-3))
     if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
         raise NotIdentifiableError(
             f"the tail decays with {rate:.3g} ± {error:.2g} 1/s, not distinguishable from "
             "zero: let it begin earlier with a larger `tail`, or use method='waveform'"
         )
     return rate, error, int(time.size)
-
-
-def _delay(rate: float, stiffness: float, lag: float, sample_time: float | None) -> float:
-    """Delay of the loop with the root -rate; negative where there is none."""
-    from scipy.optimize import brentq
-
-    if lag * rate >= 1.0:
-        raise NotIdentifiableError(
-            f"the tail decays with {rate:.4g} 1/s, faster than possible with a lag of {lag:g} s: "
-            "the lag is smaller than given"
-        )
-    delay = math.log(rate * (1.0 - lag * rate) / stiffness) / rate
-    if sample_time is None:
-        return delay
-    h = sample_time
-    z = math.exp(-rate * h)
-
-    def excess(late: float) -> float:
-        return math.log((-1.0 / held_transfer(complex(z), late, lag, h)).real / stiffness)
-
-    # The hold delays by about half a sample; a rate that is too small gives a negative delay.
-    if excess(0.0) <= 0.0:
-        return min(excess(0.0) / rate, -1e-300)
-    return float(brentq(excess, 0.0, max(delay, 0.0) + h, xtol=1e-15))

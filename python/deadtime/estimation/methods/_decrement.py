@@ -14,7 +14,6 @@ cent to the first of them, and less to each that follows.
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,31 +21,23 @@ from typing import ClassVar
 
 import numpy as np
 
-from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._result import DelayEstimate
-from deadtime.estimation.data._checks import check_delay_free, checked_names
+from deadtime.estimation._native import loop_of_extremes
+from deadtime.estimation.data._checks import delay_and
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     Extreme,
     StepReading,
     read_decaying_step,
     stiffness_of,
-    weighted_slope,
 )
-from deadtime.estimation.methods._conclusion import read_off_estimate
-from deadtime.estimation.methods._method import Method, Run
-from deadtime.estimation.models._held import held_transfer
+from deadtime.estimation.methods._conclusion import OfOne, Read
+from deadtime.estimation.methods._method import Run
 from deadtime.loops import ControlLoop
-
-#: Contribution of the other modes to the first extreme as a share, and the factor by which it falls
-#: to the next one. With K Td between 0.5 and 1.5 the second pair of roots decays 30 to 100 times as
-#: much per half period as the first.
-OTHER_MODES = 0.03
 
 
 @dataclass(frozen=True)
-class Decrement(Method):
+class Decrement(OfOne):
     """Delay, and gain if it is free, from the decay of successive peaks and valleys."""
 
     name: ClassVar[str] = "decrement"
@@ -55,35 +46,35 @@ class Decrement(Method):
         "peaks, and noise on which the controller acts, move the delay."
     )
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
-        names = checked_names(free, loop)
+    def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+        """Delay, and the gain if it is asked for."""
+        names = delay_and(free, loop, "decrement")
         if "lag" in names:
             raise ValueError(
                 "the decrement method has two numbers, damping and frequency, for delay and gain: "
                 "fix the lag, or use method='waveform'"
             )
-        check_delay_free(names, "decrement")
+        return names
+
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, simulated = run.loop, SimulatedRecording(*run[:3])
         stiffness = stiffness_of(loop, "decrement")
-        simulated = SimulatedRecording(recording, loop, window)
         reading, extremes = read_decaying_step(simulated.recording, "decrement")
         extremes = _linear(extremes, reading, loop)
-        pair, pair_cov = _ringing(extremes)
-        lag = loop.parameters["lag"]
-
-        def numbers(sigma: float, omega: float) -> Array:
-            return np.array(loop_with_root(complex(-sigma, omega), lag, loop.sample_time))
-
-        found = numbers(*pair)
-        slopes = np.stack(
-            [
-                (numbers(*(pair + change)) - numbers(*(pair - change))) / (2.0 * change.sum())
-                for change in np.diag(1e-6 * pair[1] * np.ones(2))
-            ],
-            axis=1,
-        )
-        cov = slopes @ pair_cov @ slopes.T
+        lag, sample_time = loop.parameters["lag"], loop.sample_time
+        pair, made = loop_of_extremes(extremes, lag, sample_time)
+        if pair[0] <= 0.0:
+            raise NotIdentifiableError(
+                "the peaks do not decay: the loop is at or beyond its stability limit, or in a "
+                "limit cycle; use method='relay' or 'waveform'"
+            )
+        if made is None:
+            raise NotIdentifiableError(
+                f"no delay gives a sampled loop the root {complex(-pair[0], pair[1]):.3g}: the "
+                f"oscillation is too fast for a sample time of {sample_time:g} s"
+            )
+        found, cov = made[0], np.reshape(made[1], (2, 2))
         delay, gain = float(found[0]), float(found[1]) / loop.parameters["Kp"]
         values = {"delay": delay, "gain": gain}
         scale = np.array([1.0, loop.parameters["Kp"]])
@@ -97,9 +88,7 @@ class Decrement(Method):
                 f"the peaks decay with a damping ratio of {pair[0] / math.hypot(*pair):.3g}, "
                 f"more than any delay gives with K = {stiffness:g} 1/s: check the gains"
             )
-        return read_off_estimate(
-            "decrement",
-            simulated,
+        return Read(
             values,
             own,
             reading.start,
@@ -117,41 +106,6 @@ class Decrement(Method):
                 "gain_read": gain,
             },
         )
-
-
-def loop_with_root(root: complex, lag: float, sample_time: float | None) -> tuple[float, float]:
-    """Delay and K of the integrator loop that has this root, of the smallest delay there is.
-
-    The phase of the plant at the root falls as the delay grows, so there is one delay for every
-    turn; the rightmost root belongs to the first.
-    """
-    from scipy.optimize import brentq
-
-    plant = root * (lag * root + 1.0)
-    # e^(-s Td) = -s (lag s + 1)/K
-    delay = -cmath.phase(-plant) / root.imag
-    if sample_time is None:
-        return delay, abs(plant) * math.exp(root.real * delay)
-    z = cmath.exp(root * sample_time)
-    h = sample_time
-
-    def gain_at(late: float) -> complex:
-        return -1.0 / held_transfer(z, late, lag, h)
-
-    def phase(late: float) -> float:
-        # relative to the required phase, so that no jump of 2π is within half a period of it
-        return cmath.phase(gain_at(late))
-
-    # The hold delays by about half a sample.
-    reach = min(h, 0.4 * math.pi / root.imag)
-    low, high = delay - 0.5 * h - reach, delay - 0.5 * h + reach
-    if not phase(low) < 0.0 < phase(high):
-        raise NotIdentifiableError(
-            f"no delay gives a sampled loop the root {root:.3g}: the oscillation is too fast for "
-            f"a sample time of {h:g} s"
-        )
-    delay = float(brentq(phase, low, high, xtol=1e-15))
-    return delay, gain_at(delay).real
 
 
 def _linear(extremes: list[Extreme], reading: StepReading, loop: ControlLoop) -> list[Extreme]:
@@ -179,32 +133,7 @@ def _linear(extremes: list[Extreme], reading: StepReading, loop: ControlLoop) ->
     )
 
 
-def _ringing(extremes: list[Extreme]) -> tuple[Array, Array]:
-    """Decay rate and damped frequency of the extremes, and their covariance."""
-    count = len(extremes)
-    index = np.arange(count, dtype=np.float64)
-    height = np.array([extreme.height for extreme in extremes])
-    time = np.array([extreme.time for extreme in extremes])
-    contribution = OTHER_MODES ** (index + 1.0)
-    half, half_error = weighted_slope(
-        index, time, np.hypot([e.time_error for e in extremes], contribution * np.diff(time).mean())
-    )
-    fall, fall_error = weighted_slope(
-        index, np.log(height), np.hypot([e.height_error for e in extremes] / height, contribution)
-    )
-    omega = math.pi / half
-    sigma = -fall / half
-    if sigma <= 0.0:
-        raise NotIdentifiableError(
-            "the peaks do not decay: the loop is at or beyond its stability limit, or in a "
-            "limit cycle; use method='relay' or 'waveform'"
-        )
-    slopes = np.array([[-1.0 / half, -sigma / half], [0.0, -omega / half]])
-    cov = slopes @ np.diag([fall_error**2, half_error**2]) @ slopes.T
-    return np.array([sigma, omega]), cov
-
-
-def _message(extremes: list[Extreme], names: tuple[str, ...], pair: Array) -> str:
+def _message(extremes: list[Extreme], names: tuple[str, ...], pair: tuple[float, float]) -> str:
     known = "" if "gain" in names else ", with the given gain"
     return (
         f"{len(extremes)} extremes, damping ratio {pair[0] / math.hypot(*pair):.3f} at "

@@ -19,22 +19,22 @@ error (Parseval).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from deadtime._base.arrays import Array, Mask
+from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._native import LEVEL_OF_TESTS
-from deadtime.estimation._result import ADVICE, REASONS, DelayEstimate
+from deadtime.estimation._native import LEVEL_OF_TESTS, LinesMisfit
+from deadtime.estimation._result import ADVICE, REASONS
 from deadtime.estimation.data._checks import (
-    ROUNDING,
     check_distinguishable,
+    check_even,
     check_gain,
     check_moves,
     checked_names,
@@ -42,26 +42,32 @@ from deadtime.estimation.data._checks import (
     integrator_of,
     standard_errors,
 )
-from deadtime.estimation.data._periodic import PeriodicSpectra, periodic_spectra
+from deadtime.estimation.data._periodic import Periods, whole_periods
 from deadtime.estimation.data._simulated import commands_over_samples
-from deadtime.estimation.fit._line_fit import LineProfile, Lines, fit_lines
-from deadtime.estimation.fit._profile import Profile
+from deadtime.estimation.fit._least_squares import Ends, Minimum, ModelOfOne, place_of
+from deadtime.estimation.fit._profile import Profile, ProfileCost
 from deadtime.estimation.fit._residuals import whiteness_of
-from deadtime.estimation.methods._conclusion import estimate_with_residuals, is_rounding
-from deadtime.estimation.methods._method import Method, Run
-from deadtime.estimation.models._held import HeldResponse, held_transfer
+from deadtime.estimation.methods._conclusion import OfOne, Read, is_rounding
+from deadtime.estimation.methods._method import Run
+from deadtime.estimation.models._held import HeldResponse
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
+#: The rows, what is fitted, no initial output, and what is known.
+_Asked: TypeAlias = tuple[Recording, tuple[str, ...], float, Mapping[str, float]]
+
 #: Longest delay of the search, as a share of the record or of the periods.
 LONGEST = 0.6
+
+#: Most points of the initial grid over the delay, one for each sample if they are fewer.
+MOST_POINTS = 400
 
 #: Largest relative deviation of the time between samples from its median.
 EVEN = 1e-3
 
 
 @dataclass(frozen=True)
-class Frequency(Method):
+class Frequency(OfOne):
     """Maximum likelihood at the lines of a spectrum, for periodic experiments.
 
     Parameters
@@ -92,59 +98,59 @@ class Frequency(Method):
                 positive(name, value)
         whole_number("left_out", self.left_out, least=0)
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
+    def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+        """The numbers that are asked for."""
+        return checked_names(free, loop)
+
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
         from scipy import special
 
-        ((recording, loop, window, *_),) = runs
-        names = checked_names(free, loop)
+        recording, loop, window, *_ = run
         integrator_of(loop, "frequency")
-        data = recording.window(*window)
-        rows = recording.rows(*window)
-        _check_even(data)
+        data, rows = recording.window(*window), recording.rows(*window)
+        check_even(data, EVEN, "a DFT needs evenly spaced ones; use method='output_error'")
         command, source = commands_over_samples(recording, loop)
         response = HeldResponse(recording.time[: rows.stop], command[: rows.stop])
         check_moves(data.output, command[rows])
         top = math.inf if self.highest is None else self.highest
+        known = {**loop.parameters, "delay": 0.0 if loop.delay is None else loop.delay}
         if self.period is None:
-            lines = _record_lines(data, response, len(names), top)
+            lines = _record_lines((data, names, 0.0, known), response, top)
         else:
-            spectra = periodic_spectra(data, command[rows], self.period, self.left_out, top)
-            lines = _periodic_lines(spectra, data.sample_time, len(names))
-        known = {name: loop.parameters[name] for name in ("gain", "lag")}
-        known["delay"] = 0.0 if loop.delay is None else loop.delay
-        found, jacobian = fit_lines(lines, names, known)
-        loose = [i for i, name in enumerate(names) if name != "lag" or found["lag"] > 0.0]
-        check_distinguishable(jacobian[:, loose], [names[i] for i in loose])
-        power = lines.cost(found)
-        scale = power / lines.freedom
+            periods = whole_periods(data, self.period, self.left_out, top)
+            lines = _periodic_lines((data, names, 0.0, known), command[rows], periods)
+        fit = lines.fit()
+        values = lines.values(fit.point)
+        loose = [i for i, name in enumerate(names) if name != "lag" or values["lag"] > 0.0]
+        jacobian = fit.jacobian[:, loose]
+        check_distinguishable(jacobian, [names[i] for i in loose])
+        scale = fit.cost / lines.freedom
         p_value, wider = 1.0, scale
         if lines.known_noise:
-            p_value = float(special.chdtrc(lines.freedom, power / lines.widening))
+            p_value = float(special.chdtrc(lines.freedom, fit.cost / lines.widening))
             wider = max(lines.widening, scale)
-        inverse = np.linalg.inv(jacobian[:, loose].T @ jacobian[:, loose])
-        cov = embedded(np.asarray(wider * inverse), loose, len(names))
-        values = {name: found[name] for name in names}
+        cov = embedded(np.asarray(wider * np.linalg.inv(jacobian.T @ jacobian)), loose, len(names))
         errors = standard_errors(names, cov)
         check_gain(values, errors)
+        found = {**known, **values}
         residuals = _residuals(data, response, found)
         whiteness = whiteness_of(residuals, len(names))
         white = p_value > LEVEL_OF_TESTS if lines.known_noise else whiteness.white
         reliable = white or is_rounding(residuals, data)
-        return estimate_with_residuals(
-            "frequency",
-            loop,
-            data,
+        return Read(
             values,
             cov,
-            residuals,
+            start=float(data.output[0]),
+            recording=data,
+            residuals=residuals,
             verdict=verdict_if(reliable),
             message=_message(names, lines, source, reliable),
             uncalibrated=_why_uncalibrated(loop),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
             profile=Profile(
-                cost=LineProfile(lines, names, found),
-                best=power,
+                cost=ProfileCost(lines, fit, known),
+                best=fit.cost,
                 freedom=lines.freedom,
                 widening=dict.fromkeys(errors, math.sqrt(wider / scale) if scale > 0.0 else 1.0),
                 preferred="delay and lag have similar effects" if "lag" in names else "",
@@ -152,92 +158,112 @@ class Frequency(Method):
         )
 
 
-def _check_even(data: Recording) -> None:
-    steps = np.diff(data.time)
-    if float(np.max(np.abs(steps - data.sample_time))) > EVEN * data.sample_time:
-        raise NotIdentifiableError(
-            f"the samples are {float(steps.min()):g} to {float(steps.max()):g} s apart: a DFT "
-            "needs evenly spaced ones; use method='output_error'"
-        )
+@dataclass(frozen=True, eq=False)
+class _Lines(ModelOfOne):
+    """The misfit at lines of a spectrum, over its standard deviation where that is known.
+
+    `made` makes it of the numbers.
+    """
+
+    known: Mapping[str, float]
+    made: Callable[[Any], LinesMisfit]
+    known_noise: bool
+    freedom: int
+    widening: float
+    longest: float
+    describe: str
+
+    @property
+    def kernel(self) -> LinesMisfit:
+        """The misfit of the kernel."""
+        numbers = ("delay", "gain", "lag")
+        places = [place_of(name, self.names) for name in numbers]
+        return self.made(([self.known[name] for name in numbers], places, self.row))
+
+    @property
+    def row(self) -> float:
+        """Time between two rows, s."""
+        return self.recording.sample_time
+
+    def ends(self, label: str) -> Ends:
+        """Bounds and starting values of one of the parameters."""
+        if label == "gain":
+            return Ends(-math.inf, math.inf, [self.known["gain"]])
+        return Ends(0.0, math.inf, [self.row])
+
+    def fit(self) -> Minimum:
+        """The parameters of least cost; a lag that does not reduce it is zero."""
+        row, lag = self.row, place_of("lag", self.names)
+        if "delay" not in self.names:
+            found = self.problem.solve()
+            return self.problem.without_vanishing(found, None, lag, 0.0)
+        count = int(min(MOST_POINTS, max(2.0, self.longest / row)))
+        grid = np.linspace(0.0, self.longest, count + 1)
+        guess = np.array([self.known["gain"] if name == "gain" else row for name in self.names])
+        costs, _, found = self.problem.scan(grid, guess, lag, 0.0)
+        if int(np.argmin(costs)) == count:
+            raise NotIdentifiableError(
+                f"the fit ends at a delay of {grid[-1]:.3g} s, the longest of the search: the "
+                "output is no response to this command; check columns and units"
+            )
+        return found
 
 
-def _record_lines(data: Recording, response: HeldResponse, numbers: int, highest: float) -> Lines:
+def _record_lines(asked: _Asked, response: HeldResponse, highest: float) -> _Lines:
     """Lines of one record without the mean; white noise has the same size at each."""
+    data, names, *_ = asked
     size = len(data)
     frequencies = np.fft.rfftfreq(size, data.sample_time)
     kept = (frequencies > 0.0) & (frequencies <= highest)
     nyquist = size % 2 == 0 and bool(kept[-1])
     real = 2 * int(kept.sum()) - int(nyquist)
-    if real < 2 * (numbers + 1):
+    if real < 2 * (len(names) + 1):
         raise NotIdentifiableError(
-            f"{int(kept.sum())} lines up to {highest:g} Hz are too few for {numbers} parameters: "
-            "widen the window or give a higher `highest`"
+            f"{int(kept.sum())} lines up to {highest:g} Hz are too few for {len(names)} "
+            "parameters: widen the window or give a higher `highest`"
         )
-    weight = np.full(int(kept.sum()), math.sqrt(2.0 / size))
-    if nyquist:
-        weight[-1] = math.sqrt(1.0 / size)
-
-    misfit = partial(_record_misfit, data, response, weight, kept)
+    every = int(kept.sum()) == size // 2
+    made = partial(
+        LinesMisfit.of_record,
+        commands=(response.time, response.command),
+        time=data.time,
+        output=data.output,
+        last=None if every else int(kept.sum()),
+    )
+    longest = LONGEST * float(data.time[-1] - data.time[0])
     describe = f"{int(kept.sum())} of one record"
-    span = float(data.time[-1] - data.time[0])
-    return Lines(misfit, False, real - numbers, 1.0, LONGEST * span, data.sample_time, describe)
+    freedom = real - len(names)
+    return _Lines(*asked, made, False, freedom, 1.0, longest, describe)
 
 
-def _periodic_lines(spectra: PeriodicSpectra, sample_time: float, numbers: int) -> Lines:
+def _periodic_lines(asked: _Asked, command: Array, periods: Periods) -> _Lines:
     """Excited lines of periods, over their standard deviations between periods."""
-    freedom = 2 * spectra.lines.size - numbers
+    data, names, *_ = asked
+    freedom = 2 * periods.lines.size - len(names)
     if freedom < 2:
         raise NotIdentifiableError(
-            f"{spectra.lines.size} excited lines are too few for {numbers} parameters: excite more"
+            f"{periods.lines.size} excited lines are too few for {len(names)} parameters: excite "
+            "more"
         )
     # The inverse of a variance estimated with f degrees of freedom is too large by f/(f - 1) on
     # average.
-    widening = spectra.freedom / (spectra.freedom - 1.0)
-    describe = f"{spectra.lines.size} of {spectra.periods} periods"
-    longest = min(LONGEST * spectra.periods, 1.0) * spectra.samples * sample_time
-    misfit = partial(_periodic_misfit, spectra, sample_time)
-    return Lines(misfit, True, freedom, widening, longest, sample_time, describe)
-
-
-def _record_misfit(
-    data: Recording,
-    response: HeldResponse,
-    weight: Array,
-    kept: Mask,
-    values: dict[str, float],
-) -> Array:
-    """Misfit at the `kept` lines of one record, times a weight."""
-    spectrum = np.fft.rfft(data.output - values["gain"] * _path(data, response, values))
-    lines = weight * spectrum[kept]
-    return np.concatenate([lines.real, lines.imag])
-
-
-def _periodic_misfit(
-    spectra: PeriodicSpectra, sample_time: float, values: dict[str, float]
-) -> Array:
-    """Misfit at the excited lines over their standard deviation between periods."""
-    z = np.exp(2j * np.pi * spectra.lines / spectra.samples)
-    floor = ROUNDING * float(np.max(np.abs(spectra.output)))
-    g = values["gain"] * held_transfer(z, values["delay"], values["lag"], sample_time)
-    variance = (
-        spectra.output_variance
-        + np.abs(g) ** 2 * spectra.input_variance
-        - 2.0 * (spectra.covariance * np.conj(g)).real
+    widening = periods.freedom / (periods.freedom - 1.0)
+    describe = f"{periods.lines.size} of {periods.repeated} periods"
+    longest = min(LONGEST * periods.repeated, 1.0) * periods.samples * data.sample_time
+    made = partial(
+        LinesMisfit.of_periods,
+        command=command[periods.rows],
+        output=data.output[periods.rows],
+        samples=periods.samples,
+        lines=periods.lines.tolist(),
     )
-    # Per real part; the sum of squares of all parts is then a chi-square.
-    spread = np.sqrt(0.5 * np.maximum(variance, floor**2))
-    lines = (spectra.output - g * spectra.input) / spread
-    return np.concatenate([lines.real, lines.imag])
-
-
-def _path(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
-    """Response to the commands for a gain of one."""
-    return response.at(data.time - values["delay"], values["lag"]).value
+    return _Lines(*asked, made, True, freedom, widening, longest, describe)
 
 
 def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]) -> Array:
     """Recorded output minus the response to the commands, about its mean."""
-    residuals = data.output - values["gain"] * _path(data, response, values)
+    path = response.at(data.time - values["delay"], values["lag"]).value
+    residuals = data.output - values["gain"] * path
     return np.asarray(residuals - residuals.mean())
 
 
@@ -250,7 +276,7 @@ def _why_uncalibrated(loop: ControlLoop) -> str:
     )
 
 
-def _message(names: tuple[str, ...], lines: Lines, source: str, reliable: bool) -> str:
+def _message(names: tuple[str, ...], lines: _Lines, source: str, reliable: bool) -> str:
     text = f"maximum likelihood over {', '.join(names)} at the lines {lines.describe}"
     if source != "logged":
         text += f", the command {source}"

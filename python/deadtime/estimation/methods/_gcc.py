@@ -16,15 +16,13 @@ then amplify noise.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._native import correlation_coefficient, correlation_peak
 from deadtime.estimation.data._input_output import (
     FEEDBACK,
     InputOutput,
@@ -33,8 +31,8 @@ from deadtime.estimation.data._input_output import (
 )
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import check_decays, read_ringing
-from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
-from deadtime.estimation.methods._method import Method, Run, check_choice
+from deadtime.estimation.methods._conclusion import OfOne, Read
+from deadtime.estimation.methods._method import Run, check_choice
 
 Weighting = Literal["none", "scot", "phat", "prewhitened"]
 
@@ -42,16 +40,9 @@ Weighting = Literal["none", "scot", "phat", "prewhitened"]
 #: a hundred shifts in one of a hundred recordings.
 LEVEL = 1e-4
 
-#: Width of the average of spectra for "scot", as a share of all frequencies: a wider one has less
-#: noise and less resolution.
-SMOOTHED = 0.05
-
-#: Longest whitening filter, in samples.
-LONGEST_FILTER = 12
-
 
 @dataclass(frozen=True)
-class GCC(Method):
+class GCC(OfOne):
     """Delay at the peak of the generalised cross-correlation of command and response.
 
     Parameters
@@ -76,11 +67,9 @@ class GCC(Method):
     def __post_init__(self) -> None:
         check_choice("weighting", self.weighting, get_args(Weighting))
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
-        check_delay_alone("gcc", free)
-        simulated = SimulatedRecording(recording, loop, window)
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, simulated = run.loop, SimulatedRecording(*run[:3])
         data = simulated.recording
         read = read_input_output(simulated, "gcc")
         if int(np.count_nonzero(np.diff(read.command))) < 2:
@@ -95,18 +84,13 @@ class GCC(Method):
         # Feedback within the same sample makes a peak at shift zero.
         least = 1 if feedback else 0
         gain = float(loop.parameters.get("gain", 1.0))
-        shifts, correlation = correlogram(
-            read.command, np.sign(gain) * read.response, self.weighting
+        shift, between = correlation_peak(
+            read.command, np.sign(gain) * read.response, self.weighting, (least, read.longest)
         )
-        near = (shifts >= least - 1) & (shifts <= read.longest + 1)
-        shifts, correlation = shifts[near], correlation[near]
-        place = int(np.argmax(correlation[1:-1])) + 1
-        share = _explained(read, int(shifts[place]))
-        peak = float(shifts[place]) + _between(correlation, place, self.weighting)
+        share = _explained(read, shift)
+        peak = shift + between
         delay = max(0.0, peak * read.sample_time - read.late)
-        return read_off_estimate(
-            "gcc",
-            simulated,
+        return Read(
             {"delay": delay},
             None,
             float(data.output[0]),
@@ -126,73 +110,13 @@ class GCC(Method):
         )
 
 
-def correlogram(u: Array, r: Array, weighting: Weighting) -> tuple[Array, Array]:
-    """Shifts in samples and the generalised cross-correlation of u and r at them."""
-    from scipy import signal
-
-    if weighting == "prewhitened":
-        whitener = _whitener(u)
-        u, r = np.convolve(u, whitener)[: u.size], np.convolve(r, whitener)[: r.size]
-    if weighting in ("none", "prewhitened"):
-        return (
-            np.asarray(signal.correlation_lags(r.size, u.size), dtype=np.float64),
-            np.asarray(signal.correlate(r, u)),
-        )
-    length = 2 * u.size  # long enough that no shift wraps around
-    spectrum_u, spectrum_r = np.fft.rfft(u, length), np.fft.rfft(r, length)
-    cross = spectrum_r * np.conj(spectrum_u)
-    if weighting == "phat":
-        scale = np.abs(cross)
-    else:
-        width = max(3, int(SMOOTHED * spectrum_u.size))
-        window = np.ones(width) / width
-        power = [np.convolve(np.abs(x) ** 2, window, "same") for x in (spectrum_u, spectrum_r)]
-        scale = np.sqrt(power[0] * power[1])
-    found = np.fft.irfft(cross / np.maximum(scale, 1e-12 * scale.max()), length)
-    shifts = np.arange(-u.size, u.size, dtype=np.float64)
-    return shifts, np.roll(found, u.size)
-
-
-def _whitener(u: Array) -> Array:
-    """The whitening filter 1 - a_1 q - a_2 q² … of u, its order by Akaike's criterion."""
-    most = min(LONGEST_FILTER, u.size // 8)
-    target = u[most:]
-    past = np.stack([u[most - lag : u.size - lag] for lag in range(1, most + 1)], axis=1)
-    best, chosen = np.inf, np.ones(1)
-    for order in range(most + 1):
-        weights = np.linalg.lstsq(past[:, :order], target, rcond=None)[0]
-        power = float(np.sum((target - past[:, :order] @ weights) ** 2))
-        criterion = target.size * np.log(max(power, 1e-24 * float(u @ u))) + 2 * order
-        if criterion < best:
-            best, chosen = criterion, np.concatenate([[1.0], -weights])
-    return chosen
-
-
-def _between(correlation: Array, place: int, weighting: Weighting) -> float:
-    """Position of the peak relative to the largest value, in samples."""
-    before, top, after = (float(value) for value in correlation[place - 1 : place + 2])
-    if weighting in ("none", "scot"):
-        bend = before - 2.0 * top + after
-        return float(np.clip(0.5 * (before - after) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
-    beside, sign = (after, 1.0) if after > before else (before, -1.0)
-    return sign * max(beside, 0.0) / (top + max(beside, 0.0))
-
-
 def _explained(read: InputOutput, shift: int) -> float:
     """Correlation coefficient of response and shifted command; refuses insignificant ones."""
-    from scipy import signal, special
+    from scipy import special
 
-    late = max(0, shift)
-    size = read.command.size
-    u, r = read.command[: size - late], read.response[late:]
-    coefficient = float(u @ r) / float(np.linalg.norm(u) * np.linalg.norm(r) or 1.0)
-    # For independent signals its variance is sum_m rho_u(m) rho_e(m)/n (Bartlett 1935).
-    left = r - u * float(u @ r) / float(u @ u or 1.0)
-    rho = [np.asarray(signal.correlate(x, x))[u.size - 1 :] for x in (u, left)]
-    rho_u, rho_e = (x / x[0] if x[0] > 0.0 else x for x in rho)
-    taper = 1.0 - np.arange(u.size) / u.size
-    spread = 1.0 + 2.0 * float(np.sum((taper * rho_u * rho_e)[1 : u.size // 4]))
-    needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / u.size)
+    size = read.command.size - shift
+    coefficient, spread = correlation_coefficient(read.command, read.response, shift)
+    needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / size)
     if abs(coefficient) < needed:
         raise NotIdentifiableError(
             f"command and response are correlated by {abs(coefficient):.2g} at best, unrelated "

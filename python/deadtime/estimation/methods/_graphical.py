@@ -19,15 +19,13 @@ used, and there is no interval.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._native import rise_tangent
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
@@ -35,21 +33,18 @@ from deadtime.estimation.data._step_reading import (
     read_decaying_step,
     stiffness_of,
 )
-from deadtime.estimation.methods._conclusion import check_delay_alone, read_off_estimate
-from deadtime.estimation.methods._method import Method, Run, check_choice
+from deadtime.estimation.methods._conclusion import OfOne, Read
+from deadtime.estimation.methods._method import Run, check_choice
 
 Construction = Literal["tangent", "two_point", "first_movement"]
 
-#: Movements below this share of the step count as rounding.
+#: Movements below this share of the step, and delays below this share of the response, count as
+#: rounding.
 LEAST = 1e-9
-
-#: Most iterations of the tangent; one that has not converged by then alternates between two sets of
-#: samples.
-ITERATIONS = 30
 
 
 @dataclass(frozen=True)
-class Graphical(Method):
+class Graphical(OfOne):
     """Delay from the beginning of one step response, by a construction with straight lines.
 
     Parameters
@@ -81,11 +76,9 @@ class Graphical(Method):
         if not 0.0 < low < high < 1.0:
             raise ValueError(f"shares={self.shares}: give two that increase, between 0 and 1")
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
-        check_delay_alone("graphical", free)
-        simulated = SimulatedRecording(recording, loop, window)
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, simulated = run.loop, SimulatedRecording(*run[:3])
         reading, _ = read_decaying_step(simulated.recording, "graphical")
         moved = _first_movement(reading)
         delay, stderr = float(reading.since[moved]), math.nan
@@ -95,16 +88,14 @@ class Graphical(Method):
             delay = _two_point(reading, *self.shares)
         elif self.construction == "tangent":
             delay, stderr = _tangent(reading, moved, loop.sample_time)
-        if not delay > 0.0:
+        if not delay > LEAST * float(reading.since[-1]):
             raise NotIdentifiableError(
                 f"the line meets the initial output {-delay:.3g} s before the step: the samples on "
                 "it are too few or too noisy, or there is no delay; use method='waveform'"
             )
-        return read_off_estimate(
-            "graphical",
-            simulated,
+        return Read(
             {"delay": delay},
-            np.array([[stderr**2]]),
+            stderr,
             reading.start,
             message=(
                 f"{self.construction.replace('_', ' ')} of one step: part of a lag counts as delay"
@@ -148,11 +139,8 @@ def _two_point(reading: StepReading, low: float, high: float) -> float:
     times = []
     for share in (low, high):
         row = int(np.argmax(reading.travelled >= share))
-        before, after = reading.travelled[row - 1 : row + 1]
-        part = (share - before) / (after - before)
-        times.append(
-            float(reading.since[row - 1] + part * (reading.since[row] - reading.since[row - 1]))
-        )
+        pair = slice(row - 1, row + 1)
+        times.append(float(np.interp(share, reading.travelled[pair], reading.since[pair])))
     return times[0] - (times[1] - times[0]) * low / (high - low)
 
 
@@ -160,37 +148,16 @@ def _tangent(reading: StepReading, moved: int, held: float | None) -> tuple[floa
     """Time after the step, s, at which the straight part meets the initial output; its error."""
     # Between the last sample that had not moved and the first that had.
     delay = 0.5 * float(reading.since[moved - 1] + reading.since[moved])
-    line = (0.0, 0.0, math.nan)
-    for _ in range(ITERATIONS):
-        seen = delay if held is None else held * math.ceil(delay / held - 1e-9)
-        until = delay + seen
-        rows = (reading.since >= delay) & (reading.since <= until + 1e-9)
-        if int(rows.sum()) < 2:
-            raise NotIdentifiableError(
-                f"{int(rows.sum())} samples on the straight part, from {delay:.3g} to "
-                f"{until:.3g} s after the step: sample faster than twice a delay, or use "
-                "method='waveform'"
-            )
-        line = _line(reading.since[rows], reading.travelled[rows], reading.noise)
-        if line[0] <= 0.0:
-            raise NotIdentifiableError(
-                "the output falls where it should rise along a straight line: the noise hides "
-                "the beginning of the response; use method='waveform'"
-            )
-        updated = line[1]
-        if not 0.0 < updated < 2.0 * delay or abs(updated - delay) < 1e-12:
-            break
-        delay = updated
-    return line[1], line[2]
-
-
-def _line(time: Array, share: Array, noise: float) -> tuple[float, float, float]:
-    """Slope of a line, its zero, and the standard error of the zero."""
-    centre = float(time.mean())
-    power = float(np.sum((time - centre) ** 2))
-    slope = float((time - centre) @ share) / power
-    if slope == 0.0:
-        return 0.0, math.nan, math.nan
-    place = centre - float(share.mean()) / slope
-    variance = noise**2 / slope**2 * (1.0 / time.size + (centre - place) ** 2 / power)
-    return slope, place, math.sqrt(variance)
+    found, few = rise_tangent(reading.since, reading.travelled, delay, held, reading.noise)
+    if few is not None:
+        count, begin, until = few
+        raise NotIdentifiableError(
+            f"{count} samples on the straight part, from {begin:.3g} to {until:.3g} s after the "
+            "step: sample faster than twice a delay, or use method='waveform'"
+        )
+    if found is None:
+        raise NotIdentifiableError(
+            "the output falls where it should rise along a straight line: the noise hides the "
+            "beginning of the response; use method='waveform'"
+        )
+    return found

@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -25,47 +24,38 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import increasing
-from deadtime.estimation._result import CramerRaoBound, DelayEstimate
+from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import (
     ROUNDING,
-    check_delay_free,
-    check_distinguishable,
     check_ends,
-    check_excitation,
     check_gain,
-    checked_names,
-    embedded,
+    delay_and,
     standard_errors,
     start_and_span,
 )
-from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
-from deadtime.estimation.fit._directions import Directions, all_directions
-from deadtime.estimation.fit._least_squares import Ends, minimise
-from deadtime.estimation.fit._residuals import robust_covariance, white_covariance, whiteness_of
-from deadtime.estimation.methods._conclusion import COLOURED, estimate_with_residuals, is_rounding
-from deadtime.estimation.methods._method import Method, Run, check_initial_output
-from deadtime.estimation.methods._waveform import SimulatedModel
+from deadtime.estimation.fit._least_squares import place_of
+from deadtime.estimation.fit._residuals import whiteness_of
+from deadtime.estimation.methods._conclusion import (
+    COLOURED,
+    OfOne,
+    Read,
+    is_rounding,
+    spreads_of,
+)
+from deadtime.estimation.methods._method import Run, check_initial_output
+from deadtime.estimation.methods._waveform import simulated_model
 from deadtime.experiments import FlightNoise
+from deadtime.loops import ControlLoop
 
 #: Points of the grid besides zero, and its ends as shares of the window.
 POINTS, SHORTEST, LONGEST = 24, 0.005, 0.6
-
-#: Local minima of the curve that are refined; the lowest is taken.
-REFINED = 3
-
-#: A lag is set to zero where this raises the cost by no more than this share: next to zero it acts
-#: like a delay, and the two cannot be distinguished.
-VANISHING = 1e-6
-
-#: Relative change of cost or parameters at which a search ends, and its most evaluations.
-TOLERANCE, EVALUATIONS = 1e-12, 60
 
 #: Two-sided 95 % quantile of the normal distribution.
 TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True)
-class Grid(Method):
+class Grid(OfOne):
     """Cost of the simulated loop over a grid of delays, its lowest point refined.
 
     Parameters
@@ -92,61 +82,72 @@ class Grid(Method):
             object.__setattr__(self, "delays", tuple(_checked(self.delays).tolist()))
         check_initial_output(self.initial_output)
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
-        names = checked_names(free, loop)
-        check_delay_free(names, "grid")
-        simulated = SimulatedRecording(recording, loop, window)
-        data = simulated.recording
-        check_excitation(data, len(names))
-        problem = _Problem(data, names, self.initial_output, simulated)
-        grid = problem.grid() if self.delays is None else np.array(self.delays)
-        costs, points = problem.over(grid)
-        point = problem.refined(costs, points)
-        check_ends(problem.labels, point, problem.low, problem.high)
+    def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
+        """The numbers that are asked for."""
+        return delay_and(free, loop, "grid")
 
-        misfit, jacobian = problem.misfit(point), problem.jacobian(point)
-        residuals = -misfit
-        at_zero = point <= problem.low * (1.0 + 1e-6) + 1e-9
-        loose = [i for i, name in enumerate(problem.labels) if name != "lag" or not at_zero[i]]
-        check_distinguishable(jacobian[:, loose], [problem.labels[i] for i in loose])
-        whiteness = whiteness_of(residuals, len(names))
-        reliable = whiteness.white or is_rounding(residuals, data)
-        size, count = len(problem.labels), len(names)
-        white = embedded(white_covariance(jacobian[:, loose], residuals), loose, size)
-        spread = white
-        if not reliable:
-            spread = embedded(robust_covariance(jacobian[:, loose], residuals), loose, size)
-        errors = standard_errors(names, spread)
-        values = problem.values(point)
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, model = run.loop, simulated_model(run, names, self.initial_output)
+        model = replace(model, least_lag=0.0)  # where it acts as a delay, a lag is none
+        data, labels = model.recording, model.labels
+        start, span = start_and_span(data)
+        grid = np.array(self.delays) if self.delays is not None else _delays(model.low[0], span)
+        gain = loop.parameters.get("gain", 1.0)
+        guesses = {"gain": gain, "lag": data.sample_time, "initial output": start}
+        costs, minima, found = model.problem.scan(
+            grid,
+            np.array([guesses.get(label, 0.0) for label in labels]),
+            place_of("lag", names),
+            len(data) * (ROUNDING * model.size) ** 2,
+        )
+        if int(np.argmin(costs)) == grid.size - 1:
+            raise NotIdentifiableError(
+                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid: the "
+                "output is no response of such a loop to this reference; check columns, signs, "
+                "units and gains, or give other `delays`"
+            )
+        point, residuals = found.point, -found.misfit
+        check_ends(labels, point, model.low, model.high)
+        at_zero = point <= model.low * (1.0 + 1e-6) + 1e-9
+        loose = [i for i, name in enumerate(labels) if name != "lag" or not at_zero[i]]
+        plain, robust = spreads_of(found, labels, loose, model.sizes)
+        white = whiteness_of(residuals, len(names)).white or is_rounding(residuals, data)
+        cov = plain if white else robust
+        errors = standard_errors(names, cov)
+        values = model.values(point)
         check_gain(values, errors)
-        noise = math.sqrt(float(misfit @ misfit) / (residuals.size - len(loose)))
-        low, high = (errors["delay"] * side for side in (-TWO_SIDED_95, TWO_SIDED_95))
-        return estimate_with_residuals(
-            "grid",
-            loop,
-            data,
+        noise = math.sqrt(found.cost / (residuals.size - len(loose)))
+        reach = TWO_SIDED_95 * errors["delay"]
+        low, high = max(0.0, float(point[0] - reach)), float(point[0] + reach)
+        return Read(
             values,
-            spread[:count, :count],
-            residuals,
-            crb=CramerRaoBound(problem.labels, FlightNoise(noise), standard_errors(names, white)),
-            message=_message(names, grid, reliable),
+            cov[: len(names), : len(names)],
+            start=model.start_of(point),
+            message=_message(names, grid, white),
             uncalibrated=(
                 "the grid method fits the response to the reference, without the noise that the "
-                "controller acts on: the curvature of the cost gives "
-                f"{max(0.0, point[0] + low):.4g} to {point[0] + high:.4g} s (95 %), which has "
-                "this coverage only where the controller does not act on the noise; use "
-                "method='output_error' or 'waveform' for an interval"
+                f"controller acts on: the curvature of the cost gives {low:.4g} to {high:.4g} s "
+                "(95 %), which has this coverage only where the controller does not act on the "
+                "noise; use method='output_error' or 'waveform' for an interval"
             ),
             details={
                 "delays": grid.tolist(),
                 "costs": costs.tolist(),
-                "local_minima": [float(grid[i]) for i in _local_minima(costs)],
-                "curvature_interval_95": [max(0.0, float(point[0] + low)), float(point[0] + high)],
-                "initial_output": problem.start_of(point),
+                "local_minima": [float(grid[i]) for i in minima],
+                "curvature_interval_95": [low, high],
+                "initial_output": model.start_of(point),
             },
+            recording=data,
+            residuals=residuals,
+            crb=CramerRaoBound(labels, FlightNoise(noise), standard_errors(names, plain)),
         )
+
+
+def _delays(shortest: float, span: float) -> Array:
+    """Delays from the shortest on, spaced geometrically."""
+    points = np.geomspace(SHORTEST, LONGEST, POINTS) * span
+    return np.concatenate([[shortest], points[points > shortest]])
 
 
 def _checked(delays: ArrayLike) -> Array:
@@ -158,128 +159,6 @@ def _checked(delays: ArrayLike) -> Array:
             "least, none below zero"
         )
     return grid
-
-
-def _local_minima(costs: Array) -> list[int]:
-    """Rows of the grid with a lower cost than both neighbours."""
-    middle = costs[1:-1]
-    return [int(i) + 1 for i in np.flatnonzero((middle < costs[:-2]) & (middle <= costs[2:]))]
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem(SimulatedModel):
-    """The misfit as a function of the parameters, the delay first."""
-
-    @cached_property
-    def size(self) -> float:
-        """The larger range of output and reference."""
-        return max(float(np.ptp(self.recording.output)), float(np.ptp(self.recording.reference)))
-
-    @cached_property
-    def span(self) -> float:
-        """Time from the first step to the end, s."""
-        return start_and_span(self.recording)[1]
-
-    @property
-    def gain(self) -> float:
-        """The known gain."""
-        return self.simulated.loop.parameters.get("gain", 1.0)
-
-    def ends(self, label: str) -> Ends:
-        """Bounds of the search, and scales."""
-        low, high = sorted((1e-3 * self.gain, 1e3 * self.gain))
-        time = Ends(self.shortest, self.span, self.recording.sample_time)
-        found = {"delay": time, "gain": Ends(low, high, abs(self.gain)), "lag": time}
-        return found.get(label, Ends(-np.inf, np.inf, self.size))
-
-    def starts(self) -> list[Array]:
-        """The point from which each delay is tried."""
-        start, _ = start_and_span(self.recording)
-        guesses = {"gain": self.gain, "lag": self.recording.sample_time, "initial output": start}
-        return [np.array([guesses.get(label, 0.0) for label in self.labels])]
-
-    @property
-    def shortest(self) -> float:
-        """Shortest delay and lag of the search."""
-        if self.simulated.loop.is_sampled:
-            return 0.0
-        return shortest_time(self.recording)
-
-    def grid(self) -> Array:
-        """Delays from the shortest on, spaced geometrically."""
-        points = np.geomspace(SHORTEST, LONGEST, POINTS) * self.span
-        return np.concatenate([[self.shortest], points[points > self.shortest]])
-
-    def cost(self, point: Array) -> float:
-        """Sum of squares."""
-        misfit = self.misfit(point)
-        return float(misfit @ misfit)
-
-    def jacobian(self, point: Array, first: int = 0) -> Array:
-        """Derivatives by the parameters from the `first` on; one-sided at a bound."""
-        columns = []
-        for place in range(first, point.size):
-            step = 1e-5 * self.scale[place]
-            up, down = point.copy(), point.copy()
-            up[place] += step
-            down[place] = max(self.low[place], down[place] - step)
-            change = up[place] - down[place]
-            columns.append((self.misfit(up) - self.misfit(down)) / change)
-        return np.stack(columns, axis=1)
-
-    def over(self, grid: Array) -> tuple[Array, Array]:
-        """Least cost at each delay, and the parameters there."""
-        (guess,) = self.starts()
-        costs, points = np.empty(grid.size), np.empty((grid.size, guess.size))
-        point = guess
-        for row, delay in enumerate(grid):
-            starts = [np.concatenate([[delay], start[1:]]) for start in (guess, point)]
-            point = self._improved(min(starts, key=self.cost))
-            costs[row], points[row] = self.cost(point), point
-        if int(np.argmin(costs)) == grid.size - 1:
-            raise NotIdentifiableError(
-                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid: the "
-                "output is no response of such a loop to this reference; check columns, signs, "
-                "units and gains, or give other `delays`"
-            )
-        return costs, points
-
-    def _improved(self, point: Array) -> Array:
-        """A Gauss-Newton step in all parameters but the delay, if it reduces the cost."""
-        if point.size == 1:
-            return point
-        jacobian = self.jacobian(point, first=1)
-        change = np.linalg.lstsq(jacobian, -self.misfit(point), rcond=None)[0]
-        moved = point.copy()
-        moved[1:] = np.clip(point[1:] + change, self.low[1:], self.high[1:])
-        return min((point, moved), key=self.cost)
-
-    def refined(self, costs: Array, points: Array) -> Array:
-        """The lowest of the refined local minima."""
-        minima = sorted({int(np.argmin(costs)), *_local_minima(costs)}, key=lambda row: costs[row])
-        found = [self._minimised(points[row]) for row in minima[:REFINED]]
-        return self._without_lag(min(found, key=self.cost))
-
-    def _without_lag(self, point: Array) -> Array:
-        """The point with the shortest lag and a longer delay, where that fits as well."""
-        if "lag" not in self.labels:
-            return point
-        delay, lag = self.labels.index("delay"), self.labels.index("lag")
-        without = point.copy()
-        without[delay] += point[lag] - self.low[lag]
-        without[lag] = self.low[lag]
-        without = self._minimised(without, held=lag)
-        rounding = len(self.recording) * (ROUNDING * self.size) ** 2
-        as_well = self.cost(without) <= self.cost(point) * (1.0 + VANISHING) + rounding
-        return without if as_well else point
-
-    def _minimised(self, point: Array, held: int | None = None) -> Array:
-        """Least squares over all parameters, or all but one, from a point."""
-        space = all_directions(point.size)
-        if held is not None:
-            base = np.where(np.arange(point.size) == held, point, 0.0)
-            space = Directions(base, np.delete(space.free, held, axis=1))
-        return minimise(self, point, space, TOLERANCE, EVALUATIONS).point
 
 
 def _message(names: tuple[str, ...], grid: Array, reliable: bool) -> str:

@@ -21,14 +21,13 @@ being larger than the peak.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._native import x_of_overshoot
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import (
     CLEARANCE,
@@ -38,13 +37,10 @@ from deadtime.estimation.data._step_reading import (
     read_step,
     stiffness_of,
 )
-from deadtime.estimation.methods._conclusion import read_off_estimate
-from deadtime.estimation.methods._method import Method, Run, check_choice
+from deadtime.estimation.methods._conclusion import OfOne, Read
+from deadtime.estimation.methods._method import Run, check_choice
 
 OvershootMap = Literal["dominant", "exact", "saturated"]
-
-#: Below x = 1/e the rightmost root is real and the response does not overshoot.
-SMALLEST_X = math.exp(-1.0)
 
 
 def damping_ratio(overshoot: float) -> float:
@@ -92,51 +88,19 @@ def dominant_x(overshoot: float) -> float:
     return rho * math.exp(-rho * math.cos(phi))
 
 
-def exact_overshoot(x: float) -> float:
-    """Overshoot of the exact step response for ``x = K·Td``; 0 where there is none."""
-    from scipy.optimize import brentq
-
-    if x >= 1.0:
-        return x - 0.5
-    if x <= SMALLEST_X:
-        return 0.0
-    low = 0.0
-    while _error(low + 0.5, x) > 0.0:
-        low += 0.5
-        if low > 200.0:  # x within 3e-4 of 1/e: the overshoot is below 1e-60
-            return 0.0
-    zero = brentq(_error, low, low + 0.5, args=(x,), xtol=1e-14, rtol=1e-15)
-    return max(0.0, -_error(zero + 1.0, x))
-
-
 def exact_x(overshoot: float) -> float:
-    """Inverse of `exact_overshoot`, which increases with x."""
-    from scipy.optimize import brentq
-
-    if overshoot >= 0.5:
-        return overshoot + 0.5
-    low = 0.375  # the overshoot is below 1e-7, close to rounding
-    if overshoot <= exact_overshoot(low):
+    """``x = K·Td`` of the exact step response with this overshoot, which increases with x."""
+    x = x_of_overshoot(overshoot)
+    if x is None:
         raise NotIdentifiableError(
             f"an overshoot of {100 * overshoot:.3g} % is too small: K·Td is at its "
-            f"limit 1/e = {SMALLEST_X:.4f}; use the waveform method"
+            f"limit 1/e = {math.exp(-1.0):.4f}; use the waveform method"
         )
-    return float(brentq(lambda x: exact_overshoot(x) - overshoot, low, 1.0, xtol=1e-15))
-
-
-def _error(theta: float, x: float) -> float:
-    """``e(θ)`` of the delayed exponential, summed from its largest terms down."""
-    terms = []
-    term_base = 1.0
-    for j in range(math.floor(theta) + 2):
-        if j > 0:
-            term_base *= -x / j
-        terms.append(term_base * (theta - j + 1.0) ** j)
-    return math.fsum(terms)
+    return x
 
 
 @dataclass(frozen=True)
-class Overshoot(Method):
+class Overshoot(OfOne):
     """Delay from the overshoot of one step, as Armah & Yi read it.
 
     Parameters
@@ -162,11 +126,10 @@ class Overshoot(Method):
     def __post_init__(self) -> None:
         check_choice("map", self.map, get_args(OvershootMap))
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        loop, simulated = run.loop, SimulatedRecording(*run[:3])
         stiffness = stiffness_of(loop, "overshoot")
-        simulated = SimulatedRecording(recording, loop, window)
         reading = read_step(simulated.recording)
         if self.map != "saturated":  # which simulates the limit
             check_decays(read_extremes(reading), "overshoot")
@@ -189,11 +152,9 @@ class Overshoot(Method):
         details = {"map": self.map, "overshoot": overshoot, "overshoot_noise": noise}
         if 0.0 < overshoot < 1.0:
             details["damping_ratio"] = damping_ratio(overshoot)
-        return read_off_estimate(
-            "overshoot",
-            simulated,
+        return Read(
             {"delay": delay},
-            np.array([[stderr**2]]),
+            stderr,
             reading.start,
             message=(
                 f"{100 * overshoot:.2f} % overshoot, map {self.map!r}: assumes a gain of "

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -26,11 +25,16 @@ import numpy as np
 from deadtime._base.arrays import Array, Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._native import (
+    cycle_crossings,
+    cycle_delay_by_lag,
+    cycle_delays,
+    cycle_switches,
+)
 from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
-from deadtime.estimation.methods._conclusion import check_delay_alone, estimate_with_residuals
-from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.methods._conclusion import OfOne, Read
+from deadtime.estimation.methods._method import Run
 from deadtime.estimation.models._held import HeldResponse
 from deadtime.recordings import Recording
 
@@ -41,12 +45,6 @@ LEFT_OUT = 2
 #: Fewest half cycles after these: a standard error takes two pairs.
 FEWEST = 4
 
-#: Share of the path from a crossing to its peaks that is taken as straight, also with a lag.
-STRAIGHT = 0.6
-
-#: Distance from the reference that counts as a crossing, in standard deviations of the noise.
-CLEARANCE = 4.0
-
 #: Largest relative standard deviation of the half cycles, and smallest ratio of the last peak to
 #: the first, of a limit cycle.
 UNEVEN, SHRINKING = 0.25, 0.7
@@ -56,7 +54,7 @@ AT_VALUES = 0.9
 
 
 @dataclass(frozen=True)
-class Relay(Method):
+class Relay(OfOne):
     """Delay from the period of a limit cycle under relay feedback.
 
     Parameters
@@ -82,24 +80,21 @@ class Relay(Method):
         if self.amplitude is not None:
             positive("amplitude", self.amplitude)
 
-    def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        """Fit `free` to the one recording."""
-        ((recording, loop, window, *_),) = runs
-        check_delay_alone("relay", free)
+    def read(self, run: Run, names: tuple[str, ...]) -> Read:
+        """Read the numbers from the window of one recording."""
+        recording, loop, window, *_ = run
         plant = integrator_of(loop, "relay")
         data = recording.window(*window)
         signs, height = _relay(data, self.amplitude)
         error = data.output - data.reference
-        crossings = _crossings(data.time, error)[LEFT_OUT:]
+        # Second differences of straight lines are noise, except at the corners.
+        noise = noise_of_second_differences(error)
+        crossings = cycle_crossings(data.time, error, noise)[LEFT_OUT:]
         _check_cycle(crossings, error, data.time)
         switches = _switches(data.time, signs, crossings, loop.is_sampled)
         half = float(np.mean(np.diff(crossings)))
-        readings = 0.5 * (crossings[1:] + crossings[:-1]) - switches
-        # Means of pairs of successive half cycles.
-        cycles = readings[readings.size % 2 :].reshape(-1, 2).mean(axis=1)
-        late = _delay_by_lag(plant.lag, half)
-        delay = float(cycles.mean()) - late
-        stderr = _error_of_mean(cycles)
+        count, mean, stderr = cycle_delays(crossings, switches)
+        delay = mean - cycle_delay_by_lag(plant.lag, half)
         if delay <= 0.0:
             raise NotIdentifiableError(
                 f"a quarter of the period, {0.5 * half:.3g} s, is explained by lag and hold: the "
@@ -111,31 +106,30 @@ class Relay(Method):
         slope = abs(plant.gain) * height if height is not None else abs(fitted)
         waits = float(np.mean(switches - crossings[:-1]))
         peaks = _peaks(data.time, error, crossings)
-        return estimate_with_residuals(
-            "relay",
-            loop,
-            data.window(float(first), float(last)),
+        return Read(
             {"delay": delay},
-            np.array([[stderr**2]]),
-            output - math.copysign(slope, fitted) * path,
+            stderr,
+            float(output[0]),
             message=(
-                f"{cycles.size} cycles of {2.0 * half:.4g} s; "
+                f"{count} cycles of {2.0 * half:.4g} s; "
                 + (f"the hold waits {waits:.2g} s on average, " if loop.is_sampled else "")
                 + (f"a lag of {plant.lag:g} s subtracted" if plant.lag else "a lag counts as delay")
             ),
             uncalibrated=(
-                f"the relay method gives the scatter of {cycles.size} cycles, {stderr:.2g} s for "
+                f"the relay method gives the scatter of {count} cycles, {stderr:.2g} s for "
                 "their mean, but not what a lag or a drift adds to each of them; use "
                 "method='output_error' for an interval"
             ),
             details={
                 "period": 2.0 * half,
-                "cycles": int(cycles.size),
+                "cycles": count,
                 "wait_of_hold": waits,
                 "amplitude": float(peaks.mean()),
                 "amplitude_expected": slope * (delay + waits),
                 "slope": abs(fitted),
             },
+            recording=data.window(float(first), float(last)),
+            residuals=output - math.copysign(slope, fitted) * path,
         )
 
 
@@ -153,36 +147,6 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
             "only, so it is not that of a relay; use method='output_error', or run Experiment.relay"
         )
     return np.where(data.command >= 0.0, 1.0, -1.0), size
-
-
-def _crossings(time: Array, error: Array) -> Array:
-    """Times at which the output crosses the reference, between samples."""
-    # Second differences of straight lines are noise, except at the corners.
-    beyond = max(CLEARANCE * noise_of_second_differences(error), 1e-9 * float(np.ptp(error)))
-    rough, side, last = [], 0.0, 0
-    for row, value in enumerate(error):
-        if abs(value) <= beyond:
-            continue
-        here = math.copysign(1.0, value)
-        if side and here != side:
-            # Between the last sample clearly on one side and the first clearly on the other.
-            part = error[last] / (error[last] - value)
-            rough.append(float(time[last] + part * (time[row] - time[last])))
-        side, last = here, row
-    if len(rough) < 2:
-        return np.array(rough)
-    reach = STRAIGHT * 0.5 * float(np.median(np.diff(rough)))
-    return np.array([_on_a_line(time, error, place, reach) for place in rough])
-
-
-def _on_a_line(time: Array, error: Array, place: float, reach: float) -> float:
-    """Zero of a line fitted to the samples near a crossing."""
-    near = np.abs(time - place) <= reach
-    if int(near.sum()) < 3:
-        return place
-    slope, level = np.polyfit(time[near] - place, error[near], 1)
-    moved = -float(level) / float(slope) if slope != 0.0 else math.inf
-    return place + moved if abs(moved) <= reach else place
 
 
 def _check_cycle(crossings: Array, error: Array, time: Array) -> None:
@@ -220,52 +184,14 @@ def _switches(time: Array, signs: Array, crossings: Array, sampled: bool) -> Arr
     """Time of the switch at each crossing but the last; the crossing itself without samples."""
     if not sampled:
         return crossings[:-1]
-    rows = np.flatnonzero(np.diff(signs)) + 1
-    middles = 0.5 * (crossings[1:] + crossings[:-1])
-    ends = np.concatenate([[2.0 * crossings[0] - middles[0]], middles])
-    found = []
-    for place, (low, high) in enumerate(itertools.pairwise(ends)):
-        own = time[rows[(time[rows] > low) & (time[rows] <= high)]]
-        if own.size % 2 == 0:
+    counts, times = cycle_switches(time, signs, crossings)
+    for count, crossing in zip(counts, crossings, strict=False):
+        if count % 2 == 0:
             raise NotIdentifiableError(
-                f"the command switches {own.size} times around the crossing at "
-                f"{crossings[place]:.3g} s: the noise hides the limit cycle, or another "
-                "command caused it; use a larger relay"
+                f"the command switches {count} times around the crossing at {crossing:.3g} s: the "
+                "noise hides the limit cycle, or another command caused it; use a larger relay"
             )
-        found.append(float(np.sum(own[::2]) - np.sum(own[1::2])))
-    return np.array(found)
-
-
-def _error_of_mean(cycles: Array) -> float:
-    """Standard error of the mean of cycles that share a crossing with their neighbours.
-
-    Without a hold the errors of all crossings but the first and the last cancel.
-    """
-    off = cycles - cycles.mean()
-    count = cycles.size
-    power = float(off @ off) / (count - 1)
-    neighbours = float(off[1:] @ off[:-1]) / (count - 1)
-    return math.sqrt(max(power + 2.0 * neighbours, power / count) / count)
-
-
-def _delay_by_lag(lag: float, half: float) -> float:
-    """Increase of a quarter of the period by a lag, for half a period of `half`.
-
-    From the arrival of one switch to that of the next the speed goes from -v to v as
-    1 - (1 + v) e^(-t/lag), v = tanh(half/2 lag), and the output from -p to p. The zero of the
-    output is later than the middle by the returned time.
-    """
-    from scipy.optimize import brentq
-
-    if lag == 0.0:
-        return 0.0
-    v = math.tanh(0.5 * half / lag)
-    begin = -0.5 * half + v * lag
-
-    def output(t: float) -> float:
-        return begin + t - (1.0 + v) * lag * -math.expm1(-t / lag)
-
-    return float(brentq(output, 0.5 * half, half)) - 0.5 * half
+    return np.array(times)
 
 
 def _path(

@@ -16,17 +16,15 @@ the other model is likelier by far (`noise="auto"`).
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
+from deadtime.estimation._native import LoopMisfit
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import (
     LOOP_PARAMETERS,
@@ -39,10 +37,15 @@ from deadtime.estimation.data._checks import (
     start_and_span,
 )
 from deadtime.estimation.data._simulated import SimulatedRecording, shortest_time
-from deadtime.estimation.fit._least_squares import Ends, ModelOfOne, solve_jointly
+from deadtime.estimation.fit._least_squares import (
+    Ends,
+    ModelOfOne,
+    solve_jointly,
+    without_vanishing,
+)
 from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.methods._commanded_model import Assumed
-from deadtime.estimation.methods._conclusion import concluded, without_vanishing
+from deadtime.estimation.methods._conclusion import concluded
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.estimation.methods._output_error import estimate_from_commands
 
@@ -60,9 +63,6 @@ GAIN_FACTORS = (0.35, 0.6, 1.0, 1.6)
 #: Shortest lag of a sampled loop, as a share of the time between two samples; shorter ones
 #: overflow.
 LEAST_LAG = 1e-6
-
-#: Bound of the residuals of simulations that diverge, in units of the excitation.
-LARGEST_MISFIT = 1e3
 
 #: Noise is taken to be in the recording alone where its log likelihood is larger by this (a factor
 #: of 20). Larger values prefer the innovations more often.
@@ -127,7 +127,7 @@ class Waveform(Method):
 
     def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)
-        models = [_model(run, names, self.initial_output) for run in runs]
+        models = [simulated_model(run, names, self.initial_output) for run in runs]
         model, found = solve_jointly(models)
         found = without_vanishing(model, found)
         check_ends(names, found.point, model.low, model.high)
@@ -162,83 +162,43 @@ def _unlikelihood(fit: DelayEstimate) -> float:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedModel(ModelOfOne):
-    """Residuals of the simulated loop, bounded where simulations diverge."""
+    """The misfit of the simulated loop, bounded where simulations diverge."""
 
     simulated: SimulatedRecording
+    least_lag: float = LEAST_LAG
 
-    @cached_property
-    def bound(self) -> float:
-        """Largest residual."""
-        return LARGEST_MISFIT * self.size
-
-    def misfit(self, point: Array) -> Array:
-        """Simulated minus recorded output; bounded where the loop with these numbers is not."""
-        recorded = self.recording.output
-        try:
-            output = self.simulated.output(self.values(point), self.start_of(point))
-        except ValueError:  # the response with these numbers grows without bound
-            return np.full(recorded.size, self.bound)
-        return np.clip(output - recorded, -self.bound, self.bound)
-
-
-@dataclass(frozen=True, eq=False)
-class _Model(SimulatedModel):
-    @cached_property
-    def span(self) -> float:
-        return start_and_span(self.recording)[1]
-
-    @cached_property
-    def _shortest(self) -> float:
-        if self.simulated.loop.is_sampled:
-            return LEAST_LAG * self.recording.sample_time
-        return shortest_time(self.recording)
+    @property
+    def kernel(self) -> LoopMisfit:
+        """The misfit of the kernel."""
+        return self.simulated.misfit(self.names, self.offset, self.size)
 
     def ends(self, label: str) -> Ends:
-        tenth, shortest = 0.1 * self.span, self._shortest
-        no_delay = 0.0 if self.simulated.loop.is_sampled else shortest
+        """Bounds and starting values of one of the parameters."""
+        recording, loop = self.recording, self.simulated.loop
+        start, span = start_and_span(recording)
+        shortest = lag = shortest_time(recording)
+        if loop.is_sampled:
+            shortest, lag = 0.0, self.least_lag * recording.sample_time
+        delays = np.geomspace(0.003, 0.6, DELAY_POINTS) * span
         found = {
-            "delay": Ends(no_delay, self.span, tenth),
-            "lag": Ends(shortest, self.span, tenth),
-            "start": Ends(-0.25 * self.span, 0.25 * self.span, tenth),
-            "initial output": Ends(-np.inf, np.inf, self.size),
+            "delay": Ends(shortest, span, delays),
+            "lag": Ends(lag, span, [0.02 * span]),
+            "start": Ends(-0.25 * span, 0.25 * span, [0.0]),
+            "initial output": Ends(-np.inf, np.inf, [start]),
         }.get(label)
         if found is not None:
             return found
-        value = self.simulated.loop.parameters[label]
+        value = loop.parameters[label]
         low, high = sorted((1e-3 * value, 1e3 * value))
-        return Ends(low, high, abs(value))
-
-    def jacobian(self, point: Array) -> Array:
-        """Derivatives of the misfit; zero where it is at its bound."""
-        try:
-            slopes = self.simulated.slopes(self.values(point), self.start_of(point))
-        except ValueError:
-            return np.zeros((len(self.recording), point.size))
-        columns = np.stack([slopes[label] for label in self.labels], axis=1)
-        bounded = np.abs(slopes["output"] - self.recording.output) < self.bound
-        return np.where(bounded[:, None], columns, 0.0)
-
-    def starts(self) -> list[Array]:
-        """The points of a grid over delay and gain, the best first."""
-        start, _ = start_and_span(self.recording)
-        along = [start] if self.offset is None else []
-        points = [np.array([*point, *along]) for point in itertools.product(*self._grid())]
-        costs = [float(np.sum(self.misfit(point) ** 2)) for point in points]
-        return [points[int(index)] for index in np.argsort(costs)]
-
-    def _grid(self) -> list[Array]:
-        known = self.simulated.loop.parameters
-        grids = {
-            "delay": np.geomspace(0.003, 0.6, DELAY_POINTS) * self.span,
-            "gain": np.array(GAIN_FACTORS) * known.get("gain", 1.0),
-            "lag": np.array([0.02]) * self.span,
-            "start": np.zeros(1),
-        }
-        return [grids[name] if name in grids else np.array([known[name]]) for name in self.names]
+        factors = np.array(GAIN_FACTORS) if label == "gain" else np.ones(1)
+        return Ends(low, high, factors * value)
 
 
-def _model(run: Run, names: tuple[str, ...], offset: float | None = None) -> _Model:
+def simulated_model(
+    run: Run, names: tuple[str, ...], offset: float | None = None
+) -> SimulatedModel:
+    """The model of one recording; refuses one without excitation."""
     simulated = SimulatedRecording(*run[:3])
     in_motion = simulated.recording.time[0] > run.recording.time[0]
     check_excitation(simulated.recording, len(names), in_motion=in_motion)
-    return _Model(simulated.recording, names, offset, simulated)
+    return SimulatedModel(simulated.recording, names, offset, simulated)

@@ -190,9 +190,9 @@ def window_of(part: Recording, integrates: bool) -> Window:
     power = float(moved @ moved)
     best = _Shape(np.inf, 0.0, 0.0, moved, moved)
     delays = np.array(TRIED)
-    places = response.places(time - delays[:, None] * row)
+    times = time - delays[:, None] * row
     for lag in TRIED:
-        path = response.at_places(places, lag * row)
+        path = response.at(times, lag * row)
         shapes = _without(trend, path.value if integrates else path.rate)
         sizes = np.linalg.norm(shapes, axis=1)
         within = (delays + lag > 0.0) & ((delays + lag) * row < LONGEST * (time[-1] - time[0]))

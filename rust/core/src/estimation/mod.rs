@@ -9,14 +9,20 @@
 //! to a constant input (trim). Gain, offset and trim are linear and eliminated exactly
 //! (`likelihood`), the variance of the white noise too; delay, lags and the numbers of the noise are
 //! searched (`search`, `fit`), and intervals are those of the profile (`profile`).
+//!
+//! `least_squares` fits simulated loops, `damped` is the step of its searches, and
+//! `literature` has the formulas of other methods.
 
+mod damped;
 mod disturbance;
 mod family;
 mod fit;
 mod flight;
 mod kept;
 mod kicks;
+mod least_squares;
 mod likelihood;
+mod literature;
 mod mean;
 mod noises;
 mod online;
@@ -49,7 +55,18 @@ pub use flight::{
     Scatter, Whiteness, beside_noise, colour_factors, excited_part, fit_flight, judge,
     least_squares, scatter_of, unseen_lag, whiteness,
 };
+pub use least_squares::{
+    Chebyshev, ClosedLoop, Fitted, Given, Joint, Minimum, Number as FittedNumber, Part, Scan,
+    Simulated, Vanishing, by_scatter, least_held, local_minima, refined, robust_covariance, scan,
+    solve, white_covariance, without_vanishing,
+};
 pub use likelihood::{Evaluation, Noise};
+pub use literature::{
+    Cycles, Extreme, HeldPath, PathAt, PeriodicLines, Plain, RecordLines, Ringing, Switch, Tail,
+    Tangent, Weighting, arx_losses, coefficient, crossings, cycles, decay, delay_by_lag,
+    delay_of_rate, exact_x, extremes, feedback, held_losses, loop_with_ringing, peak, ringing,
+    switches, tail_rate, tangent,
+};
 pub use online::{Answer, Known, Lags, Online, Settings, online};
 pub use path::held_response;
 pub use plant::Plant;

@@ -1,0 +1,555 @@
+//! Bindings of least squares on simulated loops.
+
+use std::cell::RefCell;
+
+use deadtime::estimation::{
+    self as core, Chebyshev, ClosedLoop, Fitted, FittedNumber, HeldPath, Joint, Minimum, Part,
+    PeriodicLines, Plain, RecordLines, Simulated, Vanishing,
+};
+use deadtime::loops::Fraction;
+use deadtime::{Error, Task};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+
+use crate::arrays::{converted, in_order, owned};
+use crate::loops::{Given, PyLoop};
+use crate::runtime::run_attached;
+
+type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+type Matrix<'py> = Bound<'py, PyArray2<f64>>;
+
+/// The rows of a recording that a loop is simulated over.
+#[derive(FromPyObject)]
+struct SimulatedRows<'py> {
+    time: Floats<'py>,
+    reference: Floats<'py>,
+    output: Floats<'py>,
+    past: Floats<'py>,
+    row: f64,
+    size: f64,
+    bound: f64,
+}
+
+/// Misfit of a simulated loop.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct LoopMisfit {
+    inner: ClosedLoop,
+    polynomials: Option<Py<PyAny>>,
+}
+
+#[pymethods]
+impl LoopMisfit {
+    #[new]
+    #[pyo3(signature = (control, rows, names, start, *, is_smooth, polynomials=None))]
+    fn new(
+        control: &PyLoop,
+        rows: SimulatedRows<'_>,
+        names: Vec<String>,
+        start: Option<f64>,
+        is_smooth: bool,
+        polynomials: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let control = control.core().clone();
+        let mut numbers = Vec::new();
+        for name in &names {
+            numbers.push(match name.as_str() {
+                "start" => FittedNumber::Start,
+                "lag" => FittedNumber::Lag(converted(control.place(name))?),
+                _ => FittedNumber::Other(converted(control.place(name))?),
+            });
+        }
+        Ok(Self {
+            inner: ClosedLoop {
+                control,
+                time: owned(&rows.time)?,
+                reference: owned(&rows.reference)?,
+                output: owned(&rows.output)?,
+                past: owned(&rows.past)?,
+                numbers,
+                start,
+                row: rows.row,
+                size: rows.size,
+                bound: rows.bound,
+                is_smooth,
+            },
+            polynomials,
+        })
+    }
+}
+
+/// Misfit of a loop whose delay is approximated by a polynomial.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct ChebyshevMisfit {
+    inner: Chebyshev,
+}
+
+#[pymethods]
+impl ChebyshevMisfit {
+    /// `known` are delay, gain, lag and Kp, `places` those of the first three among the numbers that are
+    /// fitted.
+    #[new]
+    #[pyo3(signature = (time, output, steps, *, known, places, start, intervals, is_late, units))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
+    fn new(
+        time: Floats<'_>,
+        output: Floats<'_>,
+        steps: Vec<(f64, f64)>,
+        known: [f64; 4],
+        places: [Option<usize>; 3],
+        start: Option<f64>,
+        intervals: usize,
+        is_late: bool,
+        units: Vec<f64>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            inner: Chebyshev {
+                time: owned(&time)?,
+                output: owned(&output)?,
+                steps,
+                known,
+                places,
+                start,
+                intervals,
+                is_late,
+                units,
+            },
+        })
+    }
+}
+
+/// Misfit at the lines of a spectrum.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct LinesMisfit {
+    inner: Lines,
+}
+
+#[derive(Clone)]
+enum Lines {
+    Record(RecordLines),
+    Periodic(PeriodicLines),
+}
+
+/// Delay, gain and lag where they are known, their places among the numbers that are fitted, and the time
+/// between two rows.
+type LineNumbers = ([f64; 3], [Option<usize>; 3], f64);
+
+fn plain((known, places, row): LineNumbers) -> Plain {
+    Plain { known, places, row }
+}
+
+#[pymethods]
+impl LinesMisfit {
+    /// Of one record under commands that hold from their times on: lines up to the last, or all.
+    #[staticmethod]
+    fn of_record(
+        numbers: LineNumbers,
+        commands: (Floats<'_>, Floats<'_>),
+        time: Floats<'_>,
+        output: Floats<'_>,
+        last: Option<usize>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            inner: Lines::Record(RecordLines {
+                numbers: plain(numbers),
+                path: HeldPath::new(owned(&commands.0)?, owned(&commands.1)?),
+                time: owned(&time)?,
+                output: owned(&output)?,
+                last,
+            }),
+        })
+    }
+
+    /// Of whole periods of this many samples.
+    #[staticmethod]
+    fn of_periods(
+        numbers: LineNumbers,
+        command: Floats<'_>,
+        output: Floats<'_>,
+        samples: usize,
+        lines: Vec<usize>,
+    ) -> PyResult<Self> {
+        let (command, output) = (in_order(&command)?, in_order(&output)?);
+        let made = PeriodicLines::new(plain(numbers), &command, &output, samples, &lines);
+        Ok(Self {
+            inner: Lines::Periodic(made),
+        })
+    }
+}
+
+/// What gives the misfit of one recording.
+enum Source {
+    Loop(Py<LoopMisfit>),
+    Lines(Py<LinesMisfit>),
+    Chebyshev(Py<ChebyshevMisfit>),
+    /// An object of Python with `misfit` and `jacobian`.
+    Given(Py<PyAny>),
+}
+
+/// One recording: its misfit, rows, bounds, and the points at which searches start.
+#[derive(FromPyObject)]
+struct FittedPart<'py> {
+    kernel: Bound<'py, PyAny>,
+    length: usize,
+    low: Floats<'py>,
+    high: Floats<'py>,
+    axes: Vec<Vec<f64>>,
+}
+
+/// A function of Python fails: its error is kept until the work has ended.
+struct Calls<'py> {
+    py: Python<'py>,
+    failure: RefCell<Option<PyErr>>,
+}
+
+impl Calls<'_> {
+    fn kept<T>(&self, found: PyResult<T>) -> Result<T, Error> {
+        found.map_err(|error| {
+            *self.failure.borrow_mut() = Some(error);
+            Error::Caller
+        })
+    }
+}
+
+/// Misfit and derivatives by methods of an object of Python.
+struct Called<'a, 'py> {
+    of: &'a Py<PyAny>,
+    calls: &'a Calls<'py>,
+}
+
+impl Part for Called<'_, '_> {
+    fn misfit(&self, point: &[f64], _: &Task) -> Result<Vec<f64>, Error> {
+        let py = self.calls.py;
+        let at = PyArray1::from_slice(py, point);
+        self.calls.kept((|| {
+            let found = self.of.bind(py).call_method1("misfit", (at,))?;
+            owned(&found.extract::<Floats<'_>>()?)
+        })())
+    }
+
+    fn slopes(&self, point: &[f64], _: &Task) -> Result<Vec<Vec<f64>>, Error> {
+        let py = self.calls.py;
+        let at = PyArray1::from_slice(py, point);
+        self.calls.kept((|| {
+            let found = self.of.bind(py).call_method1("jacobian", (at,))?;
+            let rows = owned(&found.extract::<Floats<'_>>()?)?;
+            let count = point.len();
+            let column = |j: usize| rows[j..].iter().step_by(count).copied().collect();
+            Ok((0..count).map(column).collect())
+        })())
+    }
+}
+
+/// Least squares over common parameters of recordings.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct LeastSquares {
+    sources: Vec<Source>,
+    sizes: Vec<usize>,
+    low: Vec<Vec<f64>>,
+    high: Vec<Vec<f64>>,
+    axes: Vec<Vec<Vec<f64>>>,
+    weights: Vec<f64>,
+    common: usize,
+    trade: Option<(usize, usize)>,
+}
+
+/// Where a sum of squares is least.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct LeastSquaresMinimum {
+    point: Py<PyArray1<f64>>,
+    misfit: Py<PyArray1<f64>>,
+    jacobian: Py<PyArray2<f64>>,
+}
+
+impl LeastSquaresMinimum {
+    fn of(py: Python<'_>, found: Minimum) -> PyResult<Self> {
+        let rows = found.misfit.len();
+        Ok(Self {
+            point: found.point.into_pyarray(py).unbind(),
+            misfit: found.misfit.into_pyarray(py).unbind(),
+            jacobian: table(py, found.slopes, rows)?.unbind(),
+        })
+    }
+}
+
+/// Columns as the table of numpy.
+fn table(py: Python<'_>, columns: Vec<Vec<f64>>, rows: usize) -> PyResult<Matrix<'_>> {
+    let count = columns.len();
+    let at = |place: usize| columns[place % count][place / count];
+    let entries: Vec<f64> = (0..rows * count).map(at).collect();
+    entries.into_pyarray(py).reshape([rows, count])
+}
+
+/// The columns of a table of numpy.
+fn columns(matrix: &Floats<'_>) -> PyResult<Vec<Vec<f64>>> {
+    let count = matrix.shape().get(1).copied().unwrap_or(0);
+    let entries = owned(matrix)?;
+    let column = |j: usize| entries[j..].iter().step_by(count).copied().collect();
+    Ok((0..count).map(column).collect())
+}
+
+impl LeastSquares {
+    fn with<T>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Joint<'_>, &Task) -> Result<T, Error>,
+    ) -> PyResult<T> {
+        let calls = Calls {
+            py,
+            failure: RefCell::new(None),
+        };
+        let polynomials: Vec<_> = self
+            .sources
+            .iter()
+            .map(|source| polynomials_of(source, &calls))
+            .collect();
+        let parts = self.sources.iter().zip(&polynomials).enumerate();
+        let parts = parts.map(|(index, (source, given))| {
+            let part: Box<dyn Part + '_> = match source {
+                Source::Loop(own) => Box::new(Simulated {
+                    of: &own.get().inner,
+                    given: given.as_deref(),
+                }),
+                Source::Lines(own) => match &own.get().inner {
+                    Lines::Record(lines) => Box::new(lines.clone()),
+                    Lines::Periodic(lines) => Box::new(lines.clone()),
+                },
+                Source::Chebyshev(own) => Box::new(own.get().inner.clone()),
+                Source::Given(of) => Box::new(Called { of, calls: &calls }),
+            };
+            Fitted {
+                part,
+                rows: self.sizes[index],
+                low: self.low[index].clone(),
+                high: self.high[index].clone(),
+                axes: self.axes[index].clone(),
+            }
+        });
+        let mut joint = Joint::new(parts.collect(), self.weights.clone(), self.common);
+        joint.trade = self.trade;
+        let found = run_attached(py, |task| work(&mut joint, task));
+        match calls.failure.take() {
+            Some(error) => Err(error),
+            None => found,
+        }
+    }
+}
+
+type Finder<'a> = Box<dyn Fn(&[f64]) -> Result<Fraction<f64>, Error> + 'a>;
+
+/// What finds the polynomials of a plant that is given by them.
+fn polynomials_of<'a>(source: &'a Source, calls: &'a Calls<'_>) -> Option<Finder<'a>> {
+    let Source::Loop(own) = source else {
+        return None;
+    };
+    let given = own.get().polynomials.as_ref()?;
+    Some(Box::new(move |numbers: &[f64]| {
+        let (num, den) = calls.kept(
+            given
+                .bind(calls.py)
+                .call1((numbers.to_vec(),))
+                .and_then(|found| found.extract::<Given<f64>>()),
+        )?;
+        Ok(Fraction { num, den })
+    }))
+}
+
+#[pymethods]
+impl LeastSquares {
+    #[new]
+    fn new(
+        parts: Vec<FittedPart<'_>>,
+        weights: Vec<f64>,
+        common: usize,
+        delay: Option<usize>,
+        lag: Option<usize>,
+    ) -> PyResult<Self> {
+        let mut made = Self {
+            sources: Vec::new(),
+            sizes: Vec::new(),
+            low: Vec::new(),
+            high: Vec::new(),
+            axes: Vec::new(),
+            weights,
+            common,
+            trade: delay.zip(lag),
+        };
+        for part in parts {
+            made.sources
+                .push(if let Ok(own) = part.kernel.cast::<LoopMisfit>() {
+                    Source::Loop(own.clone().unbind())
+                } else if let Ok(own) = part.kernel.cast::<LinesMisfit>() {
+                    Source::Lines(own.clone().unbind())
+                } else if let Ok(own) = part.kernel.cast::<ChebyshevMisfit>() {
+                    Source::Chebyshev(own.clone().unbind())
+                } else {
+                    Source::Given(part.kernel.unbind())
+                });
+            made.sizes.push(part.length);
+            made.low.push(owned(&part.low)?);
+            made.high.push(owned(&part.high)?);
+            made.axes.push(part.axes);
+        }
+        Ok(made)
+    }
+
+    /// Weighted residuals.
+    fn misfit<'py>(&self, py: Python<'py>, point: Floats<'_>) -> PyResult<Vector<'py>> {
+        let point = in_order(&point)?;
+        let found = self.with(py, |joint, task| joint.misfit(&point, task))?;
+        Ok(found.into_pyarray(py))
+    }
+
+    /// Their derivatives.
+    fn jacobian<'py>(&self, py: Python<'py>, point: Floats<'_>) -> PyResult<Matrix<'py>> {
+        let point = in_order(&point)?;
+        let found = self.with(py, |joint, task| joint.slopes(&point, task))?;
+        let rows = found.first().map_or(0, Vec::len);
+        table(py, found, rows)
+    }
+
+    /// The lowest minimum from the best starting points.
+    fn solve(&self, py: Python<'_>) -> PyResult<LeastSquaresMinimum> {
+        let found = self.with(py, |joint, task| core::solve(joint, task))?;
+        LeastSquaresMinimum::of(py, found)
+    }
+
+    /// Weights by what is left of each recording, iterated from `solve`, and the minimum with them.
+    fn by_scatter(
+        &self,
+        py: Python<'_>,
+        first: &LeastSquaresMinimum,
+    ) -> PyResult<(Vec<f64>, LeastSquaresMinimum)> {
+        let first = self.minimum(py, first)?;
+        let (weights, found) = self.with(py, |joint, task| {
+            let found = core::by_scatter(joint, &first, task)?;
+            Ok((joint.weights.clone(), found))
+        })?;
+        Ok((weights, LeastSquaresMinimum::of(py, found)?))
+    }
+
+    /// The minimum with the delay and the lag (their places) at zero where that fits as well.
+    fn without_vanishing(
+        &self,
+        py: Python<'_>,
+        found: &LeastSquaresMinimum,
+        delay: Option<usize>,
+        lag: Option<usize>,
+        size: f64,
+    ) -> PyResult<LeastSquaresMinimum> {
+        let found = self.minimum(py, found)?;
+        let which = Vanishing { lag, delay, size };
+        let found = self.with(py, |joint, task| {
+            core::without_vanishing(joint, found, which, task)
+        })?;
+        LeastSquaresMinimum::of(py, found)
+    }
+
+    /// Least sum of squares over the points base + free q.
+    fn least_held(
+        &self,
+        py: Python<'_>,
+        best: &LeastSquaresMinimum,
+        base: Floats<'_>,
+        free: Floats<'_>,
+    ) -> PyResult<f64> {
+        let best = self.minimum(py, best)?;
+        let (base, free) = (owned(&base)?, columns(&free)?);
+        self.with(py, |joint, task| {
+            core::least_held(joint, &best, &base, &free, task)
+        })
+    }
+
+    /// Least costs at delays, which come first in a point, the places of local minima among them, and the
+    /// lowest minimum; with the shortest lag where that fits as well, to `rounding`.
+    fn scan<'py>(
+        &self,
+        py: Python<'py>,
+        delays: Floats<'_>,
+        guess: Floats<'_>,
+        lag: Option<usize>,
+        rounding: f64,
+    ) -> PyResult<(Vector<'py>, Vec<usize>, LeastSquaresMinimum)> {
+        let (delays, guess) = (owned(&delays)?, owned(&guess)?);
+        let (costs, found) = self.with(py, |joint, task| {
+            let scan = core::scan(joint, &delays, &guess, task)?;
+            let found = core::refined(joint, &scan, lag, rounding, task)?;
+            Ok((scan.costs, found))
+        })?;
+        let minima = core::local_minima(&costs);
+        Ok((
+            costs.into_pyarray(py),
+            minima,
+            LeastSquaresMinimum::of(py, found)?,
+        ))
+    }
+}
+
+impl LeastSquares {
+    fn minimum(&self, py: Python<'_>, found: &LeastSquaresMinimum) -> PyResult<Minimum> {
+        let vector = |array: &Py<PyArray1<f64>>| array.bind(py).to_vec();
+        let jacobian: Floats<'_> = found.jacobian.bind(py).extract()?;
+        Ok(Minimum {
+            point: vector(&found.point)?,
+            misfit: vector(&found.misfit)?,
+            slopes: columns(&jacobian)?,
+        })
+    }
+}
+
+#[pymethods]
+impl LeastSquaresMinimum {
+    #[new]
+    fn new(
+        point: Py<PyArray1<f64>>,
+        misfit: Py<PyArray1<f64>>,
+        jacobian: Py<PyArray2<f64>>,
+    ) -> Self {
+        Self {
+            point,
+            misfit,
+            jacobian,
+        }
+    }
+
+    fn __getnewargs__(
+        &self,
+        py: Python<'_>,
+    ) -> (Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>) {
+        (
+            self.point.clone_ref(py),
+            self.misfit.clone_ref(py),
+            self.jacobian.clone_ref(py),
+        )
+    }
+
+    /// Sum of squares.
+    #[getter]
+    fn cost(&self, py: Python<'_>) -> PyResult<f64> {
+        let misfit = self.misfit.bind(py).to_vec()?;
+        Ok(misfit.iter().map(|x| x * x).sum())
+    }
+}
+
+/// Covariance of the parameters, for residuals with memory or (`white`) without, of recordings of these
+/// sizes.
+#[pyfunction]
+pub(crate) fn fit_covariance<'py>(
+    py: Python<'py>,
+    jacobian: Floats<'_>,
+    residuals: Floats<'_>,
+    sizes: Option<Vec<usize>>,
+    white: bool,
+) -> PyResult<Matrix<'py>> {
+    let (columns, residuals) = (columns(&jacobian)?, owned(&residuals)?);
+    let count = columns.len();
+    let found = if white {
+        core::white_covariance(&columns, &residuals)
+    } else {
+        let sizes = sizes.unwrap_or_else(|| vec![residuals.len()]);
+        core::robust_covariance(&columns, &residuals, &sizes)
+    };
+    found.into_pyarray(py).reshape([count, count])
+}

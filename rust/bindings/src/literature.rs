@@ -1,0 +1,245 @@
+//! Bindings of the methods of the literature.
+
+use deadtime::estimation::{self as core, Extreme, HeldPath, Tangent, Weighting};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+
+use crate::arrays::{in_order, owned};
+use crate::runtime::run_here;
+
+type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+
+/// Time, height, and their standard errors.
+type Peak = (f64, f64, f64, f64);
+
+fn extreme((time, height, time_error, height_error): Peak) -> Extreme {
+    Extreme {
+        time,
+        height,
+        time_error,
+        height_error,
+    }
+}
+
+/// Peaks and valleys of a response around its reference, at times since its step.
+#[pyfunction]
+pub(crate) fn step_extremes(
+    since: Floats<'_>,
+    beyond: Floats<'_>,
+    noise: f64,
+) -> PyResult<Vec<Peak>> {
+    let found = core::extremes(&in_order(&since)?, &in_order(&beyond)?, noise);
+    let listed = found.iter();
+    Ok(listed
+        .map(|e| (e.time, e.height, e.time_error, e.height_error))
+        .collect())
+}
+
+/// Do peaks and valleys decay?
+#[pyfunction]
+pub(crate) fn extremes_decay(extremes: Vec<Peak>) -> bool {
+    core::decay(&extremes.into_iter().map(extreme).collect::<Vec<_>>())
+}
+
+/// σ and ω of the oscillation that leaves these extremes; delay and K of the loop that has it, and their
+/// covariance, if there is one.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a tuple for Python")]
+pub(crate) fn loop_of_extremes(
+    extremes: Vec<Peak>,
+    lag: f64,
+    sample_time: Option<f64>,
+) -> ((f64, f64), Option<([f64; 2], [f64; 4])>) {
+    let extremes: Vec<_> = extremes.into_iter().map(extreme).collect();
+    let found = core::ringing(&extremes);
+    let made = (found.sigma > 0.0)
+        .then(|| core::loop_with_ringing(&found, lag, sample_time))
+        .flatten();
+    ((found.sigma, found.omega), made)
+}
+
+/// Height and rate of the exponential through a tail, and the standard error of the rate.
+#[pyfunction]
+pub(crate) fn tail_rate(
+    time: Floats<'_>,
+    left: Floats<'_>,
+    guess: f64,
+) -> PyResult<(f64, f64, f64)> {
+    let found = core::tail_rate(&in_order(&time)?, &in_order(&left)?, guess);
+    Ok((found.height, found.rate, found.error))
+}
+
+/// Delay of the loop with the root −rate, and its slope.
+#[pyfunction]
+pub(crate) fn delay_of_rate(
+    rate: f64,
+    stiffness: f64,
+    lag: f64,
+    sample_time: Option<f64>,
+) -> (f64, f64) {
+    core::delay_of_rate(rate, stiffness, lag, sample_time)
+}
+
+/// K Td of an overshoot, if that says it.
+#[pyfunction]
+pub(crate) fn x_of_overshoot(overshoot: f64) -> Option<f64> {
+    core::exact_x(overshoot)
+}
+
+/// Where the straight part of a rise meets the initial output, with its standard error; or the samples on
+/// it where they are too few, none where it does not rise, with its ends.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a tuple for Python")]
+pub(crate) fn rise_tangent(
+    since: Floats<'_>,
+    travelled: Floats<'_>,
+    guess: f64,
+    held: Option<f64>,
+    noise: f64,
+) -> PyResult<(Option<(f64, f64)>, Option<(usize, f64, f64)>)> {
+    let (since, travelled) = (in_order(&since)?, in_order(&travelled)?);
+    Ok(
+        match core::tangent(&since, &travelled, guess, held, noise) {
+            Tangent::Meets(place, error) => (Some((place, error)), None),
+            Tangent::Few(count, from, until) => (None, Some((count, from, until))),
+            Tangent::Falls => (None, None),
+        },
+    )
+}
+
+/// Crossings of the reference in a limit cycle.
+#[pyfunction]
+pub(crate) fn cycle_crossings<'py>(
+    py: Python<'py>,
+    time: Floats<'_>,
+    error: Floats<'_>,
+    noise: f64,
+) -> PyResult<Vector<'py>> {
+    let found = core::crossings(&in_order(&time)?, &in_order(&error)?, noise);
+    Ok(found.into_pyarray(py))
+}
+
+/// How often the command switches around each crossing but the last, and the time of one switch with the
+/// same effect.
+#[pyfunction]
+pub(crate) fn cycle_switches(
+    time: Floats<'_>,
+    signs: Floats<'_>,
+    crossings: Floats<'_>,
+) -> PyResult<(Vec<usize>, Vec<f64>)> {
+    let (time, signs) = (in_order(&time)?, in_order(&signs)?);
+    let found = core::switches(&time, &signs, &in_order(&crossings)?);
+    Ok(found.iter().map(|one| (one.count, one.time)).unzip())
+}
+
+/// Increase of a quarter of the period of a limit cycle by a lag.
+#[pyfunction]
+pub(crate) fn cycle_delay_by_lag(lag: f64, half: f64) -> f64 {
+    core::delay_by_lag(lag, half)
+}
+
+/// F, dF/dt and dF/dlag of an integrator under commands that hold, at times of any shape in C order.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a tuple of arrays for Python")]
+pub(crate) fn integrator_path<'py>(
+    py: Python<'py>,
+    time: Floats<'_>,
+    command: Floats<'_>,
+    times: Floats<'_>,
+    lag: f64,
+) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>)> {
+    let path = HeldPath::new(owned(&time)?, owned(&command)?);
+    let times = in_order(&times)?;
+    let found = run_here(py, |_| Ok(path.at(&times, lag)))?;
+    Ok((
+        found.value.into_pyarray(py),
+        found.rate.into_pyarray(py),
+        found.by_lag.into_pyarray(py),
+    ))
+}
+
+/// Losses of ARX models of orders `na`, `nb` at every delay from `least` on; that of the best, and that
+/// without a command.
+#[pyfunction]
+pub(crate) fn arx_losses<'py>(
+    py: Python<'py>,
+    output: Floats<'_>,
+    command: Floats<'_>,
+    orders: (usize, usize),
+    delays: (usize, usize),
+) -> PyResult<(Vector<'py>, f64, f64)> {
+    let (output, command) = (in_order(&output)?, in_order(&command)?);
+    let (losses, best, none) = run_here(py, |task| {
+        core::arx_losses(&output, &command, orders, delays, task)
+    })?;
+    Ok((losses.into_pyarray(py), best, none))
+}
+
+/// Delay in samples of a held command in a response, the losses at whole numbers of them, and that without
+/// a command.
+#[pyfunction]
+pub(crate) fn held_losses<'py>(
+    py: Python<'py>,
+    response: Floats<'_>,
+    command: Floats<'_>,
+    delays: (usize, usize),
+) -> PyResult<(f64, Vector<'py>, f64)> {
+    let (response, command) = (in_order(&response)?, in_order(&command)?);
+    let (samples, losses, none) = run_here(py, |task| {
+        core::held_losses(&response, &command, delays, task)
+    })?;
+    Ok((samples, losses.into_pyarray(py), none))
+}
+
+/// Correlation coefficient of a response and an earlier command, and the variance of one by chance, times
+/// the samples.
+#[pyfunction]
+pub(crate) fn correlation_coefficient(
+    command: Floats<'_>,
+    response: Floats<'_>,
+    shift: usize,
+) -> PyResult<(f64, f64)> {
+    let (command, response) = (in_order(&command)?, in_order(&response)?);
+    Ok(core::coefficient(&command, &response, shift))
+}
+
+/// Statistic and degrees of freedom of the test that the command depends on the output.
+#[pyfunction]
+pub(crate) fn feedback_test(
+    command: Floats<'_>,
+    reference: Floats<'_>,
+    output: Floats<'_>,
+) -> PyResult<Option<(f64, usize, usize)>> {
+    let (command, reference) = (in_order(&command)?, in_order(&reference)?);
+    Ok(core::feedback(&command, &reference, &in_order(&output)?))
+}
+
+/// The shift in samples at which the weighted correlation of a command and a response is largest, and where
+/// between samples its peak is.
+#[pyfunction]
+pub(crate) fn correlation_peak(
+    command: Floats<'_>,
+    response: Floats<'_>,
+    weighting: &str,
+    shifts: (usize, usize),
+) -> PyResult<(usize, f64)> {
+    let weighting = match weighting {
+        "scot" => Weighting::Scot,
+        "phat" => Weighting::Phat,
+        "prewhitened" => Weighting::Prewhitened,
+        _ => Weighting::None,
+    };
+    let (command, response) = (in_order(&command)?, in_order(&response)?);
+    Ok(core::peak(&command, &response, weighting, shifts))
+}
+
+/// Number of cycles between crossings, their mean delay by the switches, and its standard error.
+#[pyfunction]
+pub(crate) fn cycle_delays(
+    crossings: Floats<'_>,
+    switches: Floats<'_>,
+) -> PyResult<(usize, f64, f64)> {
+    let found = core::cycles(&in_order(&crossings)?, &in_order(&switches)?);
+    Ok((found.count, found.delay, found.error))
+}

@@ -1,0 +1,31 @@
+//! Formulas of the methods of the literature: what they read from a recording, and what follows.
+//!
+//! `extremes` reads peaks and valleys of a step response, `ringing` the delay and the gain from their
+//! decay, `tail` the delay from a response that does not overshoot, `overshoot` that of the exact
+//! response, `tangent` the straight part of a rise, `relay` the crossings and switches of a limit cycle,
+//! `arx` ARX models with every delay, `correlation`
+//! correlations of commands and responses, `spectrum` the misfit at lines of a spectrum; `held` is the plant under a held command, over time and as H(z).
+
+mod arx;
+mod columns;
+mod correlation;
+mod extremes;
+mod held;
+mod overshoot;
+mod relay;
+mod ringing;
+mod spectrum;
+mod tail;
+mod tangent;
+mod zero;
+
+pub use arx::{arx_losses, held_losses};
+pub use correlation::{Weighting, coefficient, feedback, peak};
+pub use extremes::{Extreme, decay, extremes};
+pub use held::{HeldPath, PathAt};
+pub use overshoot::exact_x;
+pub use relay::{Cycles, Switch, crossings, cycles, delay_by_lag, switches};
+pub use ringing::{Ringing, loop_with_ringing, ringing};
+pub use spectrum::{PeriodicLines, Plain, RecordLines};
+pub use tail::{Tail, delay_of_rate, tail_rate};
+pub use tangent::{Tangent, tangent};
