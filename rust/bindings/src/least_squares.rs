@@ -274,6 +274,9 @@ impl LeastSquaresMinimum {
     }
 }
 
+/// Point, misfit and derivatives.
+type MinimumParts = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>);
+
 /// Columns as the table of numpy.
 fn table(py: Python<'_>, columns: Vec<Vec<f64>>, rows: usize) -> PyResult<Matrix<'_>> {
     let count = columns.len();
@@ -514,10 +517,7 @@ impl LeastSquaresMinimum {
         }
     }
 
-    fn __getnewargs__(
-        &self,
-        py: Python<'_>,
-    ) -> (Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>) {
+    fn __getnewargs__(&self, py: Python<'_>) -> MinimumParts {
         (
             self.point.clone_ref(py),
             self.misfit.clone_ref(py),
