@@ -21,17 +21,9 @@ type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 
-/// The rows of a recording that a loop is simulated over.
-#[derive(FromPyObject)]
-struct SimulatedRows<'py> {
-    time: Floats<'py>,
-    reference: Floats<'py>,
-    output: Floats<'py>,
-    past: Floats<'py>,
-    row: f64,
-    size: f64,
-    bound: f64,
-}
+/// Time stamps, reference, output and commands before the window; time between two rows, size of the
+/// excitation, and bound of the misfit.
+type SimulatedRows<'py> = ([Floats<'py>; 4], [f64; 3]);
 
 /// Misfit of a simulated loop.
 #[pyclass(frozen, module = "deadtime._deadtime")]
@@ -53,6 +45,7 @@ impl LoopMisfit {
         polynomials: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let control = control.core().clone();
+        let ([time, reference, output, past], [row, size, bound]) = rows;
         let mut numbers = Vec::new();
         for name in &names {
             numbers.push(match name.as_str() {
@@ -64,15 +57,15 @@ impl LoopMisfit {
         Ok(Self {
             inner: ClosedLoop {
                 control,
-                time: owned(&rows.time)?,
-                reference: owned(&rows.reference)?,
-                output: owned(&rows.output)?,
-                past: owned(&rows.past)?,
+                time: owned(&time)?,
+                reference: owned(&reference)?,
+                output: owned(&output)?,
+                past: owned(&past)?,
                 numbers,
                 start,
-                row: rows.row,
-                size: rows.size,
-                bound: rows.bound,
+                row,
+                size,
+                bound,
                 is_smooth,
             },
             polynomials,
@@ -274,6 +267,9 @@ impl LeastSquaresMinimum {
     }
 }
 
+/// Point, misfit and derivatives.
+type MinimumParts = (Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>);
+
 /// Columns as the table of numpy.
 fn table(py: Python<'_>, columns: Vec<Vec<f64>>, rows: usize) -> PyResult<Matrix<'_>> {
     let count = columns.len();
@@ -395,6 +391,12 @@ impl LeastSquares {
         Ok(made)
     }
 
+    /// The tightest bounds of the common parameters, then those of each recording.
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<(Vector<'py>, Vector<'py>)> {
+        let (low, high) = self.with(py, |joint, _| Ok(joint.bounds()))?;
+        Ok((low.into_pyarray(py), high.into_pyarray(py)))
+    }
+
     /// Weighted residuals.
     fn misfit<'py>(&self, py: Python<'py>, point: Floats<'_>) -> PyResult<Vector<'py>> {
         let point = in_order(&point)?;
@@ -514,10 +516,7 @@ impl LeastSquaresMinimum {
         }
     }
 
-    fn __getnewargs__(
-        &self,
-        py: Python<'_>,
-    ) -> (Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>) {
+    fn __getnewargs__(&self, py: Python<'_>) -> MinimumParts {
         (
             self.point.clone_ref(py),
             self.misfit.clone_ref(py),

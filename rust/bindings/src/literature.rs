@@ -141,7 +141,6 @@ pub(crate) fn cycle_delay_by_lag(lag: f64, half: f64) -> f64 {
 
 /// F, dF/dt and dF/dlag of an integrator under commands that hold, at times of any shape in C order.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple of arrays for Python")]
 pub(crate) fn integrator_path<'py>(
     py: Python<'py>,
     time: Floats<'_>,

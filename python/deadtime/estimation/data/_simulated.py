@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -39,18 +38,6 @@ SHORTEST_OF_WINDOW, SHORTEST_OF_SAMPLE = 1.0 / 2000.0, 1.0 / 4.0
 
 #: Bound of the misfit of simulations that diverge, in units of the excitation.
 LARGEST_MISFIT = 1e3
-
-
-class SimulatedRows(NamedTuple):
-    """A window of a recording, with the time between its rows and the bound of the misfit."""
-
-    time: Array
-    reference: Array
-    output: Array
-    past: Array
-    row: float
-    size: float
-    bound: float
 
 
 def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]:
@@ -162,10 +149,8 @@ class SimulatedRecording:
         smooth = loop.controller._filter
         on_samples = smooth is not None and smooth.discretisation is not None
         given = loop.plant._given(loop.plant.parameters) is not None
-        rows = SimulatedRows(
-            window.time, window.reference, window.output, self._past,
-            window.sample_time, size, LARGEST_MISFIT * size,
-        )  # fmt: skip
+        arrays = window.time, window.reference, window.output, self._past
+        rows = arrays, (window.sample_time, size, LARGEST_MISFIT * size)
         return LoopMisfit(
             loop.kernel,
             rows,

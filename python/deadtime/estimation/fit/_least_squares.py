@@ -12,7 +12,7 @@ excitation.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
@@ -186,22 +186,15 @@ class JointModel(Fit):
         """Samples of each recording."""
         return tuple(part.length for part in self.parts)
 
-    def _joined(self, what: str, tightest: Callable[..., Any]) -> Array:
-        """The tightest of the common bounds, then those of each recording."""
-        count = len(self.names)
-        ends = [getattr(part, what) for part in self.parts]
-        common = tightest([end[:count] for end in ends], axis=0)
-        return np.concatenate([common, *(end[count:] for end in ends)])
-
-    @cached_property
+    @property
     def low(self) -> Array:
-        """Lower bounds."""
-        return self._joined("low", np.max)
+        """Lower bounds: the tightest of those that are common, then those of each recording."""
+        return self.problem.bounds()[0]
 
-    @cached_property
+    @property
     def high(self) -> Array:
         """Upper bounds."""
-        return self._joined("high", np.min)
+        return self.problem.bounds()[1]
 
     def starts(self) -> list[Array]:
         """That of the first recording, with what is the own of the others."""

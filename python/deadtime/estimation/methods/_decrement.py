@@ -92,7 +92,10 @@ class Decrement(OfOne):
             values,
             own,
             reading.start,
-            message=_message(extremes, names, pair),
+            message=(
+                f"{len(extremes)} extremes, damping ratio {pair[0] / math.hypot(*pair):.3f} at "
+                f"{pair[1]:.3f} rad/s{'' if 'gain' in names else ', with the given gain'}"
+            ),
             uncalibrated=(
                 "the decrement method assumes one decaying oscillation: noise alone makes the "
                 f"delay uncertain by {math.sqrt(own[0, 0]):.2g} s, but other modes in the first "
@@ -130,12 +133,4 @@ def _linear(extremes: list[Extreme], reading: StepReading, loop: ControlLoop) ->
     raise NotIdentifiableError(
         f"one extreme ({100 * extremes[0].height:.2g} % of the step) is above the noise, and "
         "a decrement takes two: raise Kp, record longer, or use method='overshoot'"
-    )
-
-
-def _message(extremes: list[Extreme], names: tuple[str, ...], pair: tuple[float, float]) -> str:
-    known = "" if "gain" in names else ", with the given gain"
-    return (
-        f"{len(extremes)} extremes, damping ratio {pair[0] / math.hypot(*pair):.3f} at "
-        f"{pair[1]:.3f} rad/s{known}"
     )

@@ -146,7 +146,12 @@ class Frequency(OfOne):
             residuals=residuals,
             verdict=verdict_if(reliable),
             message=_message(names, lines, source, reliable),
-            uncalibrated=_why_uncalibrated(loop),
+            uncalibrated=""
+            if loop.is_sampled
+            else (
+                "the frequency method takes the command as constant between samples, and that of "
+                "a continuous loop is not; use method='waveform' for an interval"
+            ),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
             profile=Profile(
                 cost=ProfileCost(lines, fit, known),
@@ -178,22 +183,19 @@ class _Lines(ModelOfOne):
         """The misfit of the kernel."""
         numbers = ("delay", "gain", "lag")
         places = [place_of(name, self.names) for name in numbers]
-        return self.made(([self.known[name] for name in numbers], places, self.row))
-
-    @property
-    def row(self) -> float:
-        """Time between two rows, s."""
-        return self.recording.sample_time
+        return self.made(
+            ([self.known[name] for name in numbers], places, self.recording.sample_time)
+        )
 
     def ends(self, label: str) -> Ends:
         """Bounds and starting values of one of the parameters."""
         if label == "gain":
             return Ends(-math.inf, math.inf, [self.known["gain"]])
-        return Ends(0.0, math.inf, [self.row])
+        return Ends(0.0, math.inf, [self.recording.sample_time])
 
     def fit(self) -> Minimum:
         """The parameters of least cost; a lag that does not reduce it is zero."""
-        row, lag = self.row, place_of("lag", self.names)
+        row, lag = self.recording.sample_time, place_of("lag", self.names)
         if "delay" not in self.names:
             found = self.problem.solve()
             return self.problem.without_vanishing(found, None, lag, 0.0)
@@ -265,15 +267,6 @@ def _residuals(data: Recording, response: HeldResponse, values: dict[str, float]
     path = response.at(data.time - values["delay"], values["lag"]).value
     residuals = data.output - values["gain"] * path
     return np.asarray(residuals - residuals.mean())
-
-
-def _why_uncalibrated(loop: ControlLoop) -> str:
-    if loop.is_sampled:
-        return ""
-    return (
-        "the frequency method takes the command as constant between samples, and that of a "
-        "continuous loop is not; use method='waveform' for an interval"
-    )
 
 
 def _message(names: tuple[str, ...], lines: _Lines, source: str, reliable: bool) -> str:

@@ -92,7 +92,10 @@ class Grid(OfOne):
         model = replace(model, least_lag=0.0)  # where it acts as a delay, a lag is none
         data, labels = model.recording, model.labels
         start, span = start_and_span(data)
-        grid = np.array(self.delays) if self.delays is not None else _delays(model.low[0], span)
+        points = np.geomspace(SHORTEST, LONGEST, POINTS) * span
+        grid = np.array([model.low[0], *points[points > model.low[0]]])
+        if self.delays is not None:
+            grid = np.array(self.delays)
         gain = loop.parameters.get("gain", 1.0)
         guesses = {"gain": gain, "lag": data.sample_time, "initial output": start}
         costs, minima, found = model.problem.scan(
@@ -142,12 +145,6 @@ class Grid(OfOne):
             residuals=residuals,
             crb=CramerRaoBound(labels, FlightNoise(noise), standard_errors(names, plain)),
         )
-
-
-def _delays(shortest: float, span: float) -> Array:
-    """Delays from the shortest on, spaced geometrically."""
-    points = np.geomspace(SHORTEST, LONGEST, POINTS) * span
-    return np.concatenate([[shortest], points[points > shortest]])
 
 
 def _checked(delays: ArrayLike) -> Array:

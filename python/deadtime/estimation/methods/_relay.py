@@ -137,8 +137,7 @@ def _relay(data: Recording, amplitude: float | None) -> tuple[Array, float | Non
     """Sign of the command at every sample, and its amplitude where it is known."""
     error = data.reference - data.output
     if data.command is None:
-        size = None if amplitude is None else positive("amplitude", amplitude)
-        return np.where(error >= 0.0, 1.0, -1.0), size
+        return np.where(error >= 0.0, 1.0, -1.0), amplitude
     size = float(np.median(np.abs(data.command)))
     at = np.abs(np.abs(data.command) - size) <= 0.01 * size
     if size == 0.0 or float(np.mean(at)) < AT_VALUES:

@@ -105,25 +105,21 @@ class Waveform(Method):
 
     def estimate(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         """Fit `free` to the windows of the runs."""
+        computed = Assumed(self.initial_output, computed=True)
         factors = set(runs[0].loop.plant.parameters) - set(VEHICLE_PARAMETERS)
         if self.noise == "loop" or (self.noise == "auto" and factors & set(free)):
-            return self._by_innovations(runs, free)
+            return estimate_from_commands(self.name, runs, free, computed)
         simulated = self._by_simulation(runs, free)
         if self.noise == "recording" or not set(free) <= set(VEHICLE_PARAMETERS):
             return simulated
         try:
-            innovations = self._by_innovations(runs, free)
+            innovations = estimate_from_commands(self.name, runs, free, computed)
         except NotIdentifiableError:  # the command cannot be computed, or does not determine `free`
             return simulated
         if simulated.verdict == "reliable" and innovations.verdict != "reliable":
             return simulated
         likelier = _unlikelihood(innovations) - _unlikelihood(simulated)
         return simulated if likelier > LIKELIHOOD_RATIO else innovations
-
-    def _by_innovations(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
-        return estimate_from_commands(
-            self.name, runs, free, Assumed(self.initial_output, computed=True)
-        )
 
     def _by_simulation(self, runs: Sequence[Run], free: Sequence[str]) -> DelayEstimate:
         names = checked_names(free, runs[0].loop, LOOP_PARAMETERS)

@@ -166,7 +166,7 @@ fn differentiation(order: usize) -> Vec<f64> {
     let x = |j: usize| libm::cos(std::f64::consts::PI * j as f64 / order as f64);
     let c = |j: usize| {
         let end = if j == 0 || j == order { 2.0 } else { 1.0 };
-        if j % 2 == 0 { end } else { -end }
+        if j.is_multiple_of(2) { end } else { -end }
     };
     let mut matrix = vec![0.0; n * n];
     for i in 0..n {

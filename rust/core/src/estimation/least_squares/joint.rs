@@ -63,6 +63,11 @@ impl<'a> Joint<'a> {
         }
     }
 
+    /// Bounds of all parameters.
+    pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        (self.low.clone(), self.high.clone())
+    }
+
     /// Number of parameters.
     pub fn count(&self) -> usize {
         self.low.len()

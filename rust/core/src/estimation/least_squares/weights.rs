@@ -19,7 +19,7 @@ pub fn by_scatter(joint: &mut Joint<'_>, first: &Minimum, task: &Task) -> Result
         let pieces = joint.pieces(&found.misfit).zip(&joint.weights);
         let mut scatter: Vec<f64> = pieces.map(size).collect();
         let most = scatter.iter().copied().fold(0.0, f64::max);
-        if !(most > 0.0) {
+        if most.is_nan() || most <= 0.0 {
             break;
         }
         for size in &mut scatter {

@@ -143,7 +143,7 @@ fn held_fit(response: &[f64], command: &[f64], late: usize) -> (f64, f64) {
     let (p, m, q) = (dot(&now, &now), dot(&now, &before), dot(&before, &before));
     let (a, b) = (dot(&now, response), dot(&before, response));
     let det = p * q - m * m;
-    let dependent = !(det > FITS.pivot * p * q);
+    let dependent = det.is_nan() || det <= FITS.pivot * p * q;
     let mut weights = [(a * q - b * m) / det, (b * p - a * m) / det];
     if dependent || weights[0] < 0.0 || weights[1] < 0.0 {
         let alone = |x: f64, power: f64| x.max(0.0) / if power > 0.0 { power } else { 1.0 };

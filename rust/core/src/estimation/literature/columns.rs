@@ -41,7 +41,7 @@ impl Columns {
             }
         }
         let rest = dot(&column, &column).sqrt();
-        if !(rest > self.dependent * size) {
+        if rest.is_nan() || rest <= self.dependent * size {
             return false;
         }
         column.iter_mut().for_each(|x| *x /= rest);

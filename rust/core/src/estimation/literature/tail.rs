@@ -75,7 +75,7 @@ pub fn tail_rate(time: &[f64], left: &[f64], guess: f64) -> Tail {
             (dh, dr) = (0.5 * dh, 0.5 * dr);
             halvings += 1;
         };
-        if !(cost(&next) <= cost(&misfit)) {
+        if cost(&next).is_nan() || cost(&next) > cost(&misfit) {
             break;
         }
         (height, rate, misfit) = (height + dh, rate + dr, next);

@@ -24,7 +24,7 @@ pub(super) fn zero(function: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -
             middle
         };
         let at_place = function(place);
-        if at_place == 0.0 || !(high - low > f64::EPSILON * (low.abs() + high.abs())) {
+        if at_place == 0.0 || high - low <= f64::EPSILON * (low.abs() + high.abs()) {
             return place;
         }
         // The tightest of the places that enclose the zero.
