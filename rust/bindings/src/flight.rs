@@ -14,6 +14,9 @@ use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
+/// Marks of rows, and numbers of rows.
+type Marks<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
+
 /// A plant as it is fitted: num/den of unit gain behind lags, and what of it is free.
 #[pyclass(frozen, module = "deadtime._deadtime")]
 pub(crate) struct FlightPlant {
@@ -166,11 +169,7 @@ impl FlightFit {
     }
 
     /// Which rows of a recording are used, and the slope of the response by which their times count.
-    fn rows<'py>(
-        &self,
-        py: Python<'py>,
-        run: usize,
-    ) -> PyResult<(Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>)> {
+    fn rows<'py>(&self, py: Python<'py>, run: usize) -> PyResult<Marks<'py>> {
         let Some(found) = self.core.runs.get(run) else {
             return converted(Err(deadtime::Error::argument(format!(
                 "recording {run} of {}: give the number of one of them, from zero",

@@ -67,12 +67,12 @@ impl Quantity {
     fn guess(self, near: &Point, before: &Point, value: f64) -> Point {
         let own = self.value(near);
         let share = (value - own) / (own - self.value(before));
-        if !(share.abs() <= BEYOND) || near.lags.len() != before.lags.len() {
+        if share.is_nan() || share.abs() > BEYOND || near.lags.len() != before.lags.len() {
             return near.clone();
         }
         let straight = |near: f64, before: f64| near + share * (near - before);
         let curved = |near: f64, before: f64| {
-            let moved = near * (near / before).powf(share);
+            let moved = near * libm::pow(near / before, share);
             if moved.is_finite() && near != 0.0 {
                 moved
             } else {

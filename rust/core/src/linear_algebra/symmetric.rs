@@ -45,10 +45,9 @@ impl Symmetric {
                         a[p * n + k] = cos * pk - sin * qk;
                         a[q * n + k] = sin * pk + cos * qk;
                     }
-                    for k in 0..n {
-                        let (vp, vq) = (vectors[p][k], vectors[q][k]);
-                        vectors[p][k] = cos * vp - sin * vq;
-                        vectors[q][k] = sin * vp + cos * vq;
+                    let (below, above) = vectors.split_at_mut(q);
+                    for (p, q) in below[p].iter_mut().zip(&mut above[0]) {
+                        (*p, *q) = (cos * *p - sin * *q, sin * *p + cos * *q);
                     }
                 }
             }

@@ -78,9 +78,12 @@ pub(super) fn unseen_air(
         .collect())
 }
 
+/// Where a number of a noise is.
+type Place = fn(&mut Noise) -> &mut f64;
+
 /// The numbers of a noise that are not zero: how to move each in its logarithm.
-fn moves_of(noise: &Noise) -> Vec<fn(&mut Noise) -> &mut f64> {
-    let all: [(bool, fn(&mut Noise) -> &mut f64); 6] = [
+fn moves_of(noise: &Noise) -> Vec<Place> {
+    let all: [(bool, Place); 6] = [
         (noise.air > 0.0, |noise| &mut noise.air_time),
         (noise.air > 0.0, |noise| &mut noise.air),
         (noise.sensor > 0.0, |noise| &mut noise.sensor_time),

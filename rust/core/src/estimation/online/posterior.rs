@@ -100,7 +100,7 @@ impl<'a> Density<'a> {
             .zip(widths(delays))
             .map(|(x, width)| {
                 let i = nearest(*x);
-                if !(self.logs[i] >= top - NOTHING) {
+                if self.logs[i] < top - NOTHING || self.logs[i].is_nan() {
                     return 0.0;
                 }
                 let log = self.at(i, *x, top - 2.0 * NOTHING);
