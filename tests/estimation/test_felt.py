@@ -68,7 +68,8 @@ def test_gain_and_angle_are_those_of_the_plant(fit):
 
 def test_both_ways_to_estimate_have_the_same_names(fit):
     """One protocol for an estimate with a loop and one without."""
-    found = dtm.estimate_delay(flight(1), plant="integrator, lag", controller=TRUTH.controller)
+    known = {"plant": "integrator, lag", "controller": TRUTH.controller, "between": "held"}
+    found = dtm.estimate_delay(flight(1), **known)
     for one in (fit, found):
         for name in FELT:
             low, high = one.ci(0.9, name)
