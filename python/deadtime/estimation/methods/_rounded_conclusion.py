@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from deadtime._base.arrays import Indices
+from deadtime._base.arrays import Array, Indices, Mask
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation.data._checks import standard_errors
 from deadtime.estimation.fit._least_squares import JointModel, Model
@@ -52,23 +52,11 @@ def read_as_intervals(
     fit = profile.fit
     parts = tuple(one.started(fit, {}) for one in models)
     model: Model = parts[0] if len(parts) == 1 else JointModel(parts, (1.0,) * len(parts))
-    used = []
-    for rows, own, places in zip(first, fit.runs, repeated, strict=True):
-        mask = ~(rows.used & ~own.used)
-        mask[places] = False
-        used.append(mask)
-    steps = np.array([rows.rounding for rows in fit.runs])
     start = model.starts()[0]
-    jacobian = model.jacobian(start)
-    inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-    likelihood = RoundedLikelihood(
-        model,
-        np.concatenate([one.recording.output for one in parts]),
-        steps,
-        np.repeat(np.arange(steps.size), [len(one.recording) for one in parts]),
-        np.concatenate(used),
-        float(steps.max()) / math.sqrt(12.0) * np.sqrt(np.diag(inverse)),
-    )
+    outputs = [one.recording.output for one in parts]
+    steps = np.array([rows.rounding for rows in fit.runs])
+    used = np.concatenate(_read(first, fit.runs, repeated))
+    likelihood = _likelihood_of(model, start, outputs, steps, used)
     peak = likelihood.likeliest(start)
     cov = likelihood.covariance(peak)
     names, count = estimate.free, len(estimate.free)
@@ -101,4 +89,32 @@ def read_as_intervals(
             widening=unseen,
             preferred="rows are rounded",
         ),
+    )
+
+
+def _read(
+    first: Sequence[FlightRows], fitted: Sequence[FlightRows], repeated: Sequence[Indices]
+) -> list[Mask]:
+    """Rows that are read as intervals: all but outliers and those that repeat the one before."""
+    masks = []
+    for rows, own, places in zip(first, fitted, repeated, strict=True):
+        mask = ~(rows.used & ~own.used)
+        mask[places] = False
+        masks.append(mask)
+    return masks
+
+
+def _likelihood_of(
+    model: Model, start: Array, outputs: Sequence[Array], steps: Array, used: Mask
+) -> RoundedLikelihood:
+    """The likelihood of the readings, with the scale of each number from least squares."""
+    jacobian = model.jacobian(start)
+    inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
+    return RoundedLikelihood(
+        model,
+        np.concatenate(outputs),
+        steps,
+        np.repeat(np.arange(steps.size), [one.size for one in outputs]),
+        used,
+        float(steps.max()) / math.sqrt(12.0) * np.sqrt(np.diag(inverse)),
     )

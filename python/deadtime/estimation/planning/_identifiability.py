@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -334,11 +334,7 @@ def identifiability(
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *loop.plant.parameters]))
     names = checked_names(free, loop, known)
     noise = _noise_with_covariance(noise)
-    if initial_output is not None and finite("initial_output", initial_output) != 0.0:
-        raise ValueError(
-            f"initial_output={initial_output}: an experiment starts at rest at zero; give 0.0 "
-            "where that is known, None where the start is fitted"
-        )
+    _checked_start(initial_output)
     count = whole_number("runs", runs, least=0)
     offset, trim = initial_output is None, trim_is_free(noise)
     run_loop = experiment.loop_in_run(loop)
@@ -370,15 +366,9 @@ def identifiability(
         whitened = partial(closed.whitened, run_loop, noise=noise)
         return bound_of([slopes], whitened, names, noise, loop.plant)
 
-    found: list[PlannedBound | None] = []
-    remarks: list[str] = []
-    for label, bound in (("command logged", command_logged), ("reference only", reference_only)):
-        try:
-            found.append(bound())
-        except (NotIdentifiableError, ValueError) as refusal:
-            found.append(None)
-            remarks.append(f"{label}: {refusal}")
-    if found[0] is None and (found[1] is None or run_loop.is_sampled):
+    cases = {"command logged": command_logged, "reference only": reference_only}
+    (logged, alone), remarks = _told(cases)
+    if logged is None and (alone is None or run_loop.is_sampled):
         raise NotIdentifiableError("; ".join(remarks))
     return Identifiability(
         loop,
@@ -387,10 +377,34 @@ def identifiability(
         noise,
         initial_output,
         recording,
-        found[0],
-        found[1],
+        logged,
+        alone,
         tuple(remarks),
     )
+
+
+def _told(
+    cases: Mapping[str, Callable[[], PlannedBound]],
+) -> tuple[list[PlannedBound | None], list[str]]:
+    """The bound of each case, None where it determines nothing, and why not."""
+    found: list[PlannedBound | None] = []
+    remarks = []
+    for label, bound in cases.items():
+        try:
+            found.append(bound())
+        except (NotIdentifiableError, ValueError) as refusal:
+            found.append(None)
+            remarks.append(f"{label}: {refusal}")
+    return found, remarks
+
+
+def _checked_start(initial_output: float | None) -> None:
+    """Refuse a known output at the start that is not that of an experiment."""
+    if initial_output is not None and finite("initial_output", initial_output) != 0.0:
+        raise ValueError(
+            f"initial_output={initial_output}: an experiment starts at rest at zero; give 0.0 "
+            "where that is known, None where the start is fitted"
+        )
 
 
 def _noise_with_covariance(noise: float | FlightNoise) -> FlightNoise:
