@@ -23,8 +23,8 @@ MODULE, ORIGIN = PLACE / "kernels.wasm.gz", PLACE / "kernels.json"
 SOURCES = ("rust/core/src", "rust/web/src")
 FILES = ("Cargo.toml", "Cargo.lock", "rust/core/Cargo.toml", "rust/web/Cargo.toml")
 
-#: Largest size of the compressed module, in bytes. The page fits and judges a recording as the package
-#: does, which takes a sixth of it.
+#: Largest size of the compressed module, in bytes. The page fits and judges a recording as the
+#: package does, which takes a sixth of it.
 MOST = 480_000
 
 
