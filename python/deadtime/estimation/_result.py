@@ -1,4 +1,4 @@
-"""Results of an estimation, with their uncertainty."""
+"""Results of an estimation, with their uncertainty. Half of the file is documentation."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Because the command is known, a limit and noise that the controller acts on have no effect, and
 least squares is maximum likelihood for white noise: the standard error is the Cramér-Rao bound. The
-model is in `_commanded_model`.
+model is in `_commanded_model`. The stages of one estimate are read one after the other: one file.
 """
 
 from __future__ import annotations
