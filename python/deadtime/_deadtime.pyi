@@ -761,13 +761,14 @@ class FamilyFit:
     ) -> dict[str, tuple[_Reals, _Reals, _Reals]]: ...
 
 def fit_family(
-    records: Sequence[tuple[_Reals, _Reals, _Reals, int]],
+    records: Sequence[tuple[_Reals, _Reals, _Reals, int, _Reals | None, float]],
     *,
     kind: str = "held",
     controller: bool = False,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
     plant: str | None = None,
+    integrating: bool | None = None,
     noise: str | None = None,
     level: float = 0.95,
     omega: Sequence[float] | None = None,

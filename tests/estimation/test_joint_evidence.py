@@ -66,7 +66,7 @@ def test_likelihoods_of_independent_records_add():
     records = [made.slow_window(seed) for seed in (0, 1)]
     options = {"plant": "lag", "noise": "white", "largest_delay": 1.0}
     alone = [fit(record, **options).candidates[0] for record in records]
-    rows = [(one.time, one.command, one.output, 0) for one in records]
+    rows = [(one.time, one.command, one.output, 0, None, 0.0) for one in records]
     both = _native.fit_family(rows, **options).candidates[0]
     assert both.deviance > sum(one.deviance for one in alone) - 1e-6
     assert both.deviance < sum(one.deviance for one in alone) + 40.0

@@ -23,7 +23,7 @@ CLEAR = 10.0
 
 
 def fit_rows(time, command, output, earlier=0, **options):
-    return _native.fit_family([(time, command, output, earlier)], **options)
+    return _native.fit_family([(time, command, output, earlier, None, 0.0)], **options)
 
 
 def fit(record, **options):

@@ -84,7 +84,9 @@ def estimate_delay(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
+    integrates: bool | None = None,
     between: Between = "undecided",
+    hold: float | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate: ...
 
@@ -102,7 +104,9 @@ def estimate_delay(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
+    integrates: bool | None = None,
     between: Between = "undecided",
+    hold: float | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> DelayEstimate | PlantEstimate:
     """Estimate the delay of a plant, or that of a closed loop, from a recording.
@@ -174,9 +178,15 @@ def estimate_delay(
         recording says so, or the state is unknown.
     largest_delay : float, optional
         Without `loop`: largest delay that is tried, s; by default 0.3 of the recording.
+    integrates : bool, optional
+        Without `loop`: whether the plant integrates, or comes to rest; by default the recording
+        decides.
     between : {"undecided", "held", "straight", "samples"}
         Without `loop`: how the command moves between two rows. By default the recording
         decides; where it does not, intervals hold for a held and a straight command.
+    hold : float, optional
+        Without `loop`: for how long the controller holds each command, s, where it is logged less
+        often than it is computed. Straight commands are half of that later.
     progress : callable, optional
         Without `loop`: called with a number that grows while plants are compared.
 
@@ -258,6 +268,8 @@ def estimate_delay(
         "closed_loop": closed_loop,
         "at_rest": at_rest,
         "largest_delay": largest_delay,
+        "integrates": integrates,
+        "hold": hold,
     }
     if loop is None:
         if method != "auto" or free is not FREE:

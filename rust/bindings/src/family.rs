@@ -283,13 +283,21 @@ fn unknown<T>(what: &str, name: &str, found: Option<T>) -> PyResult<T> {
     found.ok_or_else(|| PyValueError::new_err(format!("{what} {name:?} is not known")))
 }
 
-/// A record: times, commands, outputs, and how many first rows are used as input only.
-type Columns<'py> = (Floats<'py>, Floats<'py>, Floats<'py>, usize);
+/// A record: times, commands, outputs, how many first rows are used as input only, times of the commands
+/// where they are not those of the rows, and for how long the controller holds each, s.
+type Columns<'py> = (
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    usize,
+    Option<Floats<'py>>,
+    f64,
+);
 
 /// Fit the family of plants to records of one plant.
 #[pyfunction]
 #[pyo3(signature = (records, *, kind="held", controller=false, at_rest=None, largest_delay=None,
-    plant=None, noise=None, level=0.95, omega=None, progress=None))]
+    plant=None, integrating=None, noise=None, level=0.95, omega=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "given by name")]
 pub(crate) fn fit_family(
     py: Python<'_>,
@@ -299,17 +307,20 @@ pub(crate) fn fit_family(
     at_rest: Option<bool>,
     largest_delay: Option<f64>,
     plant: Option<&str>,
+    integrating: Option<bool>,
     noise: Option<&str>,
     level: f64,
     omega: Option<Vec<f64>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<FamilyFit> {
-    let record = |(time, command, output, earlier): &Columns<'_>| {
+    let record = |(time, command, output, earlier, sent, hold): &Columns<'_>| {
         PyResult::Ok(Record {
             time: owned(time)?,
             command: owned(command)?,
             output: owned(output)?,
             earlier: *earlier,
+            sent: sent.as_ref().map(owned).transpose()?,
+            hold: *hold,
         })
     };
     let records: Vec<Record> = records.iter().map(record).collect::<PyResult<_>>()?;
@@ -321,6 +332,7 @@ pub(crate) fn fit_family(
         at_rest,
         largest_delay,
         class: class.transpose()?,
+        integrating,
         noise: noise.transpose()?,
         level,
     };

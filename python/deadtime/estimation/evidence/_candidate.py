@@ -51,6 +51,14 @@ class PlantCandidate(ReadOnlyArrays):
         """Its real time constants, s, the largest first."""
         return tuple(value for name, value in self.parameters.items() if name.startswith("lag_"))
 
+    @property
+    def lag_sum(self) -> float:
+        """Sum of its time constants, those of a pair of poles too, s."""
+        numbers = self.parameters
+        if "pole_frequency" in numbers:
+            return 2.0 * numbers["pole_damping"] / numbers["pole_frequency"]
+        return sum(self.lags)
+
     def in_words(self) -> str:
         """What the plant is, in words: "a process that comes to rest, time constant 40 s"."""
         numbers = self.parameters

@@ -28,14 +28,23 @@ def estimate_by_evidence(
     closed_loop: bool | None = None,
     at_rest: bool | None = None,
     largest_delay: float | None = None,
+    integrates: bool | None = None,
     between: Between = "undecided",
+    hold: float | None = None,
     plant: str | None = None,
     controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate:
     """The plant that recordings show; what is not given is taken from them."""
-    known = {"at_rest": at_rest, "largest_delay": largest_delay, "between": between, "plant": plant}
+    known = {
+        "at_rest": at_rest,
+        "largest_delay": largest_delay,
+        "integrates": integrates,
+        "between": between,
+        "hold": hold or 0.0,
+        "plant": plant,
+    }
     question = questions_of(recording, window, controller, limit, closed_loop, known)
     found = question.answer(progress=progress)
     if plant is None:

@@ -118,6 +118,12 @@ class FoundPlant(ReadOnlyArrays):
         return self.best.noise_std if self.candidates else math.nan
 
     @property
+    def delay_plus_lag(self) -> float:
+        """Dead time and lags less the zero: the equivalent delay as omega goes to zero, s."""
+        best = self.best
+        return best.delay + best.lag_sum - self.parameters.get("zero", 0.0)
+
+    @property
     def delay_at_crossover(self) -> float:
         """Equivalent delay at `crossover`, s."""
         return self._at_crossover[2]
@@ -141,6 +147,7 @@ class FoundPlant(ReadOnlyArrays):
             Between 0 and 1.
         name : str
             One of `intervals`: ``"delay"``, ``"gain"``, ``"lag"`` (the largest time constant),
+            ``"delay+lag"`` (`delay_plus_lag`),
             ``"largest_gain"``, ``"crossover"``, ``"gain_at_crossover"``, ``"phase_at_crossover"``
             and ``"delay_at_crossover"``, as far as the plant has them.
 
@@ -197,6 +204,8 @@ class FoundPlant(ReadOnlyArrays):
         name : str
             One of `intervals`.
         """
+        if name == "delay+lag":
+            return self.delay_plus_lag
         if name == "lag":
             return max(self.best.lags, default=math.nan)
         return float(self.parameters[name] if name in self.parameters else getattr(self, name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
@@ -62,6 +63,10 @@ class Question(ReadOnlyArrays):
         Largest size of the command of the controller.
     shift : int
         Rows by which the command was moved to those of its controller: above zero to later ones.
+    integrates : bool or None
+        Only kinds of plant that integrate, or only those that come to rest; None: all.
+    hold : float
+        For how long the controller holds each command, s; 0 where that is not known.
     others : tuple of Question
         Further recordings of the same plant; only what is of one recording counts in them.
     """
@@ -77,6 +82,8 @@ class Question(ReadOnlyArrays):
     window: OpenRange | None = None
     limit: float | None = None
     shift: int = 0
+    integrates: bool | None = None
+    hold: float = 0.0
     others: tuple[Question, ...] = ()
 
     @property
@@ -91,10 +98,7 @@ class Question(ReadOnlyArrays):
         progress: Callable[[int], object] | None = None,
     ) -> native.FamilyFit:
         """Ask the kernel; every interval of the answer has this level."""
-        records = [
-            (one.recording.time, one.command, one.recording.output, one.earlier)
-            for one in self.each
-        ]
+        records = [one.record for one in self.each]
         return native.fit_family(
             records,
             kind=self.between,
@@ -102,6 +106,7 @@ class Question(ReadOnlyArrays):
             at_rest=self.at_rest,
             largest_delay=self.largest_delay,
             plant=self.plant,
+            integrating=self.integrates,
             level=level,
             omega=tuple(omega),
             progress=progress,
@@ -117,8 +122,10 @@ class Question(ReadOnlyArrays):
         for name in ("window", "controller"):
             own = [getattr(one, name) for one in self.each]
             found[name] = own[0] if own.count(own[0]) == len(own) else own
-        for name in ("limit", "at_rest", "largest_delay", "plant"):
+        for name in ("limit", "at_rest", "largest_delay", "integrates", "plant"):
             found[name] = getattr(self, name)
+        if self.hold:
+            found["hold"] = self.hold
         if self.between != "undecided":
             found["between"] = self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):
@@ -133,6 +140,15 @@ class Question(ReadOnlyArrays):
         window = (float(time[first]), float(time[last]))
         recording = self.recording.window(None, window[1])
         return replace(self, recording=recording, earlier=first, window=window)
+
+    @property
+    def record(self) -> tuple[Array, Array, Array, int, Array | None, float]:
+        """The recording as the kernel takes it."""
+        own = self.recording
+        sent, command = (None, self.command) if own.sent is None else own.sent
+        if self.hold and self.between == "straight":
+            sent = (own.time if sent is None else sent) + 0.5 * self.hold
+        return own.time, command, own.output, self.earlier, sent, self.hold
 
     @property
     def command(self) -> Array:
@@ -196,12 +212,9 @@ def question_of(
             "the recording has no command, and without a loop nothing else says what moved the "
             "plant: name the column of the command, or give the loop"
         )
-    if recording.sent is not None:
-        raise RecordingError(
-            "the commands of this recording have times of their own, which is not possible without "
-            "a loop: give the loop, or the command of each row"
-        )
     plant, largest_delay = known.get("plant"), known.get("largest_delay")
+    if (hold := known.get("hold")) and not 0.0 < hold < math.inf:
+        raise ValueError(f"hold={hold!r} s is not a time above zero")
     if plant is not None and plant not in PLANTS:
         raise ValueError(f"plant={plant!r} is not one of {', '.join(map(repr, PLANTS))}")
     if largest_delay is not None:

@@ -1,5 +1,6 @@
 //! A minimum with the errors of its numbers and how many of them the input tells.
 
+use super::between::open_covariance;
 use super::class::{Class, Numbers};
 use super::dispersion::dispersion;
 use super::loop_view::Seen;
@@ -10,7 +11,7 @@ use super::tolerances::EVIDENCE;
 use crate::estimation::statistics::{chi_squared_beyond, student_reach};
 use crate::linear_algebra::cholesky::inverse_of_positive;
 use crate::linear_algebra::eigenvalues::eigenvalues;
-use crate::linear_algebra::vectors::dot;
+use crate::linear_algebra::vectors::{add_multiple, dot};
 
 /// The spread of a number about which the record says nothing, in its scale: errors end there.
 const UNKNOWN: f64 = 10.0;
@@ -87,7 +88,9 @@ impl Candidate {
             .map(|at| seen.scale(at, rows.row))
             .collect();
         let information = products(&sensitivities, &scales, variance);
-        let inner = covariance(&information, &scales, factor);
+        let mut inner = covariance(&information, &scales, factor);
+        let open = open_covariance(model, point, &sensitivities, &inner, factor * variance);
+        add_multiple(&mut inner, 1.0, &open);
         let scatter =
             |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
         // Of one record the weight is 1, of several their sum of squares is that of white noise of size 1.

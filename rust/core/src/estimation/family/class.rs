@@ -125,6 +125,11 @@ impl Numbers {
         }
     }
 
+    /// The equivalent delay as ω → 0: delay and lags, less the zero.
+    pub(super) fn low_delay(&self) -> f64 {
+        self.delay + self.sum - self.zero
+    }
+
     /// Are the poles a complex pair?
     pub fn are_complex(&self) -> bool {
         self.sum * self.sum < 4.0 * self.product

@@ -22,8 +22,8 @@ const PARTS: usize = 16;
 fn power(part: &Part, omega: f64) -> f64 {
     let mean = part.command.iter().sum::<f64>() / part.command.len() as f64;
     let (mut real, mut imaginary) = (0.0, 0.0);
-    for (t, u) in part.time.iter().zip(&part.command) {
-        let (sine, cosine) = sin_cos(omega * (t - part.time[0]));
+    for (t, u) in part.sent.iter().zip(&part.command) {
+        let (sine, cosine) = sin_cos(omega * (t - part.sent[0]));
         real += (u - mean) * cosine;
         imaginary += (u - mean) * sine;
     }
@@ -101,8 +101,8 @@ pub(super) fn is_one_sine(rows: &Rows, excited: &[f64]) -> bool {
 fn left_beside(rows: &Rows, omega: f64) -> f64 {
     let (mut before, mut after) = (0.0, 0.0);
     for part in &rows.parts {
-        let wave = |t: &f64| sin_cos(omega * (t - part.time[0]));
-        let waves: Vec<(f64, f64)> = part.time.iter().map(wave).collect();
+        let wave = |t: &f64| sin_cos(omega * (t - part.sent[0]));
+        let waves: Vec<(f64, f64)> = part.sent.iter().map(wave).collect();
         let ones = vec![1.0; waves.len()];
         let constant = Projection::new(vec![ones.clone()]);
         let sine = waves.iter().map(|wave| wave.0).collect();

@@ -48,6 +48,8 @@ pub struct Question {
     pub largest_delay: Option<f64>,
     /// Only this class.
     pub class: Option<Class>,
+    /// Only classes that integrate, or only those that come to rest.
+    pub integrating: Option<bool>,
     /// Only this noise.
     pub noise: Option<Noise>,
     /// Level of the intervals.
@@ -212,7 +214,8 @@ fn moved(
         return Ok(None);
     };
     let row = records.iter().map(Record::row).fold(0.0, f64::max);
-    if question.in_loop || best.numbers.delay > EARLY * row {
+    let own_times = records.iter().any(|record| record.sent.is_some());
+    if question.in_loop || own_times || best.numbers.delay > EARLY * row {
         return Ok(None);
     }
     let mut earlier = records.to_vec();
@@ -251,7 +254,12 @@ fn leave_out_what_adds_nothing(minima: &mut Vec<Candidate>) {
 
 /// The classes and noises that are asked for.
 fn asked(question: &Question) -> (Vec<Class>, Vec<Noise>) {
-    let may_be = |class: &Class| !question.in_loop || class.integrating || class.order > 0;
+    let may_be = |class: &Class| {
+        let is_kind = question
+            .integrating
+            .is_none_or(|kind| kind == class.integrating);
+        is_kind && (!question.in_loop || class.integrating || class.order > 0)
+    };
     let classes = match question.class {
         Some(class) => vec![class],
         None => Class::all().filter(may_be).collect(),

@@ -196,6 +196,8 @@ pub(super) fn hull(all: &[Turning<'_>], largest_delay: f64) -> Vec<Named> {
     let alike = same().filter(|one| one.candidate.gain * best.candidate.gain > 0.0);
     let gains = alike.map(|one| one.candidate.interval(|seen| seen.gain));
     out.push(Named::new("gain", gains.collect()));
+    let times = same().map(|one| one.candidate.interval(|seen| seen.numbers.low_delay()));
+    out.push(Named::new("delay+lag", times.collect()));
     if let Some(largest) = best.candidate.numbers.lags().first() {
         let lag = |seen: &Seen| {
             seen.numbers

@@ -10,6 +10,7 @@
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
+mod between;
 mod candidate;
 mod class;
 mod dispersion;

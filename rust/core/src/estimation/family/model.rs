@@ -221,6 +221,18 @@ impl Model<'_> {
         self.whiteners(&x[self.plant_numbers()..])
     }
 
+    /// The whitener of one record, and where its rows stand among those of all.
+    pub(super) fn whitener_of(
+        &self,
+        part: usize,
+        point: &Point,
+    ) -> (std::ops::Range<usize>, Whitener<'_>) {
+        let noise = &point.x[self.plant_numbers()..];
+        let (gaps, weight) = (&self.rows.parts[part].gaps, self.rows.weights[part]);
+        let own = Whitener::new(gaps, self.noise, noise, weight);
+        (self.rows.places()[part].clone(), own)
+    }
+
     /// The sum of squares of residuals under other numbers of the noise.
     pub(super) fn squares_of(&self, residual: &[f64], noise: &[f64]) -> f64 {
         let whitened = self.whiteners(noise).whiten(residual);

@@ -172,7 +172,31 @@ impl State<'_> {
 
 /// The response of a plant of unit gain that is at rest until the first command arrives.
 pub(super) fn response(rows: &Part, class: Class, numbers: &Numbers) -> Response {
-    let (time, command) = (&rows.time, &rows.command);
+    // A signal behind a delay alone is taken as straight: a held one would jump between rows.
+    let straight = rows.straight || class.order == 0 && !class.integrating;
+    response_to(&rows.sent, &rows.command, straight, rows, class, numbers)
+}
+
+/// The response at the rows to a command of unit area over an interval, zero before and after it.
+pub(super) fn pulse(
+    rows: &Part,
+    interval: (f64, f64),
+    class: Class,
+    numbers: &Numbers,
+) -> Vec<f64> {
+    let (start, end) = interval;
+    let command = [1.0 / (end - start), 0.0];
+    response_to(&[start, end], &command, false, rows, class, numbers).value
+}
+
+fn response_to(
+    sent: &[f64],
+    command: &[f64],
+    straight: bool,
+    rows: &Part,
+    class: Class,
+    numbers: &Numbers,
+) -> Response {
     let count = rows.used.len();
     let mut out = Response {
         value: Vec::with_capacity(count),
@@ -189,28 +213,26 @@ pub(super) fn response(rows: &Part, class: Class, numbers: &Numbers) -> Response
         command: 0.0,
         rate: 0.0,
     };
-    // A signal behind a delay alone is taken as straight: a held one would jump between rows.
-    let straight = rows.straight || class.order == 0 && !class.integrating;
-    let mut now = time[0] + numbers.delay;
+    let mut now = sent[0] + numbers.delay;
     let mut next = 0;
     for &row in &rows.used {
         // Commands that arrive before this row.
-        while next < time.len() && time[next] + numbers.delay < time[row] {
-            let arrival = time[next] + numbers.delay;
+        while next < sent.len() && sent[next] + numbers.delay < rows.time[row] {
+            let arrival = sent[next] + numbers.delay;
             state.advance(arrival - now);
             now = arrival;
             state.command = command[next];
-            state.rate = match time.get(next + 1) {
+            state.rate = match sent.get(next + 1) {
                 Some(after) if straight => {
-                    (command[next + 1] - command[next]) / (after - time[next])
+                    (command[next + 1] - command[next]) / (after - sent[next])
                 }
                 _ => 0.0,
             };
             next += 1;
         }
         if next > 0 {
-            state.advance(time[row] - now);
-            now = time[row];
+            state.advance(rows.time[row] - now);
+            now = rows.time[row];
         }
         state.record(&mut out);
     }

@@ -12,8 +12,13 @@ const JUMPS: f64 = 0.1;
 pub struct Record {
     /// Times of the rows, s.
     pub time: Vec<f64>,
-    /// The command at each row.
+    /// The command at each row, or of each time in `sent`.
     pub command: Vec<f64>,
+    /// Times of the commands, s, where they are not those of the rows.
+    pub sent: Option<Vec<f64>>,
+    /// For how long the controller holds each command, s; 0 where that is not known. A straight
+    /// command is known for so long of each row.
+    pub hold: f64,
     /// The output, NaN where it is missing.
     pub output: Vec<f64>,
     /// Rows at the start that are used as input only.
@@ -28,24 +33,21 @@ impl Record {
     /// finite, an infinite output, or too few rows.
     pub fn checked(self) -> Result<Self, Error> {
         let count = self.time.len();
+        let sent = self.sent();
         refuse_if!(
-            self.command.len() != count || self.output.len() != count,
+            self.command.len() != sent.len() || self.output.len() != count || sent.is_empty(),
             "{count} times, {} commands and {} outputs: give one of each for every row",
             self.command.len(),
             self.output.len()
         );
-        let increases = |at: usize| self.time[at] > self.time[at - 1];
-        if let Some(at) = (1..count).find(|at| !increases(*at)) {
-            refuse!(
-                "time {} s in row {at} after {} s: times must increase",
-                self.time[at],
-                self.time[at - 1]
-            );
-        }
-        if let Some(at) = (0..count).find(|at| !self.time[*at].is_finite()) {
-            refuse!("time {} in row {at}: times must be finite", self.time[at]);
-        }
-        if let Some(at) = (0..count).find(|at| !self.command[*at].is_finite()) {
+        check_times(&self.time)?;
+        check_times(sent)?;
+        refuse_if!(
+            !(self.hold >= 0.0 && self.hold.is_finite()),
+            "commands hold for {} s: give 0 or more",
+            self.hold
+        );
+        if let Some(at) = (0..sent.len()).find(|at| !self.command[*at].is_finite()) {
             refuse!(
                 "command {} in row {at}: commands must be finite",
                 self.command[at]
@@ -63,6 +65,11 @@ impl Record {
             self.earlier
         );
         Ok(self)
+    }
+
+    /// Times of the commands, s.
+    pub(super) fn sent(&self) -> &[f64] {
+        self.sent.as_deref().unwrap_or(&self.time)
     }
 
     /// Time from the first to the last row, s.
@@ -94,7 +101,9 @@ impl Record {
 
     /// Does the record begin with rows in which neither the command nor the output moves?
     pub(super) fn begins_at_rest(&self) -> bool {
-        let moves = self.command.iter().position(|u| *u != self.command[0]);
+        let sent = self.sent();
+        let change = self.command.iter().position(|u| *u != self.command[0]);
+        let moves = change.map(|at| self.time.partition_point(|t| *t < sent[at]));
         let known = |rows: std::ops::Range<usize>| {
             let pairs = rows.map(|at| (self.time[at] - self.time[0], self.output[at]));
             pairs.filter(|(_, y)| y.is_finite()).collect::<Vec<_>>()
@@ -113,6 +122,20 @@ impl Record {
         slope.abs() <= REST.slope * error + f64::MIN_POSITIVE
             && (slope.abs() + error) * length <= REST.share * (high - low)
     }
+}
+
+fn check_times(time: &[f64]) -> Result<(), Error> {
+    if let Some(at) = (1..time.len()).find(|at| time[*at] <= time[at - 1]) {
+        refuse!(
+            "time {} s in row {at} after {} s: times must increase",
+            time[at],
+            time[at - 1]
+        );
+    }
+    if let Some(at) = (0..time.len()).find(|at| !time[*at].is_finite()) {
+        refuse!("time {} in row {at}: times must be finite", time[at]);
+    }
+    Ok(())
 }
 
 /// The slope of points and its standard error.
@@ -152,10 +175,13 @@ pub(super) enum Start {
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub(super) time: Vec<f64>,
-    /// The command less that of the first row.
+    /// Times of the commands, and the commands less the first one.
+    pub(super) sent: Vec<f64>,
     pub(super) command: Vec<f64>,
-    /// That of the first row.
+    /// The first command.
     pub(super) base: f64,
+    /// For how long the controller holds a command, s.
+    pub(super) hold: f64,
     pub(super) straight: bool,
     /// Median distance of rows and length of the record, s.
     pub(super) row: f64,
@@ -174,7 +200,7 @@ pub(super) struct Part {
 impl Part {
     fn new(record: &Record, start: Start, largest_delay: f64, straight: bool) -> Self {
         let from = match start {
-            Start::Unknown => record.time[0] + largest_delay,
+            Start::Unknown => record.sent()[0] + largest_delay,
             Start::Rest | Start::Held => record.time[0],
         };
         let counts = |at: &usize| {
@@ -183,6 +209,8 @@ impl Part {
         let first = record.command[0];
         let mut out = Self {
             time: record.time.clone(),
+            sent: record.sent().to_vec(),
+            hold: record.hold,
             command: record.command.iter().map(|u| u - first).collect(),
             base: first,
             straight,
