@@ -76,7 +76,6 @@ class LogLoop(ReadOnlyArrays):
         stop: float | None = None,
         *,
         command: Literal["setpoint", "actuator"] = "setpoint",
-        between: Literal["held", "lines"] | None = None,
     ) -> Recording:
         """The loop as a recording: how the response follows the setpoint, or the actuator.
 
@@ -88,16 +87,13 @@ class LogLoop(ReadOnlyArrays):
             What counts as the command. With ``"setpoint"`` the loop is closed inside the vehicle,
             and a plant that follows the command describes it; with ``"actuator"`` it is what the
             controller of this loop commands.
-        between : {"held", "lines"}, optional
-            Whether a command holds from its row to the next, as one does that is logged each time
-            it is computed, or moves in a straight line, as one does that is logged less often. By
-            default one that changes on most of its rows moves.
 
         Returns
         -------
         Recording
-            Its rows are those of the response. Commands have their own times (`Recording.sent`);
-            of one that moves each value is the mean until the next.
+            Its rows are those of the response. Commands have the times of their rows
+            (`Recording.sent`). Where the controller computes them more often than the log has
+            them, `estimate_delay` takes them with ``between="straight"``.
 
         Raises
         ------
@@ -117,7 +113,7 @@ class LogLoop(ReadOnlyArrays):
                 raise RecordingError(f"{self.name} is never followed: {why}")
             start, stop = max(self.segments, key=lambda ends: ends[1] - ends[0])
         told = self.signals[command]
-        return recording_of(self.name, self.setpoint, self.response, told, (start, stop), between)
+        return recording_of(self.name, self.setpoint, self.response, told, (start, stop))
 
     def headline(self) -> str:
         """The loop in one line."""

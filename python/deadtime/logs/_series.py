@@ -53,6 +53,11 @@ class Series(ReadOnlyArrays):
         return f"<Series {self.source}{unit}: {len(self)} rows at {self.rate:.4g} Hz>"
 
     @property
+    def topic(self) -> str:
+        """The message of the log that holds it."""
+        return self.source.partition(".")[0]
+
+    @property
     def period(self) -> float:
         """Median time between rows, s."""
         return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf

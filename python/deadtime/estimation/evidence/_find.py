@@ -61,6 +61,26 @@ def estimate_by_evidence(
     return replace(named, verdict="indication", reason=reason)
 
 
+def fit_alone(fit: PlantEstimate, recording: Recording) -> PlantEstimate:
+    """The kind of plant of an estimate, fitted to another recording of it by itself.
+
+    Raises
+    ------
+    RecordingError, ValueError
+        When the recording has too few rows.
+    """
+    question = replace(
+        fit._question,
+        recording=recording,
+        earlier=0,
+        plant=fit.best.name,
+        window=None,
+        shift=0,
+        others=(),
+    )
+    return estimate_of(question, question.answer())
+
+
 def _are_apart(named: native.FamilyFit, whole: native.FamilyFit) -> bool:
     """Whether gain or angle, where the likeliest plant crosses over, have no value in common."""
     omega = whole.crossover

@@ -64,7 +64,7 @@ def stages_of(
     controller commands to the response it is: filters are computed, and the rest is that
     of actuators and airframe.
     """
-    own = {one.command: one for one in relations if one.loop == loop and one.estimate is not None}
+    own = {one.command: one for one in relations if one.loop == loop and one.verdict != "none"}
     stages = []
     if "setpoint" in own:
         stages.append(_measured(own["setpoint"], "setpoint to response, loop closed"))
@@ -90,11 +90,9 @@ def stages_of(
 
 
 def _measured(one: LoopLatency, name: str) -> Stage:
-    value, error, _ = one.sum_of()
-    assert one.estimate is not None
     start, stop = one.windows[0]
     where = f"estimated from {start:.1f} to {stop:.1f} s"
     if len(one.windows) > 1:
         more = len(one.windows) - 1
         where += f" and {more} more window{'s' if more > 1 else ''}"
-    return Stage(name, value, error, where, one.estimate.verdict)
+    return Stage(name, one.time, one.stderr, where, one.verdict)

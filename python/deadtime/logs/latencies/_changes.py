@@ -8,8 +8,8 @@ from typing import Any
 
 from deadtime._base.plain import plain_fields
 from deadtime._base.verdicts import Verdict, verdict_if
-from deadtime.logs.latencies._elsewhere import TWO_SIDED
 from deadtime.logs.latencies._latency import Latency
+from deadtime.logs.latencies._relation import TWO_SIDED
 
 #: Probability below which a difference counts as real.
 REAL = 0.05
@@ -55,7 +55,7 @@ class LatencyChange:
     @property
     def ci(self) -> tuple[float, float]:
         """95 % interval of the change, s."""
-        reach = TWO_SIDED * self.stderr
+        reach = 0.5 * TWO_SIDED * self.stderr
         return self.change - reach, self.change + reach
 
     @property
@@ -75,7 +75,7 @@ class LatencyChange:
 
 
 def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, ...]:
-    """Compare the loops that two logs tell about.
+    """Compare the loops of which two logs show the time.
 
     Parameters
     ----------
@@ -110,14 +110,11 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
         for other in after.estimated:
             if (one.loop, one.command) != (other.loop, other.command):
                 continue
-            first, first_error, _ = one.sum_of()
-            second, second_error, _ = other.sum_of()
+            first, first_error = one.time, one.stderr
+            second, second_error = other.time, other.stderr
             spread = math.hypot(first_error, second_error)
             z = abs(second - first) / spread if spread > 0.0 else math.inf
-            reliable = all(
-                fit.estimate is not None and fit.estimate.verdict == "reliable"
-                for fit in (one, other)
-            )
+            reliable = one.verdict == other.verdict == "reliable"
             found.append(
                 LatencyChange(
                     one.loop, one.command, first, first_error, second, second_error,

@@ -4,8 +4,7 @@ Two clocks whose rates differ by r make the time from command to response grow b
 Rows that come regularly on both clocks show r by their stamps: their periods are in the ratio m/n
 of small whole numbers, times 1 + r. Two tasks that are run by oscillators of their own, and stamped
 by one clock, look the same; there the time from command to response does not grow. It is measured
-in windows over the log, each with the plant of the estimate moved in time and with a gain of its
-own, and a line is fitted through these times.
+in windows over the log, and a line is fitted through these times.
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
-from deadtime.estimation import DelayEstimate, path_of
-from deadtime.logs.latencies._windows import Window, told_by, trend_of, variance_of
+from deadtime.logs.latencies._relation import TWO_SIDED, LoopLatency, WindowTime
 
 #: Largest whole number of rows of one signal in a whole number of the other's, and the largest
 #: difference of two clocks that run on quartz.
@@ -35,19 +33,11 @@ FEWEST = 50
 #: Level of the test of a line of times.
 SIGNIFICANCE = 0.01
 
-#: Most steps of the search for the time of a window, the share of its error at which it ends, and
-#: the largest step, as a share of the time from command to response.
-STEPS, SETTLED, LARGEST = 12, 0.1, 0.5
-
 #: Windows below which a line of times says nothing about its error.
 LEAST = 3
 
 #: Drift over the log that matters, as a share of the 95 % interval: the interval then covers 93 %.
 WORTH = 0.1
-
-#: Width of a 95 % interval in standard errors.
-TWO_SIDED = 3.92
-
 
 #: Name of a signal, and the stamps of its rows, s.
 Stamped: TypeAlias = tuple[str, Array]
@@ -81,35 +71,28 @@ class Growth(NamedTuple):
         return abs(self.value - value) <= self.quantile * self.error
 
 
-def why_two_clocks(
-    fit: DelayEstimate,
-    windows: Sequence[Window],
-    command: Stamped,
-    response: Stamped,
-) -> str:
-    """Why the clocks of a log make its estimate doubtful; empty where they do not.
+def why_two_clocks(found: LoopLatency, command: Stamped, response: Stamped) -> str:
+    """Why the clocks of a log make a time doubtful; empty where they do not.
 
     Parameters
     ----------
-    fit : DelayEstimate
-        The estimate.
-    windows : sequence of Window
-        All windows of the log that tell something.
+    found : LoopLatency
+        The time.
     command, response : (str, ndarray)
         Name and stamps of each signal.
     """
     start, stop = response[1][[0, -1]].tolist()
     length = stop - start
-    low, high = fit.ci(0.95, "delay+lag")
+    low, high = found.interval
     worth = WORTH * (high - low)
     names = f"{command[0]} and {response[0]}"
     stamps = rates_apart(command[1], response[1])
     apart = 0.0 if stamps is None or abs(stamps.value) <= stamps.most else stamps.value
-    grows = growth_of(fit, windows, start)
+    grows = growth_of(found.times, found.time, start)
     if grows is not None and not grows.may_be(0.0) and abs(grows.value) * length > worth:
         by = stated(grows.value, grows.error, "s")
         error = math.hypot(grows.start_error, (high - low) / TWO_SIDED)
-        first = stated(fit.delay_plus_lag + grows.start, error, "s")
+        first = stated(found.time + grows.start, error, "s")
         also = f", whose stamps do so by {1e6 * abs(apart):.3g} ppm" if apart else ""
         return (
             f"the time from command to response grows by {by} each second, as where {names} are "
@@ -164,19 +147,17 @@ def _period(time: Array) -> Rate | None:
     return Rate(period, 2.0 * off / float(time[-1] - time[0]))
 
 
-def growth_of(fit: DelayEstimate, windows: Sequence[Window], start: float) -> Growth | None:
-    """By how much the time from command to response grows over a log; None where it is not known.
+def growth_of(each: Sequence[WindowTime], time: float, start: float) -> Growth | None:
+    """By how much the times of windows grow over a log; None where it is not known.
 
     The scatter of the times around their line widens its error where it is more than their own.
     The errors of the best half are taken for their median: in gusts some are far too small.
     """
     from scipy import special
 
-    tried = [time_in(one, fit) for one in apart_from_each_other(windows)]
-    told = [one for one in tried if one is not None]
-    if len(told) < LEAST:
+    if len(each) < LEAST:
         return None
-    at, times, errors = np.array(told).T
+    at, times, errors = np.array([(one.at, one.time - time, one.stderr) for one in each]).T
     errors = np.maximum(errors, np.median(errors))
     rows = np.stack([np.ones(at.size), at - start], axis=1) / errors[:, None]
     (first, slope), *_ = np.linalg.lstsq(rows, times / errors)
@@ -186,43 +167,3 @@ def growth_of(fit: DelayEstimate, windows: Sequence[Window], start: float) -> Gr
     first_error, error = np.sqrt(scale * np.diag(np.linalg.inv(rows.T @ rows))).tolist()
     quantile = float(special.stdtrit(freedom, 1.0 - SIGNIFICANCE / 2))
     return Growth(float(slope), error, quantile, float(first), first_error)
-
-
-def apart_from_each_other(windows: Sequence[Window]) -> list[Window]:
-    """Windows that do not overlap, those that promise more first."""
-    chosen: list[Window] = []
-    for one in windows:
-        if one.is_apart(chosen):
-            chosen.append(one)
-    return chosen
-
-
-def time_in(window: Window, fit: DelayEstimate) -> tuple[float, float, float] | None:
-    """When a window tells its time, how much later than the estimate that is, and its error, s.
-
-    It tells it where the response moves. Gauss and Newton's search for gain and delay, with offset
-    and trend; None where it does not end.
-    """
-    part, plant = window.recording, fit.loop.plant
-    sent = part.sent or (part.time, told_by(part))
-    path = path_of(plant, *sent)
-    values = plant.parameters
-    basis = trend_of(part.time)
-    moved = part.output - basis @ (basis.T @ part.output)
-    largest, late = LARGEST * max(fit.delay_plus_lag, part.sample_time), 0.0
-    for _ in range(STEPS):
-        times = part.time - fit.delay - late
-        rate = path.slopes(times, values, ()).rate
-        columns = np.stack([path.value(times, values), -rate], axis=1)
-        columns -= basis @ (basis.T @ columns)
-        (gain, slope), *_ = np.linalg.lstsq(columns, moved)
-        if gain <= 0.0:
-            return None
-        left = moved - columns @ (gain, slope)
-        variance = variance_of(left) * float(np.linalg.pinv(columns.T @ columns)[1, 1])
-        step, error = float(slope / gain), math.sqrt(variance) / float(gain)
-        if abs(step) < SETTLED * error:
-            moves = columns[:, 1] ** 2
-            return float(moves @ part.time / np.sum(moves)), late + step, error
-        late += math.copysign(min(abs(step), largest), step)
-    return None

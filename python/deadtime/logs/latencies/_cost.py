@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from deadtime._base.arrays import Array
 from deadtime._base.plain import plain_fields
-from deadtime.estimation import DelayEstimate
-from deadtime.loops import ControlLoop, FactoredPlant, P
+from deadtime.estimation import PlantEstimate
+from deadtime.loops import P
 from deadtime.recordings import Recording
 
 #: The sensitivity peak of a well damped loop (Åström and Hägglund 2006).
@@ -24,9 +23,6 @@ PEAK = 1.7
 
 #: Frequencies, in rad over the sum of delay and lag, and their number.
 LOWEST, HIGHEST, FREQUENCIES = 0.02, 60.0, 1500
-
-#: Draws of the estimate for the intervals of the gains, and their seed.
-DRAWS, SEED = 200, 1
 
 #: Halvings of the range of the gain.
 HALVINGS = 40
@@ -46,7 +42,7 @@ class GainCost:
     well_damped : float
         Gain at which the sensitivity peak is 1.7.
     largest_ci, well_damped_ci : (float, float)
-        95 % intervals, from the covariance of the estimate.
+        Their 95 % intervals.
     flown : float or None
         Slope of the actuator on the error of the loop, where the error explains four fifths of
         the actuator; None for other controllers.
@@ -66,61 +62,38 @@ class GainCost:
         return plain_fields(vars(self))
 
 
-def cost_of(fit: DelayEstimate, recording: Recording) -> GainCost | None:
-    """The gains for the plant of an estimate; None where no positive gain makes it unstable."""
-    plant = fit.loop.plant
-    assert isinstance(plant, FactoredPlant)
-    numbers = np.array([fit._value(name) for name in fit.free])
-    time = max(fit.delay_plus_lag, 1e-9)
-    omega = np.geomspace(LOWEST, HIGHEST, FREQUENCIES) / time
-    best = _gains(plant, fit.free, numbers, omega)
-    if best is None or plant.gain == 0.0:
+def cost_of(fit: PlantEstimate, recording: Recording) -> GainCost | None:
+    """The gains for the plant of an estimate; None where no gain makes it unstable.
+
+    The interval of the well damped gain is, as a share, that of the largest.
+    """
+    largest = fit.largest_gain
+    if "largest_gain" not in fit.intervals or not math.isfinite(largest):
         return None
-    random = np.random.default_rng(SEED)
-    drawn = random.multivariate_normal(numbers, np.nan_to_num(fit.cov), DRAWS, method="eigh")
-    found = [_gains(plant, fit.free, one, omega) for one in drawn]
-    known = np.array([one for one in found if one is not None] or [best])
-    ends = np.quantile(known, [0.025, 0.975], axis=0)
+    low, high = fit.ci(0.95, "largest_gain")
+    share = _well_damped(fit, largest)
     flown = flown_gain(recording)
     margin = None
     if flown is not None:
-        loop = ControlLoop(plant, P(flown), delay=fit.delay)
-        margin = float(loop.margin().delay_margin)
-    (low, high), (low_damped, high_damped) = ends.T.tolist()
-    return GainCost(
-        best[0], (low, high), best[1], (low_damped, high_damped), flown, margin
-    )  # fmt: skip
+        margin = float(fit.loop(P(flown)).margin().delay_margin)
+    ends = (share * low, share * high)
+    return GainCost(largest, (low, high), share * largest, ends, flown, margin)
 
 
-def _gains(
-    plant: FactoredPlant, names: tuple[str, ...], numbers: Array, omega: Array
-) -> tuple[float, float] | None:
-    """Largest stable gain and that of the sensitivity peak, with the sign of the plant's gain."""
-    values = dict(zip(names, numbers.tolist(), strict=True))
-    delay = max(values.pop("delay", 0.0), 0.0)
-    values = {
-        name: max(value, 0.0) if name.startswith("lag") else value for name, value in values.items()
-    }
-    moved = plant._replace({**plant.parameters, **values})
-    response = moved.transfer_function().frequency_response(omega)
-    G = np.ravel(response) * np.exp(-1j * omega * delay)
-    sign = math.copysign(1.0, values.get("gain", plant.gain))
-    G = G * sign
-    phase = np.unwrap(np.angle(G))
-    phase += 2.0 * np.pi * np.round(-phase[0] / (2.0 * np.pi))
-    beyond = np.flatnonzero(phase <= -np.pi)
-    if not beyond.size or beyond[0] == 0:
-        return None
-    k = int(beyond[0])
-    share = (phase[k - 1] + np.pi) / (phase[k - 1] - phase[k])
-    size = np.exp((1.0 - share) * np.log(abs(G[k - 1])) + share * np.log(abs(G[k])))
-    largest = 1.0 / float(size)
-    low, high = 0.0, largest
+def _well_damped(fit: PlantEstimate, largest: float) -> float:
+    """The gain of the sensitivity peak as a share of the largest stable one."""
+    plant = fit.plant
+    assert plant is not None
+    time = max(fit.best.delay + fit.best.lag_sum, 1e-9)
+    omega = np.geomspace(LOWEST, HIGHEST, FREQUENCIES) / time
+    G = np.ravel(plant.transfer_function().frequency_response(omega))
+    G = largest * G * np.exp(-1j * omega * fit.delay)
+    low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         peak = float(np.max(1.0 / np.maximum(np.abs(1.0 + middle * G), 1e-12)))
         low, high = (middle, high) if peak < PEAK else (low, middle)
-    return sign * largest, sign * low
+    return low
 
 
 def flown_gain(recording: Recording) -> float | None:

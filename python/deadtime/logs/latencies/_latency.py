@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -16,39 +15,24 @@ from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain_fields
 from deadtime._base.progress import Stages, stage_report
-from deadtime.estimation import SharedNumber, shared_number
 from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
 from deadtime.logs.latencies._budget import Stage, stages_of
+from deadtime.logs.latencies._clocks import why_two_clocks
+from deadtime.logs.latencies._commands import Command, sampling_of
 from deadtime.logs.latencies._contradictions import doubted_by_others
-from deadtime.logs.latencies._controller import (
-    Command,
-    between_rows,
-    hidden_between_rows,
-    hold_of,
-    known_commands,
-    smeared,
-)
 from deadtime.logs.latencies._filters import FilterDelay, filters_of
 from deadtime.logs.latencies._live import around_the_vehicle
-from deadtime.logs.latencies._relation import LoopLatency, doubted_by_clocks, relation_of
-from deadtime.logs.latencies._windows import (
-    Window,
-    best_of,
-    others_of,
-    parts_of,
-    rows_of_a_window,
-    seen_windows,
-    window_of,
-)
-from deadtime.logs.latencies._words import said_of
+from deadtime.logs.latencies._relation import LoopLatency, relation_of
+from deadtime.logs.latencies._windows import averaged, parts_of, rows_of_a_window, windows_of
+from deadtime.logs.latencies._words import in_full, table_of
 from deadtime.recordings import Recording
 
 
 @dataclass(frozen=True, eq=False)
 class Latency(ReadOnlyArrays, Pictured):
-    """Where in a vehicle the time goes, from one log.
+    """How long the loops of a vehicle take to respond, from one log.
 
     Attributes
     ----------
@@ -56,15 +40,17 @@ class Latency(ReadOnlyArrays, Pictured):
         The file, and autopilot and vehicle.
     loops : tuple of LoopLatency
         For each loop the time from setpoint to response, and from what its controller commands to
-        the response; with the reason where it was refused.
+        the response; with the reason where there is none.
     stages : dict of str to tuple of Stage
-        The budget of each loop.
+        Where the time of each loop goes.
     filters : tuple of FilterDelay
         The filters that the parameters of the log name.
     remarks : tuple of str
         What was damaged or left out of the log.
     link : Link or None
         The way of the messages to the ground station, in a tlog.
+    advice : tuple of str
+        What to log and to fly to know more.
     """
 
     source: str
@@ -74,6 +60,7 @@ class Latency(ReadOnlyArrays, Pictured):
     filters: tuple[FilterDelay, ...] = ()
     remarks: tuple[str, ...] = ()
     link: Link | None = None
+    advice: tuple[str, ...] = ()
 
     def loop(self, name: str, command: Command = "setpoint") -> LoopLatency:
         """The time of one loop.
@@ -91,70 +78,28 @@ class Latency(ReadOnlyArrays, Pictured):
 
     @property
     def estimated(self) -> tuple[LoopLatency, ...]:
-        """The loops whose time was not refused."""
-        return tuple(one for one in self.loops if one.estimate is not None)
-
-    def shared(self, kind: str, command: Command = "actuator", name: str = "delay") -> SharedNumber:
-        """What the loops of one kind say together about a number that they share.
-
-        Parameters
-        ----------
-        kind : str
-            ``"rate"``, ``"attitude"``, ``"velocity"`` or ``"position"``.
-        command : {"actuator", "setpoint"}
-            From what the time counts.
-        name : str
-            ``"delay"``, or ``"delay+lag"`` where the axes are alike.
-
-        Returns
-        -------
-        SharedNumber
-            Of the reliable estimates, each with its own gain, lag and noise. The vertical axis is
-            one of them; ``axes=`` of `latency` chooses.
-
-        Raises
-        ------
-        ValueError
-            When fewer than two of these loops have a reliable estimate.
-        """
-        asked = [one for one in self.loops if (one.kind, one.command) == (kind, command)]
-        fits = [one.estimate for one in asked if one.estimate is not None]
-        told = [fit for fit in fits if fit.verdict == "reliable"]
-        if len(told) < 2:
-            raise ValueError(
-                f"{len(told)} of the {len(asked)} loops of {kind} have a reliable estimate from "
-                f"the {command}: a shared number needs two"
-            )
-        return shared_number(told, name)
+        """The loops that have a time."""
+        return tuple(one for one in self.loops if one.verdict != "none")
 
     def headline(self) -> str:
-        """The shortest answer: the fastest loop of the vehicle that is told, in one line."""
-        told = sorted(self.estimated, key=_order)
-        if not told:
-            return f"none: no loop of {self.source} tells how long it takes to respond"
-        return told[0].headline()
+        """The shortest answer: the fastest loop of the vehicle that has a time, in one line."""
+        found = sorted(self.estimated, key=_order)
+        if not found:
+            return f"none: no loop of {self.source} shows how long it takes to respond"
+        return found[0].headline()
 
     def summary(self) -> str:
-        """All loops, their budget and what it costs, in lines of text."""
-        lines = [self.headline(), f"{self.source}: {self.vehicle}", ""]
-        for one in self.estimated:
-            lines += self._lines(one)
-        refused = [one for one in self.loops if one.estimate is None]
-        if refused:
-            lines.append("refused:")
-            lines += [f"  {one.name}: {one.refusal}" for one in refused]
-        if self.link is not None:
-            lines.append(self.link.summary())
-        return "\n".join([*lines, *self.remarks])
+        """All loops in one table, a line each, and what is most worth knowing."""
+        return "\n".join([self.headline(), f"{self.source}: {self.vehicle}", "", *table_of(self)])
 
-    def _lines(self, one: LoopLatency) -> list[str]:
-        first, *others = said_of(one)
-        lines = [first, *(f"  {words}" for words in others)]
-        if one.command == "actuator" or (one.loop, "actuator") not in {
-            (other.loop, other.command) for other in self.estimated
-        }:
-            lines += [f"  {stage.line()}" for stage in self.stages.get(one.loop, ()) if stage.part]
-        return lines
+    def details(self) -> str:
+        """Every loop with its plant, its windows, its stages and what they cost."""
+        lines = [self.headline(), f"{self.source}: {self.vehicle}"]
+        for one in self.loops:
+            lines += ["", *in_full(one, self.stages.get(one.loop, ()))]
+        if self.link is not None:
+            lines += ["", self.link.summary()]
+        return "\n".join([*lines, "", *self.remarks])
 
     def to_dict(self) -> dict[str, Any]:
         """All results as plain values for JSON."""
@@ -182,20 +127,20 @@ class Latency(ReadOnlyArrays, Pictured):
         return self.plot() if self.estimated else None
 
     def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write one HTML file with all of it: the budget, each fit and the gains.
+        """Write one HTML file with all of it: the times, each fit and the gains.
 
         Needs matplotlib.
         """
         from deadtime._base.page import page, write_page
         from deadtime.logs.latencies._page import budget_of, fit_of, row_of, sentence
 
-        told = self.estimated
+        found = self.estimated
         text = page(
             "logs/latencies/page.html",
             title=f"Latencies in {self.source}",
             described=self.vehicle,
             verdict=self.headline(),
-            rows=[row_of(one) for one in told],
+            rows=[row_of(one) for one in found],
             all=self._picture(),
             budget=budget_of(self.stages),
             filters=[
@@ -203,23 +148,22 @@ class Latency(ReadOnlyArrays, Pictured):
                 for one in self.filters
             ],
             link="" if self.link is None else sentence(self.link.summary()),
-            fits=[fit_of(one) for one in told],
-            refused=[one for one in self.loops if one.estimate is None],
+            fits=[fit_of(one) for one in found],
+            refused=[one for one in self.loops if one.verdict == "none"],
             remarks=self.remarks,
-            around=around_the_vehicle(told),
+            around=around_the_vehicle(found),
         )
         return write_page(text, Path(path))
 
     def __repr__(self) -> str:
-        return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops told>"
+        return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops>"
 
 
 def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
-    """Reliable estimates first, inner loops before outer ones, then the vehicle alone."""
+    """Reliable times first, inner loops before outer ones, then the vehicle alone."""
     kinds = ("rate", "attitude", "velocity", "position", "")
-    assert one.estimate is not None
     kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
-    return (one.estimate.verdict != "reliable", kind, one.command == "setpoint", one.promise)
+    return (one.verdict != "reliable", kind, one.command == "setpoint", one.stderr)
 
 
 def latency(
@@ -256,18 +200,17 @@ def latency(
 
     Notes
     -----
-    Of each loop the windows are ranked by the Cramér-Rao bound of delay and lag together that they
-    promise. The best is fitted by gain, delay and one lag, or two lags where one is an indication;
-    where that is, together with up to two others. From the setpoint, two lags that come out alike
-    give way to a pair of complex poles if that is reliable, as of a rate loop that is closed by a
-    proportional controller. From the setpoint the plant follows its command;
-    from what the controller commands it integrates.
+    Each loop is divided into windows. Those in which the command moves the most are fitted
+    together, without a plant that is named: from the setpoint one that comes to rest, from what the
+    controller commands one that integrates. The time is that of delay and lags together, the
+    equivalent delay as the frequency goes to zero.
+
+    Where the log holds each command of the controller, commands hold between rows; where it holds
+    only some of them they are straight, and what they may have been between the rows is part of the
+    interval. So is the spread of the time between windows, each estimated by itself.
 
     Where command and response are stamped by clocks that drift apart, by more than a tenth of the
-    interval over the log, the estimate is an indication. The time of each window over the log tells
-    that, and stamps that are regular. Nor is an estimate reliable if one of the two next best
-    windows, fitted by itself, contradicts it, nor those of north and east whose intervals lie apart
-    by more than a factor of two.
+    interval over the log, the time is an indication; so is one that another loop contradicts.
 
     Examples
     --------
@@ -279,7 +222,7 @@ def latency(
     >>> angle = np.ravel(vehicle.simulate(time, told).outputs)
     >>> angle = angle + 0.003 * np.random.default_rng(1).standard_normal(600)
     >>> found = dtm.latency(dtm.Recording(time, told, angle))
-    >>> time, stderr, (low, high) = found.loops[0].sum_of()
+    >>> low, high = found.loops[0].interval
     >>> low < 0.11 < high
     True
     """
@@ -290,7 +233,7 @@ def latency(
         log = open_log(log)
     chosen = _chosen(log, axes, loops)
     wanted = [(loop, one) for loop in chosen for one in _commands(loop)]
-    found = doubted_by_others(_all_told(log, wanted, report))
+    found = doubted_by_others(_all_of(log, wanted, report))
     filters = filters_of(log)
     stages = {loop.name: stages_of(log, loop.name, found, filters) for loop in chosen}
     vehicle = " ".join(one for one in (log.autopilot, log.vehicle, log.firmware) if one)
@@ -313,14 +256,14 @@ def _sent_from_the_ground(log: Log, loops: list[LogLoop]) -> list[str]:
     if not names:
         return []
     half = log.link.half_round_trip
-    worth = (
-        "which this log does not tell"
+    long = (
+        "which this log does not show"
         if half is None
         else f"at least {stated(2.0 * half, 0.0, 's')}"
     )
     return [
         f"{', '.join(names)}: the setpoint is stamped where it was sent, on the ground; its time "
-        f"to the response holds the link there and back, {worth}"
+        f"to the response holds the link there and back, {long}"
     ]
 
 
@@ -349,7 +292,7 @@ def loops_asked_for(
     return sum(len(list(_commands(loop))) for loop in _chosen(log, axes, loops))
 
 
-def _all_told(
+def _all_of(
     log: Log, wanted: list[tuple[LogLoop, Command]], report: Callable[[str], object]
 ) -> list[LoopLatency]:
     """Each in a thread: the kernel computes beside the interpreter.
@@ -361,7 +304,7 @@ def _all_told(
     order = sorted(range(len(wanted)), key=lambda k: rows_of_a_window(wanted[k][0]))
     order = [*order[:1], *order[:0:-1]]
     try:
-        begun = {pool.submit(_told, log, *wanted[k]): k for k in order}
+        begun = {pool.submit(latency_of, log, *wanted[k]): k for k in order}
         found = {}
         for one in as_completed(begun):
             found[begun[one]] = one.result()
@@ -377,33 +320,24 @@ def _commands(loop: LogLoop) -> Iterator[Command]:
         yield "actuator"
 
 
-def _told(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
+def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
+    """The time of one loop from one of its commands."""
     if not loop.segments:
         why = "; ".join(loop.why_left_out) or "it is never followed"
-        return LoopLatency(loop.name, loop.axis, loop.kind, command, (), math.inf, None, why)
+        return LoopLatency(loop.name, loop.axis, loop.kind, command, "none", why)
     told = loop.signals[command]
-    between = between_rows(log, loop.kind, told)
-    loop = known_commands(log, loop, command, between)
-    told = loop.signals[command]
-    seen = seen_windows(loop, command, between)
-    windows = best_of(seen)
-
-    def held(window: Window) -> Recording:
-        return loop.recording(window.start, window.stop, command=command, between="held")
-
-    hidden = 0.0
-    unsure = hold_of(log, loop.kind)[1] if between == "lines" else 0.0
-    if windows:
-        first = (windows[0].start, windows[0].stop)
-        hidden = hidden_between_rows(told, between, *first)
-        if between == "lines":
-            unsure = math.hypot(unsure, smeared(log, loop.kind, told, *first))
+    sampling = sampling_of(log, loop.kind, told)
     found = relation_of(
-        loop.name, loop.axis, loop.kind, command, windows, between,
-        held if between is None else None, hidden, unsure, others_of(seen, windows),
+        loop.name, loop.axis, loop.kind, command, windows_of(log, loop, command),
+        lambda *ends: averaged(loop.recording(*ends, command=command), loop.kind),
+        sampling, command == "actuator",
     )  # fmt: skip
+    # Two signals of one message have one clock.
+    if found.verdict == "none" or told.topic == loop.response.topic:
+        return found
     named = ((one.source, one.time) for one in (told, loop.response))
-    return doubted_by_clocks(found, [one for one in seen if one.tells], *named)
+    why = why_two_clocks(found, *named)
+    return found.doubted(why) if why else found
 
 
 def _of_recording(recording: Recording) -> Latency:
@@ -416,11 +350,11 @@ def _of_recording(recording: Recording) -> Latency:
             recording.time, recording.reference, recording.output,
             command=recording.reference, units=recording.units, source=recording.source,
         )  # fmt: skip
-    window = window_of(told, not follows)
-    one = relation_of(recording.source or "recording", "", "", command, [window])
-    if recording.sent is not None:
-        one = doubted_by_clocks(
-            one, parts_of(told, not follows),
-            ("the commands", recording.sent.time), ("the rows", recording.time),
-        )  # fmt: skip
-    return Latency(recording.source or "recording", "a recording", (one,))
+    name = recording.source or "recording"
+    whole, parts = parts_of(told)
+    one = relation_of(name, "", "", command, parts, whole.window)
+    if recording.sent is not None and one.verdict != "none":
+        clocks = (("the commands", recording.sent.time), ("the rows", recording.time))
+        if why := why_two_clocks(one, *clocks):
+            one = one.doubted(why)
+    return Latency(name, "a recording", (one,))

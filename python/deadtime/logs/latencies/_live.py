@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from deadtime._base.explorer import Explorer
 from deadtime.logs.latencies._relation import LoopLatency
-from deadtime.loops import P
+from deadtime.loops import P, explorer_of
 
 #: Ends of the map, as a share of the largest stable gain, and of delay and lag together.
 _BEYOND = 1.5
@@ -30,14 +30,12 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
     """The loop with the gain flown, or else the well damped one; None where no fit is reliable.
 
     Of several vehicles, such as that of the rate and that of the angle, the one whose gain is
-    known, and then the one that is told best.
+    known, and then the one of the least error.
     """
-    told = [
-        one for one in estimated if one.cost and one.estimate and one.estimate.verdict == "reliable"
-    ]
-    if not told:
+    reliable = [one for one in estimated if one.cost and one.verdict == "reliable"]
+    if not reliable:
         return None
-    one = min(told, key=lambda one: (_flown(one) is None, one.promise))
+    one = min(reliable, key=lambda one: (_flown(one) is None, one.stderr))
     assert one.estimate is not None
     assert one.cost is not None
     gain = _flown(one)
@@ -48,11 +46,10 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
         "of the controller. The interval is that of the delay, with gain and lag as estimated."
     )
     controller = P(one.cost.well_damped if gain is None else gain)
-    widest, longest = (
-        float(f"{_BEYOND * end:.2g}") for end in (one.cost.largest, one.estimate.delay_plus_lag)
-    )
+    widest, longest = (float(f"{_BEYOND * end:.2g}") for end in (one.cost.largest, one.time))
     ranges = {"Kp": (min(widest, 0.0), max(widest, 0.0)), "delay": (0.0, longest)}
-    return Around(one.estimate.explore(controller, ranges), words)
+    loop = one.estimate.loop(controller)
+    return Around(explorer_of(loop.specification, ranges, one.estimate.ci()), words)
 
 
 def _flown(one: LoopLatency) -> float | None:

@@ -14,11 +14,10 @@ from deadtime.logs.latencies._words import said_of
 
 def row_of(one: LoopLatency) -> tuple[str, ...]:
     """A loop in the table of times."""
-    value, error, (low, high) = one.sum_of()
-    assert one.estimate is not None
-    verdict = one.estimate.verdict
-    ends = between(low, high, error, "s") if verdict == "reliable" else NOT_CLAIMED
-    return (one.loop, one.command, verdict, claimed(verdict, value, error, "s"), ends)
+    reliable = one.verdict == "reliable"
+    ends = between(*one.interval, one.stderr, "s") if reliable else NOT_CLAIMED
+    time = claimed(one.verdict, one.time, one.stderr, "s")
+    return (one.loop, one.command, time, ends, one.verdict)
 
 
 def budget_of(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:

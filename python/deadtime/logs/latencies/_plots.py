@@ -19,25 +19,23 @@ def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     if not told:
         raise ValueError(f"{source}: no loop tells how long it takes, so nothing is drawn")
     figure, ax = new_figure(7.5, AROUND + ROW * len(told))
-    sums = [one.sum_of() for one in told]
-    unit, factor = time_unit(float(np.median([value for value, _, _ in sums])))
-    for place, (one, (value, _, (low, high))) in enumerate(zip(told, sums, strict=True)):
-        fit = one.estimate
-        assert fit is not None
-        look = {"alpha": 1.0 if fit.verdict == "reliable" else 0.35, "height": 0.6}
-        delay = fit.delay / factor
+    unit, factor = time_unit(float(np.median([one.time for one in told])))
+    for place, one in enumerate(told):
+        assert one.estimate is not None
+        reliable = one.verdict == "reliable"
+        look = {"alpha": 1.0 if reliable else 0.35, "height": 0.6}
+        delay = one.estimate.delay / factor
         ax.barh(place, delay, color=COLOURS[0], **look)
-        ax.barh(place, value / factor - delay, left=delay, color=COLOURS[1], **look)
-        ax.plot([low / factor, high / factor], [place, place], color="0.15", lw=1.4, marker="|")
+        ax.barh(place, one.time / factor - delay, left=delay, color=COLOURS[1], **look)
+        if reliable:
+            ends = [end / factor for end in one.interval]
+            ax.plot(ends, [place, place], color="0.15", lw=1.4, marker="|")
     ax.set_yticks(range(len(told)))
-    fits = [one.estimate for one in told]
-    doubts = ["" if fit and fit.verdict == "reliable" else " (indication)" for fit in fits]
-    ax.set_yticklabels(
-        [f"{one.loop}, {one.command}{d}" for one, d in zip(told, doubts, strict=True)]
-    )
+    doubts = {"reliable": "", "indication": " (indication)"}
+    ax.set_yticklabels([f"{one.loop}, {one.command}{doubts[one.verdict]}" for one in told])
     ax.invert_yaxis()
     # One loop with a long tail does not hide the others.
-    widest = max(value for value, _, _ in sums) / factor
+    widest = max(one.time for one in told) / factor
     ax.set_xlim(0.0, 1.6 * widest)
     ax.set_xlabel(f"from the command to the response [{unit}]")
     handles = [ax.barh(0, 0, color=colour) for colour in COLOURS[:2]]
@@ -64,9 +62,7 @@ def draw_fit(ax: Axes, one: LoopLatency) -> None:
     ax.plot(recording.time, recording.output, **DATA, label="response")
     if one.command == "setpoint":
         ax.step(recording.time, recording.reference, where="post", **REFERENCE, label="setpoint")
-    # Air has moved the response too: the plant alone is drawn around its mean.
-    plant = recording.output - (fit.residuals - fit.residuals.mean())
-    ax.plot(recording.time, plant, color=COLOURS[1], lw=1.4, label="plant alone")
+    ax.plot(recording.time, fit.fitted, color=COLOURS[1], lw=1.4, label="fit")
     ax.set_xlabel("time from the start of the log [s]")
     ax.set_ylabel(f"{one.loop} [{unit}]" if unit else one.loop)
     ax.figure.legend(loc="outside upper center", ncols=3, frameon=False)

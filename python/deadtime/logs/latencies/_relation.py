@@ -1,46 +1,55 @@
-"""The time from a command of one loop to its response, estimated over its best windows."""
+"""The time from a command of one loop to its response, over the windows of a log."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, cast
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from deadtime._base.digits import between, stated
-from deadtime._base.errors import DeadtimeError, NotIdentifiableError
+from deadtime._base.digits import between as ends_of, stated
+from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
-from deadtime._base.verdicts import NOT_CLAIMED, claimed
-from deadtime.estimation import (
-    DelayEstimate,
-    OutputError,
-    bic,
-    estimate_delay,
-    likeliest,
-    with_pair,
-)
-from deadtime.logs.latencies._clocks import Stamped, why_two_clocks
-from deadtime.logs.latencies._controller import Between, Command
+from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed
+from deadtime.estimation import PlantEstimate, estimate_delay, fit_alone
+from deadtime.logs.latencies._commands import Command, Sampling
 from deadtime.logs.latencies._cost import GainCost, cost_of
-from deadtime.logs.latencies._elsewhere import TWO_SIDED, contradiction
-from deadtime.logs.latencies._windows import LONGEST, OF_A_ROW, Window
-from deadtime.loops import ControlLoop, FactoredPlant, P
+from deadtime.logs.latencies._spread import Spread, spread_of
+from deadtime.logs.latencies._windows import LENGTHS, LONGEST, Window, best_of
 from deadtime.recordings import Recording
 
-#: The second lag that is tried, as a share of the first.
-SECOND = 0.3
+#: Width of a 95 % interval in standard errors.
+TWO_SIDED = 3.92
 
-#: Difference of BIC at which commands hold, or move, between rows, and what it may be worth
-#: otherwise, as a share of the 95 % interval.
-CLEARLY, WORTH = 6.0, 0.25
+#: Windows whose time is estimated by themselves, those that move the most: more show more of the
+#: spread and take longer.
+ALONE = 10
 
-#: What an estimate says whose plant has too few lags, and one whose windows differ.
-LACKING, CONTRADICT = "a further lag of", "the recordings contradict one another"
+#: A time says something if its standard error is below itself, or below so many rows.
+OF_A_ROW = 2.0
 
-#: Intervals of the other numbers are computed when they are asked for.
-METHOD = OutputError(intervals="sum", rivals=False)
+
+@dataclass(frozen=True)
+class WindowTime:
+    """The time of one window, estimated by itself.
+
+    Attributes
+    ----------
+    at : float
+        Middle of the window, s from the start of the log.
+    time, stderr : float
+        From the command to the response, and its standard error, s.
+    movement : float
+        Deviation of the command from a straight line.
+    """
+
+    at: float
+    time: float
+    stderr: float
+    movement: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,71 +63,88 @@ class LoopLatency(ReadOnlyArrays):
     command : {"setpoint", "actuator"}
         From what the time counts: the setpoint, with the loop closed, or what its controller
         commands, which is the vehicle alone.
+    verdict : {"reliable", "indication", "none"}
+        Whether `interval` is claimed to hold; whether there is a time at all.
+    reason : str
+        Why it is not ``"reliable"``; empty where it is.
+    interval : (float, float)
+        95 % interval of `time`, s, with the spread between windows.
     windows : tuple of (float, float)
-        Where it was estimated, s from the start of the log, the one that promises most first.
-    promise : float
-        Standard error of delay and lag together that the first window promises, s.
-    estimate : DelayEstimate or None
-        Gain, delay and one or two lags, or a pair of complex poles, over all windows together; None
-        where it was refused.
-    refusal : str
-        Why there is no estimate; empty where there is one.
+        Where it was estimated, s from the start of the log.
+    estimate : PlantEstimate or None
+        The plant that the windows show together; None where there is no time.
+    times : tuple of WindowTime
+        The time of each window by itself.
+    spread : Spread or None
+        What these say together; None of fewer than two.
     cost : GainCost or None
         Gains of a proportional controller for the estimated vehicle.
-    between : {"held", "lines"} or None
-        Whether commands are known to hold between the rows of the log, or to move.
+    sampling : Sampling or None
+        How commands pass between the rows of the log.
     """
 
     loop: str
     axis: str
     kind: str
     command: Command
-    windows: tuple[tuple[float, float], ...]
-    promise: float
-    estimate: DelayEstimate | None
-    refusal: str = ""
+    verdict: Verdict
+    reason: str
+    interval: tuple[float, float] = (math.nan, math.nan)
+    windows: tuple[tuple[float, float], ...] = ()
+    estimate: PlantEstimate | None = None
+    times: tuple[WindowTime, ...] = ()
+    spread: Spread | None = None
     cost: GainCost | None = None
-    between: Between | None = None
+    sampling: Sampling | None = field(default=None, repr=False)
 
     @property
     def name(self) -> str:
         """Such as ``"roll rate, setpoint to response"``."""
         return f"{self.loop}, {self.command} to response"
 
-    def sum_of(self) -> tuple[float, float, tuple[float, float]]:
-        """Delay and lag together, the error that its interval amounts to, and that, s.
+    @property
+    def time(self) -> float:
+        """From the command to the response, delay and lags together, s; NaN if there is none."""
+        return math.nan if self.estimate is None else self.estimate.delay_plus_lag
 
-        The interval is the 95 % one; the error a standard error, (high - low)/3.92.
-        """
-        if self.estimate is None:
-            raise ValueError(f"{self.name} was refused: {self.refusal}")
-        low, high = self.estimate.ci(0.95, "delay+lag")
-        return self.estimate.delay_plus_lag, (high - low) / (2.0 * TWO_SIDED), (low, high)
+    @property
+    def stderr(self) -> float:
+        """The standard error that the interval amounts to, s."""
+        return (self.interval[1] - self.interval[0]) / TWO_SIDED
+
+    def doubted(self, why: str) -> LoopLatency:
+        """The time as an indication, for this reason too."""
+        reason = f"{self.reason}; {why}" if self.reason else why
+        return replace(self, verdict="indication", reason=reason)
 
     def headline(self) -> str:
         """The time in one line."""
-        if self.estimate is None:
-            return f"none: {self.name}, {self.refusal}"
-        value, error, (low, high) = self.sum_of()
-        verdict = self.estimate.verdict
-        known = f"{verdict}: {self.name} {claimed(verdict, value, error, 's')}"
-        if verdict != "reliable":
-            return f"{known}, {NOT_CLAIMED}"
-        return f"{known} (95 %: {between(low, high, error, 's')})"
+        if self.verdict == "none":
+            return f"none: {self.name}, {self.reason}"
+        known = f"{self.verdict}: {self.name} {self.shown()}"
+        return known if self.verdict == "reliable" else f"{known}, {NOT_CLAIMED}"
+
+    def shown(self) -> str:
+        """The time with its interval where that is claimed to hold."""
+        if self.verdict == "none":
+            return "—"
+        value = claimed(self.verdict, self.time, self.stderr, "s")
+        if self.verdict != "reliable":
+            return value
+        return f"{value} (95 %: {ends_of(*self.interval, self.stderr, 's')})"
 
     def to_dict(self) -> dict[str, Any]:
-        """The time as plain values for JSON.
-
-        Of the numbers of the estimate, only delay and lag together have an interval besides their
-        standard errors: `estimate` has the others, and some take long.
-        """
-        fit = self.estimate
-        names = ("loop", "axis", "kind", "command", "windows", "promise", "refusal")
-        results = {
-            "estimate": None if fit is None else fit.to_dict(intervals=("delay+lag",)),
-            "cost": None if self.cost is None else self.cost.to_dict(),
-        }
-        return plain_fields({name: getattr(self, name) for name in names} | results)
+        """The time as plain values for JSON."""
+        names = ("loop", "axis", "kind", "command", "verdict", "reason", "time", "windows")
+        parts = {
+            name: None if part is None else part.to_dict()
+            for name, part in (
+                ("estimate", self.estimate), ("spread", self.spread), ("cost", self.cost)
+            )
+        }  # fmt: skip
+        known = {"interval_95": self.interval if self.verdict == "reliable" else None}
+        each = {"times": [vars(one) for one in self.times]}
+        return plain_fields({name: getattr(self, name) for name in names} | known | each | parts)
 
 
 def relation_of(
@@ -126,167 +152,115 @@ def relation_of(
     axis: str,
     kind: str,
     command: Command,
-    windows: list[Window],
-    between: Between | None = None,
-    held: Callable[[Window], Recording] | None = None,
-    hidden: float = 0.0,
-    unsure: float = 0.0,
-    others: Sequence[Window] = (),
+    windows: Sequence[Window],
+    part: Callable[[float, float], Recording],
+    sampling: Sampling | None = None,
+    integrates: bool | None = None,
 ) -> LoopLatency:
-    """Fit the plant of a loop to its windows, or say why that tells nothing.
+    """The plant of a loop over its windows, or why they do not show one.
 
-    Where it is not known whether commands hold or move between rows, `held` gives a window with
-    commands that hold; the likelier of the two is taken. A time below `hidden`, s, is not reliable,
-    nor one whose interval is narrow against `unsure`, s, by which commands may hold longer or less,
-    nor one that `others` contradict.
+    `part` gives the recording from one time to another, s.
     """
-    ends = _ends_of(windows)
-    told = [one for one in windows if one.tells]
-    promise = windows[0].promise if windows else float("inf")
-
-    def refused(why: str) -> LoopLatency:
-        return LoopLatency(loop, axis, kind, command, ends, promise, None, why)
-
+    chosen = best_of(windows)
+    nothing = LoopLatency(loop, axis, kind, command, "none", "", sampling=sampling)
     if not windows:
-        return refused("it is never followed for long enough")
-    if not told:
-        return refused(_says_nothing(windows[0], command))
+        return replace(nothing, reason="it is never followed for long enough")
+    if not chosen:
+        return replace(nothing, reason=f"the {command} does not move")
     try:
-        fit = _fitted(told, command == "actuator", held, others)
-    except DeadtimeError as error:
-        return refused(str(error).partition("; check ")[0])
-    if why := _no_answer(fit, told[0]):
-        return refused(why)
-    if fit.delay_plus_lag < hidden:
-        fit = fit.doubted(
-            f"the {command} moves between rows of the log by more than it shows, which hides times "
-            f"below {stated(hidden, 0.0, 's')}",
-        )
-    low, high = fit.ci(0.95, "delay+lag")
-    if unsure > WORTH * (high - low):
-        fit = fit.doubted(
-            "the log does not tell when commands changed between its rows, or how long each holds, "
-            f"which is worth {stated(unsure, 0.0, 's')} more or less",
-        )
-    cost = cost_of(fit, told[0].recording) if command == "actuator" else None
-    ends = _ends_of(told[: len(fit.runs)])
-    return LoopLatency(loop, axis, kind, command, ends, promise, fit, "", cost, between)
-
-
-def doubted_by_clocks(
-    found: LoopLatency, seen: list[Window], command: Stamped, response: Stamped
-) -> LoopLatency:
-    """The time as an indication, where both signals are stamped by clocks of their own.
-
-    `seen` are all windows that tell something, `command` and `response` names and stamps, s.
-    """
-    if found.estimate is None:
-        return found
-    why = why_two_clocks(found.estimate, seen, command, response)
-    return replace(found, estimate=found.estimate.doubted(why)) if why else found
-
-
-def _ends_of(windows: list[Window]) -> tuple[tuple[float, float], ...]:
-    """Start and stop of each window, s."""
-    return tuple((one.start, one.stop) for one in windows)
-
-
-def _no_answer(fit: DelayEstimate, window: Window) -> str:
-    """Why the fit is no answer of a vehicle to this command; empty if it may be one."""
-    # The interval: two lags that come out equal have no finite standard error.
-    low, high = fit.ci(0.95, "delay+lag")
-    value, error = fit.delay_plus_lag, (high - low) / (2.0 * TWO_SIDED)
-    if fit.gain is not None and fit.gain <= 0.0:
-        return f"the response moves against its command (gain {fit.gain:.3g})"
-    longest = LONGEST * (window.stop - window.start)
-    if value > longest:
-        return (
-            f"delay and lag together come out as {stated(value, error, 's')}, longer than the "
-            f"{longest:.3g} s that a window of {window.stop - window.start:.3g} s can tell"
-        )
-    if not np.isfinite(error) or error > max(value, OF_A_ROW * window.recording.sample_time):
-        return f"delay and lag together come out as {stated(value, error, 's')}: that says nothing"
-    return ""
-
-
-def _says_nothing(window: Window, command: str) -> str:
-    """Why the best window of a loop says nothing."""
-    if not np.isfinite(window.promise):
-        return f"the {command} does not move"
-    share = f"{100.0 * window.explained:.0f} % of the response follows the {command}"
-    promise = stated(window.time, window.promise, "s")
-    return f"too little moves: even in the best window {share}, which promises {promise}"
+        fit = _fitted([part(*ends) for ends in chosen], kind, integrates, sampling)
+    except (DeadtimeError, ValueError) as error:
+        return replace(nothing, reason=str(error).partition("; ")[0])
+    found = replace(
+        nothing, verdict=fit.verdict, reason=fit.reason, windows=tuple(chosen), estimate=fit
+    )
+    if fit.verdict == "none":
+        return replace(found, estimate=None)
+    found = _with_interval(found, windows)
+    if why := _no_answer(found):
+        return replace(found, verdict="none", reason=why, estimate=None)
+    cost = cost_of(fit, fit.recording) if command == "actuator" else None
+    return replace(found, cost=cost)
 
 
 def _fitted(
-    windows: list[Window],
-    integrates: bool,
-    held: Callable[[Window], Recording] | None,
-    others: Sequence[Window],
-) -> DelayEstimate:
-    """The plant that fits all windows, or the first of them where they contradict one another."""
-    first = max(0.5 * windows[0].time, windows[0].recording.sample_time)
-
-    def lagging(*lags: float) -> FactoredPlant:
-        return FactoredPlant(lags, integrator=integrates)
-
-    def tried(parts: list[Recording], plant: FactoredPlant) -> DelayEstimate:
-        names = ["delay", *(name for name in plant.parameters if name != "zero")]
-        loop = ControlLoop(plant, P(1.0))
-        return estimate_delay(parts, loop, method=METHOD, free=names)
-
-    def richer(parts: list[Recording], fit: DelayEstimate) -> DelayEstimate:
-        """The fit, or that with two lags, or a pair of poles, where one lag is not enough."""
-        if fit.verdict == "reliable" or LACKING not in fit.message:
-            return fit
-        found = {"1 lag": fit}
-        try:
-            found["2 lags"] = more = tried(parts, lagging(first, SECOND * first))
-            # A loop that is closed around a lag is of second order, and mostly oscillates.
-            if not (integrates or more.verdict == "reliable") and LACKING in more.message:
-                pair = with_pair(cast(FactoredPlant, more.loop.plant))
-                complex_poles = None if pair is None else tried(parts, pair)
-                # Noise takes the place of what a pair lacks, which least squares tells better.
-                if complex_poles is not None and complex_poles.verdict == "reliable":
-                    return complex_poles
-        except NotIdentifiableError:
-            pass
-        return found[likeliest(found)]
-
-    parts, beside = ([one.recording for one in some] for some in (windows, others))
-    fit, doubt = tried(parts[:1], lagging(first)), ""
-    if held is not None:
-        still = tried([held(windows[0])], lagging(first))
-        better = bic(fit) - bic(still)
-        if abs(better) < CLEARLY:
-            doubt = _either(fit, still)
-        if better > 0.0:
-            fit = still
-            parts, beside = ([held(one) for one in some] for some in (windows, others))
-    if doubt:
-        return fit.doubted(doubt)
-    fit = richer(parts[:1], fit)
-    # What the plant lacks in one window it lacks in all together.
-    if len(parts) > 1 and fit.verdict == "reliable":
-        try:
-            together = tried(parts, cast(FactoredPlant, fit.loop.plant))
-        except NotIdentifiableError:
-            return fit
-        reasons = together.reason.split("; ")
-        apart = [one.replace("recordings", "windows") for one in reasons if CONTRADICT in one]
-        fit = fit.doubted("; ".join(apart)) if apart else richer(parts, together)
-    if fit.verdict == "reliable" and (why := contradiction(fit, beside, METHOD)):
-        return fit.doubted(why)
-    return fit
-
-
-def _either(moving: DelayEstimate, still: DelayEstimate) -> str:
-    """What it is worth that commands hold or move between rows; empty if next to nothing."""
-    apart = abs(moving.delay_plus_lag - still.delay_plus_lag)
-    low, high = moving.ci(0.95, "delay+lag")
-    if apart < WORTH * (high - low):
-        return ""
-    return (
-        "the log does not tell whether commands hold or move between its rows, which is worth "
-        f"{stated(apart, 0.0, 's')}"
+    parts: Sequence[Recording], kind: str, integrates: bool | None, sampling: Sampling | None
+) -> PlantEstimate:
+    """The likeliest plant over all parts together."""
+    length = float(min(one.time[-1] - one.time[0] for one in parts))
+    longest = LONGEST * min(LENGTHS.get(kind, length), length)
+    known: dict[str, Any] = {}
+    if sampling is not None:
+        known = {"between": sampling.between, "hold": sampling.hold or None}
+    return estimate_delay(
+        parts,
+        closed_loop=integrates,
+        integrates=integrates,
+        largest_delay=longest,
+        **known,
     )
+
+
+def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency:
+    """The time with its interval: that of the fit, the spread, and what the log leaves unknown."""
+    fit = found.estimate
+    assert fit is not None
+    times = _alone(fit, windows)
+    spread = None
+    value = fit.delay_plus_lag
+    low, high = fit.ci(0.95, "delay+lag")
+    if len(times) > 1:
+        spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
+        fitted = sum(_is_in(one.at, found.windows) for one in times)
+        between = _reach(spread) / math.sqrt(max(1, fitted))
+        low = value - math.hypot(value - low, between)
+        high = value + math.hypot(high - value, between)
+    unsure = 0.0 if found.sampling is None else found.sampling.unsure
+    interval = (max(0.0, low - unsure), high + unsure)
+    return replace(found, interval=interval, times=times, spread=spread)
+
+
+def _is_in(time: float, windows: Sequence[tuple[float, float]]) -> bool:
+    return any(start <= time <= stop for start, stop in windows)
+
+
+def _reach(spread: Spread) -> float:
+    """How far the true time of one window may lie from the mean, s, at 95 %."""
+    from scipy.special import stdtrit
+
+    return spread.between * float(stdtrit(spread.count - 1, 0.975))
+
+
+def _alone(fit: PlantEstimate, windows: Sequence[Window]) -> tuple[WindowTime, ...]:
+    """The time of each window by itself, where it tells one."""
+    moving = sorted(windows, key=lambda one: one.movement, reverse=True)[:ALONE]
+    found = []
+    for one in sorted(moving, key=lambda one: one.start):
+        try:
+            alone = fit_alone(fit, one.recording)
+        except (DeadtimeError, ValueError):
+            continue
+        if alone.verdict == "none" or "delay+lag" not in alone.intervals:
+            continue
+        low, high = alone.ci(0.95, "delay+lag")
+        error = (high - low) / TWO_SIDED
+        if _says_something(alone.delay_plus_lag, error, one.recording):
+            middle = 0.5 * (one.start + one.stop)
+            found.append(WindowTime(middle, alone.delay_plus_lag, error, one.movement))
+    return tuple(found)
+
+
+def _says_something(value: float, error: float, part: Recording) -> bool:
+    return math.isfinite(error) and error < max(value, OF_A_ROW * part.sample_time)
+
+
+def _no_answer(found: LoopLatency) -> str:
+    """Why the fit is no answer of a vehicle to this command; empty if it may be one."""
+    fit = found.estimate
+    assert fit is not None
+    if fit.best.parameters["gain"] <= 0.0:
+        return f"the response moves against its command (gain {fit.best.parameters['gain']:.3g})"
+    if not _says_something(found.time, found.stderr, fit.recording):
+        value = stated(found.time, found.stderr, "s")
+        return f"delay and lag together come out as {value}: that says nothing"
+    return ""

@@ -1,240 +1,183 @@
-"""The windows of a loop that promise the most about its delay.
-
-In a window of length L the response y is compared with that of a plant with few numbers: gain,
-offset, trim, and a delay T that stands for delay and lag. The Cramér-Rao bound of T for residuals
-of variance v is
-
-    std(T) >= sqrt(v c / sum(d_i^2)),
-
-d the slope of the response with what gain, offset and trim explain taken out, and
-c = (1 + rho)/(1 - rho) for residuals of lag-1 autocorrelation rho, which are worth fewer rows.
-"""
+"""The parts of a loop that are fitted: those in which its command moves the most."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime.estimation import HeldResponse
-from deadtime.logs._log import LogLoop
-from deadtime.logs.latencies._controller import LENGTHS, Between, Command
+from deadtime.logs._log import Log, LogLoop
+from deadtime.logs._names import Kind, Windows
+from deadtime.logs._windows import outside, shared
+from deadtime.logs.latencies._commands import Command
 from deadtime.recordings import Recording
 
-#: Fewest and most rows of a window.
-FEWEST, MOST = 24, 6000
+#: Fewest rows of a window, most rows that are fitted together, and most runs of windows that they
+#: come from: more are surer and take longer.
+FEWEST, MOST, TOGETHER = 24, 1200, 3
 
-#: Shares of that length that are tried, and of its own by which one window comes after another.
-SIZES, SHIFT = (1.0, 0.5), 0.5
+#: Movement of a window, as a share of the largest, below which it ends a run.
+STILL = 0.1
 
-#: Parts that are looked at, those whose command moves the most.
-LOOKED_AT = 64
+#: Length of a window of each kind of loop, s.
+LENGTHS: dict[str, float] = {"rate": 4.0, "attitude": 8.0, "velocity": 12.0, "position": 20.0}
 
-#: Parts of a recording in which its time is compared.
-PARTS = 8
+#: Share of that length in which a response settles after commands that are not in the log.
+SETTLES = 0.05
 
-#: Delays and lags that are tried, in rows.
-TRIED = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-
-#: Longest time from command to response, as a share of the window.
+#: Longest time from command to response that is looked for, as a share of that length.
 LONGEST = 0.2
 
-#: Further windows that are used with the best, and by how much less they may promise.
-FURTHER, LESS = 2, 3.0
+#: Rows are averaged over this share of that length: more takes less time and rounds off the
+#: response.
+AVERAGED = 1e-3
 
-#: Windows that are compared with those.
-COMPARED = 2
+#: Most parts of a recording, and fewest rows of one.
+PARTS, ROWS_OF_A_PART = 8, 60
 
-#: A window says something if it promises the time to this share of itself, or of a row.
-SHARE, OF_A_ROW = 0.5, 2.0
-
-#: Size of a response, as a share of the command, that is rounding.
-TINY = 1e-12
-
-#: Share of the variance of the response that a command has to explain, beyond what noise would.
-EXPLAINED = 0.1
+#: Steps of this many usual periods within averaged rows are gaps.
+GAP = 1.5
 
 
 class Window(NamedTuple):
-    """A part of a loop's recording.
+    """A part of a loop.
 
     Attributes
     ----------
     start, stop : float
         s from the start of the log.
     recording : Recording
-        The part.
-    promise : float
-        Standard error of the time from command to response that the part promises, s.
-    time : float
-        That time, roughly, s.
-    explained : float
-        Share of the variance of the response that the command explains.
+        Its rows, averaged where they are many.
+    movement : float
+        Deviation of the command from a straight line.
+    segment : int
+        The segment of the log that it is a part of.
     """
 
     start: float
     stop: float
     recording: Recording
-    promise: float
-    time: float
-    explained: float
-
-    @property
-    def tells(self) -> bool:
-        """Whether the window says anything about the time."""
-        row = self.recording.sample_time
-        return self.explained > EXPLAINED and self.promise < max(SHARE * self.time, OF_A_ROW * row)
-
-    def is_apart(self, others: Sequence[Window]) -> bool:
-        """Whether the window shares no time with these."""
-        return all(self.stop <= other.start or self.start >= other.stop for other in others)
+    movement: float
+    segment: int = 0
 
 
-class _Shape(NamedTuple):
-    """The best of the tried responses: sum of squares left, time, gain, residuals, slope."""
+def windows_of(log: Log, loop: LogLoop, command: Command) -> list[Window]:
+    """All windows of a loop, in order, without the time after pauses of the log."""
+    told = loop.signals[command]
+    settles = SETTLES * LENGTHS[loop.kind]
+    pauses = [(low, high + settles) for low, high in sorted([*told.gaps, *log.gaps])]
+    segments = shared(list(loop.segments), outside(pauses))
+    found = []
+    for segment, ends in enumerate(segments):
+        for start, stop in _divided(*ends, LENGTHS[loop.kind]):
+            inside = (loop.response.time >= start) & (loop.response.time <= stop)
+            if np.count_nonzero(inside & np.isfinite(loop.response.values)) >= FEWEST:
+                part = window_of(loop.recording(start, stop, command=command), loop.kind)
+                found.append(part._replace(start=start, stop=stop, segment=segment))
+    return found
 
-    square: float
-    time: float
-    gain: float
-    left: Array
-    turn: Array
+
+def _divided(start: float, stop: float, length: float) -> Windows:
+    """A segment in equal parts of about some length, s."""
+    count = max(1, round((stop - start) / length))
+    return list(pairwise(np.linspace(start, stop, count + 1).tolist()))
 
 
-def seen_windows(loop: LogLoop, command: Command, between: Between | None) -> list[Window]:
-    """The windows with most movement, the one that promises most first; none without rows."""
-    parts = sorted(_parts(loop, command, between), key=_movement, reverse=True)
-    found = [window_of(part, command == "actuator") for part in parts[:LOOKED_AT]]
-    return sorted(found, key=lambda one: one.promise if one.tells else np.inf)
+def window_of(part: Recording, kind: Kind | None = None) -> Window:
+    """A recording as a window."""
+    told = part.command if part.command is not None else part.reference
+    line = np.polynomial.Polynomial.fit(part.time, told, 1)
+    moves = float(np.std(told - line(part.time)))
+    rows = part if kind is None else averaged(part, kind)
+    return Window(float(part.time[0]), float(part.time[-1]), rows, moves)
 
 
-def best_of(found: Sequence[Window]) -> list[Window]:
-    """The windows to fit."""
-    chosen = list(found[:1])
-    for one in found[1:]:
-        if one.is_apart(chosen) and one.tells and one.promise < LESS * chosen[0].promise:
-            chosen.append(one)
-        if len(chosen) > FURTHER:
+def averaged(part: Recording, kind: Kind) -> Recording:
+    """The recording with means of neighbouring rows of the output, where they are many.
+
+    The mean of the output over a time T is that at its middle but for its curvature: to
+    (omega T)²/24, and without a delay.
+    """
+    over = AVERAGED * LENGTHS[kind]
+    together = int(over / part.sample_time + 1e-6)
+    if together < 2 or part.sent is None:
+        return part
+    count = len(part) // together * together
+    rows = part.time[:count].reshape(-1, together)
+    whole = np.ptp(rows, axis=1) < GAP * (together - 1) * part.sample_time
+    mean = _mean(part.output[:count], together)[whole]
+    if mean.size < FEWEST:
+        return part
+    last = np.arange(together - 1, count, together)[whole]
+    return Recording(
+        rows.mean(axis=1)[whole],
+        part.reference[last],
+        mean,
+        units=part.units,
+        source=part.source,
+        sent=part.sent,
+    )
+
+
+def _mean(values: Array, together: int) -> Array:
+    return np.asarray(values.reshape(-1, together).mean(axis=1))
+
+
+def best_of(windows: Sequence[Window]) -> Windows:
+    """Runs of neighbouring windows to fit together, in order: start and stop of each, s.
+
+    Those that move the most, up to some number of rows.
+    """
+    least = STILL * max((one.movement for one in windows), default=0.0)
+    left = [k for k, one in enumerate(windows) if one.movement > least]
+    chosen: Windows = []
+    rows = MOST
+    while left and len(chosen) < TOGETHER:
+        runs = [run for run in _runs(windows, left, rows) if run]
+        if not runs:
             break
-    return chosen
+        best = max(runs, key=lambda run: sum(windows[k].movement ** 2 for k in run))
+        chosen.append((windows[best[0]].start, windows[best[-1]].stop))
+        rows -= sum(len(windows[k].recording) for k in best)
+        left = [k for k in left if k not in best]
+    if left and not chosen:
+        most = max(left, key=lambda k: windows[k].movement)
+        chosen = [(windows[most].start, windows[most].stop)]
+    return sorted(chosen)
 
 
-def others_of(found: Sequence[Window], chosen: Sequence[Window]) -> list[Window]:
-    """The windows beside those to fit that promise the most, which are to agree with them."""
-    apart: list[Window] = list(chosen)
-    for one in found:
-        if one.tells and one.is_apart(apart):
-            apart.append(one)
-    return apart[len(chosen) :][:COMPARED]
-
-
-def parts_of(recording: Recording, integrates: bool) -> list[Window]:
-    """Equal parts of a recording that tell something; none of a short one."""
-    start, stop = float(recording.time[0]), float(recording.time[-1])
-    edges = np.linspace(start, stop, PARTS + 1).tolist()
-    rows = np.searchsorted(recording.time, edges)
-    if np.min(np.diff(rows)) < FEWEST:
-        return []
-    found = [window_of(recording.window(*ends), integrates) for ends in pairwise(edges)]
-    return [one for one in found if one.tells]
+def _runs(windows: Sequence[Window], places: Sequence[int], most: int) -> list[list[int]]:
+    """From each of these windows on, as many neighbours as have so many rows together."""
+    runs = []
+    for first, place in enumerate(places):
+        run: list[int] = []
+        rows = 0
+        for k in places[first:]:
+            rows += len(windows[k].recording)
+            beside = k == place + len(run) and windows[k].segment == windows[place].segment
+            if not beside or rows > most:
+                break
+            run.append(k)
+        runs.append(run)
+    return runs
 
 
 def rows_of_a_window(loop: LogLoop) -> float:
     """About how many rows a window of this loop has."""
-    return min(LENGTHS[loop.kind] / loop.response.period, MOST)
+    return min(LENGTHS[loop.kind] / loop.response.period, 1.0 / AVERAGED)
 
 
-def _parts(loop: LogLoop, command: Command, between: Between | None) -> list[Recording]:
-    """Parts of the segments of a loop, as long as its kind asks for, half over one another."""
-    longest = min(LENGTHS[loop.kind], MOST * loop.response.period)
-    parts = []
-    for (start, stop), length in product(loop.segments, [size * longest for size in SIZES]):
-        shift = SHIFT * length
-        count = max(1, int(np.floor((stop - start - length) / shift + 1e-9)) + 1)
-        for k in range(count):
-            low = start + k * shift
-            # The last part of a segment takes what is left of it.
-            high = stop if k == count - 1 and stop - low < length + shift else low + length
-            inside = np.isfinite(loop.response.values) & (
-                (loop.response.time >= low) & (loop.response.time <= high)
-            )
-            if np.count_nonzero(inside) >= FEWEST:
-                parts.append(loop.recording(low, high, command=command, between=between))
-    return parts
-
-
-def _movement(part: Recording) -> float:
-    """Deviation of the command of a part from a straight line."""
-    return float(np.std(_without(trend_of(part.time), told_by(part))))
-
-
-def told_by(part: Recording) -> Array:
-    """What a recording was told on its rows: its command, or its reference where it has none."""
-    return part.reference if part.command is None else part.command
-
-
-def _without(basis: Array, values: Array) -> Array:
-    """What a basis leaves of values, along their last axis."""
-    return np.asarray(values - (values @ basis) @ basis.T)
-
-
-def window_of(part: Recording, integrates: bool) -> Window:
-    """A recording as a window, with what it says about the time from command to response."""
-    time, output = part.time, part.output
-    response = HeldResponse(*(part.sent or (time, told_by(part))))
-    row = part.sample_time
-    trend = trend_of(time)
-    moved = _without(trend, output)
-    power = float(moved @ moved)
-    best = _Shape(np.inf, 0.0, 0.0, moved, moved)
-    delays = np.array(TRIED)
-    times = time - delays[:, None] * row
-    for lag in TRIED:
-        path = response.at(times, lag * row)
-        shapes = _without(trend, path.value if integrates else path.rate)
-        sizes = np.linalg.norm(shapes, axis=1)
-        within = (delays + lag > 0.0) & ((delays + lag) * row < LONGEST * (time[-1] - time[0]))
-        moves = sizes > TINY * (1.0 + np.max(np.abs(path.rate), axis=1))
-        tried = np.flatnonzero(within & moves)
-        if tried.size == 0:
-            continue
-        gains = shapes[tried] @ moved / sizes[tried]
-        squares = power - gains**2
-        least = tried[np.argmin(squares)]
-        delay, size = float(delays[least]), float(sizes[least])
-        unit = shapes[least] / size
-        gain = float(unit @ moved)
-        left = moved - gain * unit
-        if float(left @ left) < best.square:
-            slope = path.rate[least]
-            if not integrates:
-                ahead, behind = (
-                    response.at(time - (delay + half) * row, lag * row).rate for half in (0.5, -0.5)
-                )
-                slope = (behind - ahead) / row
-            turn = _without(trend, slope) * (gain / size)
-            turn -= unit * float(unit @ turn)
-            best = _Shape(float(left @ left), (delay + lag) * row, gain / size, left, turn)
-    ends = float(time[0]), float(time[-1])
-    if best.gain == 0.0 or power == 0.0:
-        return Window(*ends, part, np.inf, 0.0, 0.0)
-    left, turn = best.left, best.turn
-    variance = variance_of(left)
-    information = float(turn @ turn)
-    promise = np.sqrt(variance / information) if information > 0.0 else np.inf
-    return Window(*ends, part, float(promise), best.time, 1.0 - best.square / power)
-
-
-def trend_of(time: Array) -> Array:
-    """Orthonormal columns of a constant and a line, shape (n, 2)."""
-    columns = np.stack([np.ones(time.size), time - time.mean()], axis=1)
-    return np.asarray(np.linalg.qr(columns)[0])
-
-
-def variance_of(left: Array) -> float:
-    """Variance of residuals, times the rows that are worth one because they are correlated."""
-    square = float(left @ left)
-    rho = float(np.clip((left[1:] @ left[:-1]) / max(square, 1e-300), 0.0, 0.999))
-    return square / left.size * (1.0 + rho) / (1.0 - rho)
+def parts_of(recording: Recording) -> tuple[Recording, list[Window]]:
+    """One recording, and equal parts of it, each with the commands before it."""
+    assert recording.command is not None
+    sent = recording.sent or (recording.time, recording.command)
+    whole = Recording(
+        recording.time, recording.reference, recording.output,
+        units=recording.units, source=recording.source, sent=sent,
+    )  # fmt: skip
+    count = min(PARTS, max(1, len(recording) // ROWS_OF_A_PART))
+    edges = np.linspace(recording.time[0], recording.time[-1], count + 1).tolist()
+    return whole, [window_of(whole.window(*ends)) for ends in pairwise(edges)]

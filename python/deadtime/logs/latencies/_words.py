@@ -1,53 +1,119 @@
-"""Estimates of a latency report in words."""
+"""The times of a log in words: one table, and each loop in full."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from deadtime._base.digits import stated
+from deadtime._base.digits import between, stated
 from deadtime._base.verdicts import claimed
-from deadtime.estimation import DelayEstimate, unit_of
+from deadtime.logs.latencies._budget import Stage
 from deadtime.logs.latencies._relation import LoopLatency
 
+if TYPE_CHECKING:
+    from deadtime.logs.latencies._latency import Latency
 
-def numbers_of(fit: DelayEstimate) -> list[str]:
-    """Every number of the fitted plant, with its standard error."""
-    single = sum(name.startswith("lag") for name in fit.free) == 1
-    found = []
-    for name in fit.free:
-        value, error = fit._value(name), fit.stderr[name]
-        if not 0.0 < error < abs(value):
-            # Two equal lags, and a number at its bound, have no such error but an interval.
-            low, high = fit.ci(0.95, name)
-            error = (high - low) / 3.92
-        shown = "lag" if single and name == "lag_1" else name.replace("_", " ")
-        found.append(f"{shown} {claimed(fit.verdict, value, error, unit_of(name))}")
-    return found
+#: Most rows of the table, and most lines below it.
+ROWS, BELOW = 15, 5
+
+#: Heads of the table.
+HEADS = ("loop", "from", "time", "95 %", "verdict", "windows", "well damped", "flown")
+
+
+def row_of(one: LoopLatency) -> tuple[str, ...]:
+    """A loop in the table of times."""
+    if one.verdict == "none":
+        return (one.loop, one.command, "—", "", "none", "", "", "")
+    reliable = one.verdict == "reliable"
+    time = claimed(one.verdict, one.time, one.stderr, "s")
+    ends = between(*one.interval, one.stderr, "s") if reliable else ""
+    return (one.loop, one.command, time, ends, one.verdict, str(len(one.times)), *_gains(one))
+
+
+def _gains(one: LoopLatency) -> tuple[str, str]:
+    """The well damped gain, and the one that is flown."""
+    cost = one.cost
+    if cost is None:
+        return "", ""
+    low, high = cost.well_damped_ci
+    flown = "" if cost.flown is None else f"{cost.flown:.3g}"
+    return claimed(one.verdict, cost.well_damped, 0.25 * (high - low)), flown
+
+
+def shown_in_table(loops: Sequence[LoopLatency]) -> list[LoopLatency]:
+    """The loops of the table: those with a time first where there are too many."""
+    if len(loops) <= ROWS:
+        return list(loops)
+    order = ("reliable", "indication", "none")
+    best = sorted(range(len(loops)), key=lambda k: (order.index(loops[k].verdict), k))[:ROWS]
+    return [loops[k] for k in sorted(best)]
+
+
+def table_of(found: Latency) -> list[str]:
+    """One line a loop, and below it what is most worth knowing."""
+    rows = [HEADS, *(row_of(one) for one in shown_in_table(found.loops))]
+    used = [k for k in range(len(HEADS)) if any(row[k] for row in rows[1:])]
+    widths = {k: max(len(row[k]) for row in rows) for k in used}
+    lines = ["  ".join(f"{row[k]:<{widths[k]}}" for k in used).rstrip() for row in rows]
+    return [*lines, "", *below(found)]
+
+
+def below(found: Latency) -> list[str]:
+    """At most five lines: what is most worth knowing, and what to do to know more."""
+    lines = []
+    if (left := len(found.loops) - ROWS) > 0:
+        lines.append(f"{left} more loops: --verbose")
+    for verdict in ("indication", "none"):
+        alike = [one for one in found.loops if one.verdict == verdict]
+        if alike:
+            first, more = alike[0], len(alike) - 1
+            also = f" ({more} more: --verbose)" if more else ""
+            lines.append(f"{verdict}: {first.loop} from {first.command}: {first.reason}{also}")
+    lines += found.advice
+    return lines[:BELOW]
+
+
+def in_full(one: LoopLatency, stages: Sequence[Stage] = ()) -> list[str]:
+    """The time of a loop, what it is made of, what makes it doubtful, and what it costs."""
+    if one.estimate is None:
+        return [one.headline()]
+    lines = [one.headline(), *(f"  {words}" for words in said_of(one))]
+    if one.command == "actuator":
+        lines += [f"  {stage.line()}" for stage in stages if stage.part]
+    return lines
 
 
 def said_of(one: LoopLatency) -> list[str]:
-    """The time of a loop that was not refused, what it is made of, doubts, and what it costs."""
+    """What there is to say about a time, a sentence each."""
     fit = one.estimate
     assert fit is not None
-    said = [one.headline(), ", ".join(numbers_of(fit))]
-    if fit.verdict != "reliable":
-        said.append(f"not reliable: {fit.reason}")
+    said = [f"{fit.best.in_words()}, dead time {claimed(one.verdict, fit.delay, _error(one), 's')}"]
+    if one.verdict != "reliable":
+        said.append(f"not reliable: {one.reason}")
+    if one.spread is not None:
+        said.append(one.spread.line())
     if one.cost is not None:
         said.append(cost_in_words(one))
     return said
+
+
+def _error(one: LoopLatency) -> float:
+    """A quarter of the interval of the dead time."""
+    assert one.estimate is not None
+    low, high = one.estimate.ci(0.95, "delay")
+    return 0.25 * (high - low)
 
 
 def cost_in_words(one: LoopLatency) -> str:
     """What delay and lag cost in gain, in a sentence."""
     cost = one.cost
     assert cost is not None
-    assert one.estimate is not None
-    verdict = one.estimate.verdict
     half = 0.25 * (cost.largest_ci[1] - cost.largest_ci[0])
     damped = 0.25 * (cost.well_damped_ci[1] - cost.well_damped_ci[0])
     text = (
-        f"a proportional gain is stable up to {claimed(verdict, cost.largest, half)} and well "
-        f"damped (Ms 1.7) up to {claimed(verdict, cost.well_damped, damped)}"
+        f"a proportional gain is stable up to {claimed(one.verdict, cost.largest, half)} and well "
+        f"damped (Ms 1.7) up to {claimed(one.verdict, cost.well_damped, damped)}"
     )
     if cost.flown is not None:
         text += f"; {cost.flown:.3g} is flown"
