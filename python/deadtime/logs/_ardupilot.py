@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from deadtime.logs._ardupilot_modes import HORIZONTAL, UNCONTROLLED, VERTICAL
+from deadtime.logs._ardupilot_units import unit_of_rate
+from deadtime.logs._ardupilot_vehicles import FILTERED, injected, plane, rover
 from deadtime.logs._conditions import closed_where, in_modes, in_the_air, not_in_modes, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, LoopNames, Signal
 from deadtime.logs._rotations import heading
 
-DEGREE = np.pi / 180.0
+#: The message of a controller is taken where it has this many times the rows of RATE, because its
+#: setpoint is the one behind a filter.
+DENSER = 2
 
 ARMED = Condition(state("armed", "state", lambda values: values > 0), "the vehicle is disarmed")
 IN_THE_AIR = Condition(
@@ -33,16 +35,21 @@ AXES = (("roll", "R", "Roll"), ("pitch", "P", "Pitch"), ("yaw", "Y", "Yaw"))
 DOWN = "downwards to upwards"
 
 
-def _inner_loops(rate: str) -> list[LoopNames]:
+def _inner_loops(contents: LogContents) -> list[LoopNames]:
     """Rate and attitude of each axis; the yaw in ATT jumps at north."""
     rates, angles = [], []
     for axis, letter, column in AXES:
-        asked = Signal("RATE", (f"{letter}Des",), rate)
+        unit = unit_of_rate(contents, axis, "RATE", letter, "deg/s")
+        asked, came = Signal("RATE", (f"{letter}Des",), unit), Signal("RATE", (letter,), unit)
+        pid = f"PID{letter}"
+        unit = unit_of_rate(contents, axis, pid, "Act", "rad/s")
+        fast = Signal(pid, ("Tar",), unit, rule=FILTERED), Signal(pid, ("Act",), unit)
+        setpoint, response = [asked, fast[0]], [came, fast[1]]
+        if _denser(contents, pid, "RATE"):
+            setpoint, response = setpoint[::-1], response[::-1]
         rates.append(
             LoopNames(
-                f"{axis} rate", axis, "rate",
-                setpoint=(asked,),
-                response=(Signal("RATE", (letter,), rate),),
+                f"{axis} rate", axis, "rate", setpoint, response,
                 actuator=(Signal("RATE", (f"{letter}Out",)),),
                 conditions=(ARMED, IN_THE_AIR, CONTROLLED),
             )
@@ -58,6 +65,14 @@ def _inner_loops(rate: str) -> list[LoopNames]:
             )
         )  # fmt: skip
     return [*rates, *angles]
+
+
+def _denser(contents: LogContents, topic: str, other: str) -> bool:
+    """Whether a topic that has both signals is logged far more often than another."""
+    found, slow = contents.topics.get(topic), contents.topics.get(other)
+    if found is None or not {"Tar", "Act"} <= set(found.columns):
+        return False
+    return slow is None or found.time.size > DENSER * slow.time.size
 
 
 def _horizontal(axis: str, k: int) -> list[LoopNames]:
@@ -113,29 +128,23 @@ def _vertical() -> list[LoopNames]:
     return [speed, altitude]
 
 
-def _unit_of_rates(contents: LogContents) -> str:
-    """Unit of the messages RATE: firmware of 2014 and 2015 logs hundredths of a degree.
-
-    Logs without units of their own are told apart by the gyroscope, which is in rad/s.
-    """
-    rate, gyro = contents.topics.get("RATE"), contents.topics.get("IMU")
-    if rate is None or gyro is None or "R" not in rate.columns or "GyrX" not in gyro.columns:
-        return "deg/s"
-    logged, measured = np.nanstd(rate.columns["R"]), np.nanstd(gyro.columns["GyrX"])
-    return "cdeg/s" if logged * DEGREE > 10.0 * measured else "deg/s"
-
-
 KEY_PARAMETERS = (
     "ATC_RAT_*_[PID]", "ATC_RAT_*_FF", "ATC_RAT_*_FLT[TED]", "ATC_ANG_*_P", "ATC_INPUT_TC",
     "ATC_RATE_*_MAX", "RATE_*_[PID]", "STB_*_P", "PSC_*_[PID]", "PSC_*_FLT[TED]", "PSC_POSXY_P",
     "THR_ACCEL_[PID]", "THR_RATE_P", "THR_ALT_P", "INS_GYRO_FILTER", "INS_ACCEL_FILTER",
-    "INS_HNTCH_*", "INS_MPU6K_FILTER", "SCHED_LOOP_RATE", "FSTRATE_ENABLE", "MOT_SPIN_*",
-    "MOT_*_EXPO", "MOT_SLEW_*_TIME", "MOT_PWM_TYPE", "LOG_BITMASK",
+    "RLL_RATE_[PID]", "PTCH_RATE_[PID]", "RLL2SRV_*", "PTCH2SRV_*", "Q_A_RAT_*_[PID]",
+    "ATC_STR_RAT_*", "ATC_SPEED_[PID]", "INS_HNTCH_*", "INS_MPU6K_FILTER", "SCHED_LOOP_RATE",
+    "FSTRATE_ENABLE", "MOT_SPIN_*", "MOT_*_EXPO", "MOT_SLEW_*_TIME", "MOT_PWM_TYPE", "LOG_BITMASK",
 )  # fmt: skip
 
 
 def names(contents: LogContents) -> AutopilotNames:
     """The loops of ArduPilot in the messages of all its versions since 2014."""
-    loops = _inner_loops(_unit_of_rates(contents))
-    loops += [*_horizontal("north", 0), *_horizontal("east", 1), *_vertical()]
+    vehicle = contents.vehicle.partition(" ")[0]
+    places = [*_horizontal("north", 0), *_horizontal("east", 1), *_vertical()]
+    if vehicle == "Rover":
+        return AutopilotNames([*rover(ARMED), *places], KEY_PARAMETERS)
+    if vehicle == "Plane":
+        return AutopilotNames([*plane(contents, (ARMED, IN_THE_AIR)), *places], KEY_PARAMETERS)
+    loops = [*_inner_loops(contents), *places, *injected((ARMED, IN_THE_AIR))]
     return AutopilotNames(loops, KEY_PARAMETERS)

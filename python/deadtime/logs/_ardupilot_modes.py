@@ -19,12 +19,33 @@ PLANE = {
 }  # fmt: skip
 
 ROVER = {
-    0: "MANUAL", 1: "ACRO", 3: "STEERING", 4: "HOLD", 5: "LOITER", 6: "FOLLOW", 7: "SIMPLE",
-    10: "AUTO", 11: "RTL", 12: "SMART_RTL", 15: "GUIDED", 16: "INITIALISING",
+    0: "MANUAL", 1: "ACRO", 2: "LEARNING", 3: "STEERING", 4: "HOLD", 5: "LOITER", 6: "FOLLOW",
+    7: "SIMPLE", 8: "DOCK", 9: "CIRCLE", 10: "AUTO", 11: "RTL", 12: "SMART_RTL", 15: "GUIDED",
+    16: "INITIALISING",
+}  # fmt: skip
+
+SUB = {
+    0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 7: "CIRCLE", 9: "SURFACE",
+    16: "POSHOLD", 19: "MANUAL", 20: "MOTOR_DETECT", 21: "SURFTRAK",
 }  # fmt: skip
 
 #: Modes in which no controller sets the attitude.
-UNCONTROLLED = frozenset({"MANUAL", "TURTLE", "INITIALISING"})
+UNCONTROLLED = frozenset({"MANUAL", "TURTLE", "INITIALISING", "MOTOR_DETECT"})
+
+#: Modes of a plane that set its roll and pitch, and those of a QuadPlane that set the attitude of
+#: its rotors, or their rates.
+PLANE_ANGLES = frozenset({
+    "AUTO", "AUTOTUNE", "AVOID_ADSB", "CIRCLE", "CRUISE", "FBWA", "FBWB", "GUIDED", "LOITER", "RTL",
+    "STABILIZE", "TAKEOFF", "THERMAL",
+})  # fmt: skip
+Q_ANGLES = frozenset({"QAUTOTUNE", "QHOVER", "QLAND", "QLOITER", "QRTL", "QSTABILIZE"})
+Q_RATES = Q_ANGLES | {"QACRO"}
+
+#: Modes of a rover that set its turn rate and its speed.
+STEERED = frozenset({
+    "ACRO", "AUTO", "CIRCLE", "DOCK", "FOLLOW", "GUIDED", "LOITER", "RTL", "SIMPLE", "SMART_RTL",
+    "STEERING",
+})  # fmt: skip
 
 #: Modes that close the horizontal loops, and those that close the vertical ones.
 HORIZONTAL = frozenset({
@@ -33,5 +54,5 @@ HORIZONTAL = frozenset({
     "QLAND", "QRTL",
 })  # fmt: skip
 VERTICAL = (HORIZONTAL - {"POSITION"}) | {
-    "ALT_HOLD", "SPORT", "AUTOTUNE", "GUIDED_NOGPS", "FLOWHOLD", "QHOVER",
+    "ALT_HOLD", "SPORT", "AUTOTUNE", "GUIDED_NOGPS", "FLOWHOLD", "QHOVER", "SURFACE", "SURFTRAK",
 }  # fmt: skip

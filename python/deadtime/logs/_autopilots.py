@@ -12,6 +12,7 @@ TABLES = {
     "PX4": "_px4",
     "ArduPilot": "_ardupilot",
     "Betaflight": "_betaflight",
+    "Cleanflight": "_betaflight",
     "INAV": "_betaflight",
     "Crazyflie": "_crazyflie_loops",
 }

@@ -1,4 +1,4 @@
-"""Loops of Betaflight and INAV in their Blackbox logs."""
+"""Loops of Betaflight, Cleanflight and INAV in their Blackbox logs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from deadtime.logs._blackbox_modes import INAV
 from deadtime.logs._conditions import closed_where, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, Kind, LoopNames, Signal
+from deadtime.logs._sticks import curve_of_head, has_rates, is_successor, setpoint_of_controller
 
 
 def _has_bit(*bits: int) -> Callable[[Array], Mask]:
@@ -49,12 +50,28 @@ def _controller(axis: int) -> tuple[Signal, ...]:
     )
 
 
-def _rate(name: str, axis: int, setpoint: str, conditions: tuple[Condition, ...]) -> LoopNames:
+def _asked(axis: int, contents: LogContents) -> tuple[Signal, ...]:
+    """The setpoint of a rate, or in a log without it what the sticks ask for."""
+    stick = f"rcCommand[{axis}]"
+    logged = Signal("main", (f"setpoint[{axis}]",), "deg/s")
+    if has_rates(contents.firmware, contents.parameters):
+        derive = curve_of_head(contents.parameters, axis)
+        rule = "to deg/s by the rates of the head"
+        return logged, Signal("main", (stick,), "deg/s", derive=derive, rule=rule)
+    columns = (stick, f"gyroADC[{axis}]", f"axisP[{axis}]")
+    rule = "to deg/s by the controller's term P"
+    derived = Signal("main", columns, "deg/s", derive=setpoint_of_controller, rule=rule)
+    return logged, derived
+
+
+def _rate(
+    name: str, axis: int, setpoint: tuple[Signal, ...], conditions: tuple[Condition, ...]
+) -> LoopNames:
     return LoopNames(
         name=f"{name} rate",
         axis=name,
         kind="rate",
-        setpoint=(Signal("main", (f"{setpoint}[{axis}]",), "deg/s"),),
+        setpoint=setpoint,
         response=(Signal("main", (f"gyroADC[{axis}]",), "deg/s"),),
         actuator=_controller(axis),
         conditions=conditions,
@@ -102,11 +119,29 @@ KEY_PARAMETERS = (
 )  # fmt: skip
 
 
+def _conditions(contents: LogContents) -> tuple[Condition, ...]:
+    """When the sticks set the rates; those of a log with setpoints are followed in every mode."""
+    main, bits = contents.topics.get("main"), (1, 2)
+    armed: tuple[Condition, ...] = (ARMED,)
+    if contents.autopilot == "Cleanflight" and not is_successor(contents.firmware):
+        # Its flags are those of modes alone, and it logs while it is armed.
+        armed, bits = (), (0, 1)
+    if main is not None and "setpoint[0]" in main.columns:
+        return armed
+    angles = _has_bit(*bits)
+    sticks = state("slow", "flightModeFlags", lambda flags: ~angles(flags))
+    return (*armed, Condition(sticks, "the sticks set angles, whose rates are not logged"))
+
+
 def names(contents: LogContents) -> AutopilotNames:
-    """Rates of both firmwares; velocities and positions where INAV navigates."""
+    """Rates of all; velocities and positions where INAV navigates."""
     axes = tuple(enumerate(("roll", "pitch", "yaw")))
-    if contents.autopilot == "Betaflight":
-        rates = [_rate(name, k, "setpoint", (ARMED,)) for k, name in axes]
+    if contents.autopilot != "INAV":
+        conditions = _conditions(contents)
+        rates = [_rate(name, k, _asked(k, contents), conditions) for k, name in axes]
         return AutopilotNames(rates, KEY_PARAMETERS)
-    rates = [_rate(name, k, "axisRate", (ARMED, CONTROLLED)) for k, name in axes]
+    rates = [
+        _rate(name, k, (Signal("main", (f"axisRate[{k}]",), "deg/s"),), (ARMED, CONTROLLED))
+        for k, name in axes
+    ]
     return AutopilotNames([*rates, *_translations()], KEY_PARAMETERS)

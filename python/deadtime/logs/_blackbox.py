@@ -1,4 +1,4 @@
-"""Read Blackbox logs of Betaflight and INAV."""
+"""Read Blackbox logs of Betaflight, Cleanflight and INAV."""
 
 from __future__ import annotations
 
@@ -22,11 +22,15 @@ Integers = NDArray[np.int32]
 
 #: Fields that a Betaflight log of high resolution holds ten times as large.
 FINE = re.compile(r"(gyroADC|gyroUnfilt|rcCommand)\[\d\]|setpoint\[[012]\]")
+#: A scale of the gyroscope below this is not one in deg/s, whose least is that of 16 bits.
+LEAST_SCALE = 1e-4
+
+COMMIT = re.compile("[0-9a-f]{7,40}")
 GYRO = re.compile(r"(gyroADC|gyroUnfilt)\[\d\]")
 
 
 def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> LogContents:
-    r"""Read a Blackbox log of Betaflight or INAV.
+    r"""Read a Blackbox log of Betaflight, Cleanflight or INAV.
 
     Logs of data version 2 define their fields themselves. Versions whose fields, scales and modes
     are known: Betaflight 4.2 to 4.6 and 2025.12, INAV 5 to 8. Those of other versions are read by
@@ -133,8 +137,7 @@ def _read_flight(log: bytes, number: int) -> _Flight:
 def _contents(flight: _Flight, remarks: tuple[str, ...]) -> LogContents:
     head, frames, time = flight.head, flight.frames, flight.time
     firmware = head.text("Firmware revision")
-    kind = re.match("(Betaflight|INAV) ", firmware, re.IGNORECASE)
-    autopilot = {"betaflight": "Betaflight", "inav": "INAV"}[kind[1].lower()] if kind else ""
+    autopilot = _autopilot(firmware, head.text("Firmware type"))
     topics = {"main": Topic(time, _columns(flight, "I", frames.main))}
     modes: tuple[tuple[float, str], ...] = ()
     if frames.slow.size:
@@ -159,6 +162,17 @@ def _contents(flight: _Flight, remarks: tuple[str, ...]) -> LogContents:
     )
 
 
+def _autopilot(firmware: str, kind: str) -> str:
+    """The firmware's name; in a head without it the type, which its successors left as it was."""
+    found = re.match("(Betaflight|Cleanflight|INAV) ", firmware, re.IGNORECASE)
+    if found is None:
+        # A commit alone stands where the first versions of Cleanflight name themselves.
+        return "Cleanflight" if kind == "Cleanflight" and COMMIT.fullmatch(firmware) else ""
+    return {"betaflight": "Betaflight", "cleanflight": "Cleanflight", "inav": "INAV"}[
+        found[1].lower()
+    ]
+
+
 def _gaps(flight: _Flight) -> tuple[tuple[float, float], ...]:
     """Where iterations are missing that the firmware was told to log."""
     shape = layout(flight.head)
@@ -174,8 +188,8 @@ def _remarks(flight: _Flight, autopilot: str) -> Iterator[str]:
     frames = flight.frames
     if not autopilot:
         yield (
-            f'The firmware "{flight.head.text("Firmware revision")}" is neither Betaflight nor '
-            "INAV: its fields are read as the head defines them."
+            f'The firmware "{flight.head.text("Firmware revision")}" is neither Betaflight, '
+            "Cleanflight nor INAV: its fields are read as the head defines them."
         )
     if frames.damaged:
         yield f"The log is damaged at {frames.damaged} places; what stands there is left out."
@@ -218,7 +232,9 @@ def _columns(flight: _Flight, letter: str, table: Integers) -> Columns:
 def _scales(head: Head) -> dict[str, float]:
     """By what the columns are multiplied that are not as the log holds them."""
     fine = 0.1 if head.numbers.get("blackbox_high_resolution") == 1.0 else 1.0
-    gyro = head.numbers.get("gyro_scale", 1.0)
+    gyro = head.numbers.get("gyro_scale", head.numbers.get("gyro.scale", 1.0))
+    if 0.0 < gyro < LEAST_SCALE:
+        gyro *= 1e6 * 180.0 / np.pi  # Baseflight's is in rad/µs
     return {
         name: (fine if FINE.fullmatch(name) else 1.0) * (gyro if GYRO.fullmatch(name) else 1.0)
         for name in head.list("Field I name")

@@ -24,7 +24,7 @@ def state(topic: str, column: str, holds: Callable[[Array], Mask]) -> Told:
         found = contents.topics.get(topic)
         if found is None or column not in found.columns:
             return None
-        rows = increasing(found.time)
+        rows = increasing(found.time, last=True)
         if not rows.any():
             return None
         return windows_of(found.time[rows], holds(np.asarray(found.columns[column])[rows]))
@@ -66,7 +66,7 @@ def in_modes(modes: Collection[str]) -> Told:
             return None
         time = np.array([at for at, _ in contents.modes])
         active = np.array([name in modes for _, name in contents.modes])
-        kept = increasing(time)
+        kept = increasing(time, last=True)
         return windows_of(time[kept], active[kept])
 
     return windows

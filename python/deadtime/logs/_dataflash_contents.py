@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections import ChainMap
 
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime._base.errors import RecordingError
-from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
+from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER, SUB
 from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._dataflash_messages import Messages
+from deadtime.logs._dataflash_vehicle import vehicle_of
 
 #: Numbers of events.
 ARMED, DISARMED, LANDED, FLYING = 10, 11, 18, 28
 
-#: The message that names vehicle and version.
-FIRMWARE = re.compile(r"(?:APM:|Ardu)?(?P<vehicle>Copter|Plane|Rover|Sub|Blimp\w*) V\S+.*")
-
-MODES = {"Copter": COPTER, "Plane": PLANE, "Rover": ROVER}
+MODES = {"Copter": COPTER, "Plane": PLANE, "Rover": ROVER, "Sub": SUB}
 
 
 def contents_of(form: str, source: str, messages: Messages, remarks: list[str]) -> LogContents:
@@ -35,18 +32,18 @@ def contents_of(form: str, source: str, messages: Messages, remarks: list[str]) 
             f"{source} begins as a DataFlash log, but holds no message whose format it tells"
         )
     texts = messages.texts("MSG", "Message")
-    firmware = next(filter(None, map(FIRMWARE.fullmatch, texts)), None)
-    vehicle = firmware["vehicle"] if firmware else ""
+    parameters = _parameters(messages)
+    vehicle, firmware, how = vehicle_of(messages, parameters)
     frame = next((text[6:].strip() for text in texts if text.startswith("Frame:")), "")
     return LogContents(
         format=form,
         autopilot="ArduPilot",
         vehicle=f"{vehicle} ({frame})" if vehicle and frame else vehicle or frame,
-        firmware=firmware[0] if firmware else "",
+        firmware=firmware,
         topics=ChainMap(_events(messages), messages),  # type: ignore[arg-type]
-        parameters=_parameters(messages),
+        parameters=parameters,
         modes=_modes(messages, vehicle),
-        remarks=tuple(remarks),
+        remarks=(*remarks, *filter(None, [how])),
     )
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._conditions import (
     closed_where,
@@ -20,6 +23,9 @@ AXES = ("roll", "pitch", "yaw")
 ANGLES = {"roll": roll_of, "pitch": pitch_of, "yaw": yaw_of}
 QUATERNION = ("q[0]", "q[1]", "q[2]", "q[3]")
 DEMANDED = ("q_d[0]", "q_d[1]", "q_d[2]", "q_d[3]")
+
+#: The topic of one gyroscope, whose axes are those of the board.
+GYRO = "sensor_gyro"
 
 #: ``vehicle_status.arming_state`` of an armed vehicle, in all versions.
 ARMED = 2
@@ -58,6 +64,7 @@ def _closed(flag: str, modes: frozenset[str]) -> tuple[Condition, ...]:
 
 
 def _rate(axis: str, k: int) -> LoopNames:
+    """The rate loop; of old logs without the vehicle's rate, what a gyroscope measures of it."""
     flagged = state("vehicle_control_mode", "flag_control_rates_enabled", _is_set)
     return LoopNames(
         name=f"{axis} rate",
@@ -67,6 +74,8 @@ def _rate(axis: str, k: int) -> LoopNames:
         response=(
             Signal("vehicle_angular_velocity", (f"xyz[{k}]",), "rad/s"),
             Signal("vehicle_attitude", (f"{axis}speed",), "rad/s"),
+            Signal("sensor_combined", (f"gyro_rad[{k}]",), "rad/s"),
+            Signal(GYRO, ("xyz"[k],), "rad/s"),
         ),
         actuator=(
             Signal("vehicle_torque_setpoint", (f"xyz[{k}]",)),
@@ -79,21 +88,22 @@ def _rate(axis: str, k: int) -> LoopNames:
 def _attitude(axis: str) -> LoopNames:
     flagged = state("vehicle_control_mode", "flag_control_attitude_enabled", _is_set)
     derive, rule = ANGLES[axis], f"{axis} of the quaternion"
+    turns: dict[str, Any] = {"derive": unwrapped, "rule": "without jumps of a turn"}
     return LoopNames(
         name=axis,
         axis=axis,
         kind="attitude",
         setpoint=(
             Signal("vehicle_attitude_setpoint", DEMANDED, "rad", derive=derive, rule=rule),
-            Signal(
-                "vehicle_attitude_setpoint", (f"{axis}_body",), "rad",
-                derive=unwrapped, rule="without jumps of a turn",
-            ),
+            Signal("vehicle_attitude_setpoint", (f"{axis}_body",), "rad", **turns),
         ),
-        response=(Signal("vehicle_attitude", QUATERNION, "rad", derive=derive, rule=rule),),
+        response=(
+            Signal("vehicle_attitude", QUATERNION, "rad", derive=derive, rule=rule),
+            Signal("vehicle_attitude", (axis,), "rad", **turns),
+        ),
         actuator=(Signal("vehicle_rates_setpoint", (axis,), "rad/s"),),
         conditions=(*FLYING, closed_where(first_told(flagged, not_in_modes({"Acro"})))),
-    )  # fmt: skip
+    )
 
 
 def _translation(
@@ -158,4 +168,11 @@ NAMES = AutopilotNames(
 
 def names(contents: LogContents) -> AutopilotNames:
     """The loops of PX4, the same in all its versions: the topics differ, and are alternatives."""
-    return NAMES
+    if not contents.parameters.get("SENS_BOARD_ROT"):
+        return NAMES
+    # The board is turned in the vehicle, and a gyroscope on it measures other axes.
+    loops = (
+        replace(loop, response=tuple(one for one in loop.response if one.topic != GYRO))
+        for loop in NAMES.loops
+    )
+    return replace(NAMES, loops=tuple(loops))

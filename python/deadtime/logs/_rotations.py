@@ -7,20 +7,31 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime.logs._names import Signal
 
+#: Least sum of squares of a quaternion, which is 1 to rounding; firmware logs zeros for one that is
+#: not set.
+SET = 0.5
+
+
+def _where_set(angle: Array, w: Array, x: Array, y: Array, z: Array) -> Array:
+    return np.where(w * w + x * x + y * y + z * z >= SET, angle, np.nan)
+
 
 def roll_of(w: Array, x: Array, y: Array, z: Array) -> Array:
     """Rotation about the forward axis."""
-    return np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    return _where_set(roll, w, x, y, z)
 
 
 def pitch_of(w: Array, x: Array, y: Array, z: Array) -> Array:
     """Rotation about the right axis, nose up."""
-    return np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    return _where_set(pitch, w, x, y, z)
 
 
 def yaw_of(w: Array, x: Array, y: Array, z: Array) -> Array:
     """Rotation about the downward axis, in one turn after another: it does not jump at pi."""
-    return unwrapped(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return unwrapped(_where_set(yaw, w, x, y, z))
 
 
 def heading(topic: str, column: str) -> Signal:

@@ -109,14 +109,16 @@ def _series(signal: Signal, topic: Topic, start: float) -> tuple[Series, int]:
     return series, int(kept.size - np.count_nonzero(kept))
 
 
-def increasing(time: Array) -> Mask:
+def increasing(time: Array, *, last: bool = False) -> Mask:
     """The most rows whose times increase strictly, with no pause of a day.
 
     One wrong time far ahead then takes no later rows with it, and one far behind no earlier ones.
+    Of rows with one time the first is kept, which is a measured value, or with `last` the last: of
+    states that change at one time it is the one that stays.
     """
     kept = np.isfinite(time)
     rows = np.flatnonzero(kept)
-    repeated = np.flatnonzero(np.diff(time[rows]) == 0.0) + 1
+    repeated = np.flatnonzero(np.diff(time[rows]) == 0.0) + (0 if last else 1)
     rows = np.delete(rows, repeated)
     if np.any(np.diff(time[rows]) <= 0.0):
         rows = rows[_longest(time[rows].tolist())]

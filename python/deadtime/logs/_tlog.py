@@ -42,6 +42,10 @@ PX4_MAIN = {1: 0, 2: 1, 3: 2, 5: 10, 6: 14, 7: 15}
 PX4_AUTO = {2: 17, 3: 4, 4: 3, 5: 5, 6: 18, 8: 19, 9: 20}
 AUTO = 4
 
+#: Fields with a time of the vehicle's clock: when a message was made, and when its values were
+#: measured, which may be long ago. The second tells the clock only where no message has the first.
+BOOT, MEASURED = "time_boot_ms", "time_usec"
+
 #: A clock of the vehicle that goes back by more than this, s, was started anew.
 RESTART = 10.0
 
@@ -73,6 +77,9 @@ def read_tlog(data: bytes, source: str) -> LogContents:
         raise RecordingError(
             f"{source} looks like a tlog, but no autopilot sends a HEARTBEAT in it"
         )
+    kind, pilot = (
+        int(_values(found, "HEARTBEAT", name, vehicle)[-1]) for name in ("type", "autopilot")
+    )
     remarks = []
     if packets.skipped:
         remarks.append(f"{packets.skipped} bytes of the file are no packet and are left out")
@@ -82,8 +89,6 @@ def read_tlog(data: bytes, source: str) -> LogContents:
         remarks.append(f"{damaged} packets with a wrong checksum are left out")
     found, clock = _one_session(found, vehicle, remarks, source)
     topics = _topics(found, vehicle, clock)
-    heartbeat = topics["HEARTBEAT"]
-    kind, pilot = (int(heartbeat.columns[name][-1]) for name in ("type", "autopilot"))
     autopilot = AUTOPILOTS.get(pilot, "")
     return LogContents(
         format="tlog",
@@ -92,7 +97,7 @@ def read_tlog(data: bytes, source: str) -> LogContents:
         firmware=_firmware(found, vehicle),
         topics=topics,
         parameters=_parameters(found, vehicle),
-        modes=_modes(heartbeat, autopilot, kind),
+        modes=_modes(topics.get("HEARTBEAT"), autopilot, kind),
         remarks=tuple(remarks),
         span=(float(clock[1][0]), float(clock[1][-1])),
         link=_link(data, packets, found, vehicle, dialect.mavlink_map),
@@ -126,21 +131,11 @@ def _one_session(
     RecordingError
         When no message of the vehicle has a time.
     """
-    places, ground, boot = [], [], []
-    for batch in found:
-        time = _boot_time(batch)
-        if time is not None:
-            rows = batch.senders().get(vehicle, np.empty(0, dtype=np.int64))
-            places.append(batch.places[rows])
-            ground.append(batch.ground[rows])
-            boot.append(time[rows])
-    at = np.concatenate([*places, np.empty(0, dtype=np.int64)])
+    at, received, sent = _clock_rows(found, vehicle, BOOT)
+    if not at.size:
+        at, received, sent = _clock_rows(found, vehicle, MEASURED)
     if not at.size:
         raise RecordingError(f"{source}: no message of the autopilot holds a time of its clock")
-    order = np.argsort(at, kind="stable")
-    at = at[order]
-    received = np.concatenate(ground)[order]
-    sent = np.concatenate(boot)[order]
     starts = np.flatnonzero(np.diff(sent) < -RESTART) + 1
     edges = np.concatenate(([0], starts, [at.size]))
     longest = int(np.argmax(np.diff(edges)))
@@ -157,15 +152,31 @@ def _one_session(
     return [batch for batch in found if batch.places.size], (received[order], np.sort(sent))
 
 
-def _boot_time(batch: Batch) -> Array | None:
-    """The vehicle's clock in these messages, s; None if they have none."""
-    names = batch.records.dtype.names or ()
-    if "time_boot_ms" in names:
-        return 1e-3 * batch.records["time_boot_ms"].astype(float)
-    if "time_usec" in names:
-        time = batch.records["time_usec"].astype(float)
-        return 1e-6 * time if time.size and time.max() < SINCE_1970 else None
-    return None
+def _clock_rows(
+    found: list[Batch], vehicle: Sender, field: str
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Places, times on the ground and times of the vehicle in all its messages with this field."""
+    places, ground, clock = [np.empty(0, dtype=np.int64)], [np.empty(0)], [np.empty(0)]
+    for batch in found:
+        rows, time = batch.senders().get(vehicle), _vehicle_time(batch, field)
+        if rows is not None and time is not None:
+            rows = rows[np.isfinite(time[rows])]
+            places.append(batch.places[rows])
+            ground.append(batch.ground[rows])
+            clock.append(time[rows])
+    at = np.concatenate(places)
+    order = np.argsort(at, kind="stable")
+    return at[order], np.concatenate(ground)[order], np.concatenate(clock)[order]
+
+
+def _vehicle_time(batch: Batch, field: str) -> Array | None:
+    """The vehicle's clock in these messages, s, NaN where it is not known; None without a field."""
+    if field not in (batch.records.dtype.names or ()):
+        return None
+    time = batch.records[field].astype(float)
+    unit = 1e-3 if field == BOOT else 1e-6
+    # A message without a time has 0, and GPS may tell that of the satellites.
+    return np.where((time > 0.0) & (time < SINCE_1970), unit * time, np.nan)
 
 
 def _link(
@@ -174,12 +185,9 @@ def _link(
     """The way of the vehicle's messages to the ground station; None where the log does not tell."""
     told = []
     for batch in found:
-        rows, time = batch.senders().get(vehicle), _boot_time(batch)
-        if (
-            rows is not None
-            and time is not None
-            and "time_boot_ms" in (batch.records.dtype.names or ())
-        ):
+        rows, time = batch.senders().get(vehicle), _vehicle_time(batch, BOOT)
+        if rows is not None and time is not None:
+            rows = rows[np.isfinite(time[rows])]
             told.append((rows.size, batch.name, time[rows], batch.ground[rows]))
     if not told:
         return None
@@ -239,8 +247,14 @@ def _topics(found: list[Batch], vehicle: Sender, clock: Clock) -> dict[str, Topi
 def _topic(batch: Batch, rows: NDArray[np.int64], own: bool, clock: Clock) -> Topic:
     """The messages of one type from one sender."""
     ground = batch.ground[rows]
-    time = _boot_time(batch) if own else None
-    seconds = np.interp(ground, *clock) if time is None else time[rows]
+    seconds = np.interp(ground, *clock)
+    for field in (BOOT, MEASURED):
+        time = _vehicle_time(batch, field) if own else None
+        if time is not None:
+            # A fix that is lost keeps its time: that is not when the message was sent.
+            near = np.abs(time[rows] - seconds) <= RESTART
+            seconds = np.where(near, time[rows], seconds)
+            break
     columns = {"ground_time": ground}
     units = {}
     for name in batch.records.dtype.names or ():
@@ -286,7 +300,9 @@ def _firmware(found: list[Batch], vehicle: Sender) -> str:
     return version_of(int(versions[-1])) if versions.size else ""
 
 
-def _modes(heartbeat: Topic, autopilot: str, kind: int) -> tuple[tuple[float, str], ...]:
+def _modes(heartbeat: Topic | None, autopilot: str, kind: int) -> tuple[tuple[float, str], ...]:
+    if heartbeat is None:  # none in the part that is read
+        return ()
     numbers = heartbeat.columns["custom_mode"].astype(np.int64)
     changes = changes_of(heartbeat.time, numbers)
     return tuple((at, _mode(number, autopilot, kind)) for at, number in changes)
