@@ -30,6 +30,12 @@ class DataFlash:
         values = [one.encode() if isinstance(one, str) else one for one in values]
         self.data += b"\xa3\x95" + bytes([number]) + packed.pack(*values)
 
+    def add_rows(self, name, *columns):
+        """Many messages of numbers, one for each row of these columns."""
+        number, packed = self.forms[name]
+        first = b"\xa3\x95" + bytes([number])
+        self.data += b"".join(first + packed.pack(*row) for row in zip(*columns, strict=True))
+
     def units(self, labels, factors, forms):
         """The tables of newer logs: labels and factors by letter, letters by type."""
         self.define("UNIT", 0x81, "QbZ", "TimeUS,Id,Label")
@@ -99,6 +105,15 @@ class ULogFile:
     def add(self, name, seconds, *values):
         stamp = struct.pack("<HQ", self.numbers[name], round(seconds * 1e6))
         self.message("D", stamp + np.asarray(values, "<f4").tobytes())
+
+    def add_rows(self, name, seconds, values):
+        """Many messages of a topic; values of shape (n, columns)."""
+        kind = [("size", "<u2"), ("kind", "S1"), ("topic", "<u2"), ("stamp", "<u8")]
+        rows = np.empty(len(seconds), [*kind, ("values", "<f4", values.shape[1])])
+        rows["size"], rows["kind"] = rows.dtype.itemsize - 3, b"D"
+        rows["topic"], rows["stamp"] = self.numbers[name], np.rint(1e6 * seconds)
+        rows["values"] = values
+        self.data += rows.tobytes()
 
     def dropout(self, milliseconds):
         self.message("O", struct.pack("<H", milliseconds))
