@@ -5,15 +5,39 @@ from deadtime.logs.latencies._changes import LatencyChange, compare_latencies
 from deadtime.logs.latencies._cost import GainCost
 from deadtime.logs.latencies._filters import FilterDelay
 from deadtime.logs.latencies._latency import Latency, latency
+from deadtime.logs.latencies._modelled import modelled
+from deadtime.logs.latencies._moves import Move, Moves, aligned, moves_of
+from deadtime.logs.latencies._plain import (
+    Difference,
+    PlainTime,
+    PlainTimes,
+    differences,
+    disagrees,
+    plain_times,
+)
 from deadtime.logs.latencies._relation import LoopLatency
+from deadtime.logs.latencies._spread import Spread, spread_of
 
 __all__ = [
+    "Difference",
     "FilterDelay",
     "GainCost",
     "Latency",
     "LatencyChange",
     "LoopLatency",
+    "Move",
+    "Moves",
+    "PlainTime",
+    "PlainTimes",
+    "Spread",
     "Stage",
+    "aligned",
     "compare_latencies",
+    "differences",
+    "disagrees",
     "latency",
+    "modelled",
+    "moves_of",
+    "plain_times",
+    "spread_of",
 ]

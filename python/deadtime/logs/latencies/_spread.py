@@ -46,8 +46,6 @@ class Spread:
         Interval of the mean of Hartung and Knapp, s.
     between : float
         Standard deviation of the true times between windows, s.
-    expected : (float, float)
-        Interval in which the true time of a further window lies, s.
     heterogeneity : float
         Share of the variance between the times that their errors do not explain (I squared).
     p_value : float
@@ -62,7 +60,6 @@ class Spread:
     stderr: float
     interval: tuple[float, float]
     between: float
-    expected: tuple[float, float]
     heterogeneity: float
     p_value: float
     slope: float
@@ -149,19 +146,17 @@ def spread_of(
     count = int(time.size)
     if count < FEWEST:
         mean, stderr = (float(time[0]), float(error[0])) if count else nothing
-        return Spread(count, mean, stderr, nothing, math.nan, nothing, math.nan, math.nan,
+        return Spread(count, mean, stderr, nothing, math.nan, math.nan, math.nan,
                       math.nan, nothing)  # fmt: skip
     line = _line(time, error, np.ones((count, 1)))
     mean, stderr = float(line.numbers[0]), math.sqrt(float(line.covariance[0, 0]))
     reach = float(t.ppf(0.5 * (1.0 + level), line.degrees))
     tau = math.sqrt(line.between)
-    # A further window: t of k - 2 degrees (Higgins, Thompson and Spiegelhalter 2009).
-    wide = float(t.ppf(0.5 * (1.0 + level), max(count - 2, 1))) * math.hypot(tau, stderr)
     share = max(0.0, 1.0 - line.degrees / line.left) if line.left > 0.0 else 0.0
     slope, ends = _slope(time, error, size, level)
     return Spread(
         count, mean, stderr, (mean - reach * stderr, mean + reach * stderr), tau,
-        (mean - wide, mean + wide), share, float(chi2.sf(line.left, line.degrees)), slope, ends,
+        share, float(chi2.sf(line.left, line.degrees)), slope, ends,
     )  # fmt: skip
 
 

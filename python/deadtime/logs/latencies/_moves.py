@@ -1,0 +1,399 @@
+"""All moves of a setpoint, aligned, and the response to them.
+
+A move is a change from one stretch in which the setpoint rests, or moves slowly, to the next. Its
+zero of time is where half of the change of the setpoint is reached. The response is scaled by
+the size of the change. Its time is that at which it passes half of its own change: with noise it
+passes more than once, so the time spent below half counts, which is the crossing where there is
+one. After a jump that is delay + 0.69 lag for a plant of one lag, after a slow ramp delay + lag.
+
+The median over n moves lies between the k-th and the (n + 1 - k)-th time with a probability of
+1 - 2 P(B < k), B binomial of n and 1/2, whatever the distribution (the sign test).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from deadtime._base.arrays import Array
+from deadtime._base.digits import between as ends_of, stated
+from deadtime._base.frozen import ReadOnlyArrays
+from deadtime._base.plain import plain_fields
+from deadtime.logs._recording import moves as moves_between
+from deadtime.logs._series import Series
+from deadtime.logs._windows import runs
+from deadtime.logs.latencies._controller import Between
+from deadtime.logs.latencies._correlation import correlation_of, grid_of, peak_of, value_at
+
+#: Least size of a move, in standard deviations of the noise of the response, and as a share of the
+#: most by which the setpoint changes within the longest time: smaller ones are hidden by others.
+NOISES, OF_RANGE = 6.0, 0.1
+
+#: How much a setpoint that rests may change, as a share of the size of the move beside it.
+RESTS = 0.2
+
+#: How long it rests before and after a move, in rough times from setpoint to response: the longest
+#: with which there are enough moves. A response measured too early has not come all the way, and
+#: in most flights the setpoint hardly rests: a slow swing from one side to the other is a move too.
+REST, ENOUGH = (4.0, 3.0, 2.0, 1.5, 1.0), 12
+
+#: Fewest rows of the slower series in such a rest.
+ROWS = 2.0
+
+#: Longest change of a move, and how long the response is followed after half of it, in rough times.
+CHANGE, FOLLOWED = 4.0, 8.0
+
+#: Where the levels of the response are read, in rough times after the rests of the setpoint.
+LATER = 0.5
+
+#: Least change of the response, as a share of that of the setpoint, that is an answer to it.
+ANSWERED = 0.2
+
+#: The common time axis: its start, in rough times, its points, and the share of the moves that a
+#: median at one point needs.
+BEFORE, POINTS, SHARE = 3.0, 241, 0.5
+
+#: Coverage that the interval of the median has at least; fewer than six moves do not allow it.
+COVERAGE = 0.95
+
+
+class Move(NamedTuple):
+    """One move of the setpoint: times in s, levels in its unit.
+
+    `start` is the end of its rest before the move, `half` the time of half of the change, and
+    `stop` the end of its rest afterwards; it goes from `level` to `level + size`. Each rest is
+    `rest` or longer, and `rough` a rough time from setpoint to response.
+    """
+
+    start: float
+    half: float
+    stop: float
+    level: float
+    size: float
+    rest: float
+    rough: float
+
+
+@dataclass(frozen=True, eq=False)
+class Moves(ReadOnlyArrays):
+    """The response of a loop to all moves of its setpoint.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Time from half of the change of the setpoint, s.
+    setpoint, response, lower, upper : ndarray, shape (n,)
+        Medians of setpoint and response, and the quartiles of the response, as shares of the
+        change of the setpoint; NaN where fewer than half of the moves are followed.
+    responses : ndarray, shape (count, n)
+        The response to each; NaN after the setpoint moves on.
+    times, sizes, starts : ndarray, shape (count,)
+        Of each move the time from half of the change of the setpoint to half of that of the
+        response, s, infinite where the response does not answer; the size of the change in the
+        unit of the setpoint; and when, s from the start of the log.
+    median : float
+        Median of the times, s; NaN where there is none.
+    interval : (float, float)
+        Its interval by order statistics, s; NaN for fewer than six moves.
+    coverage : float
+        Probability with which that interval holds, 0.95 or more; NaN without one.
+    least : float
+        Size from which a change counts as a move, in the unit of the setpoint.
+    moves : tuple of Move
+        The moves.
+    reason : str
+        Why there is no time; empty where there is one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from deadtime.logs import Series
+    >>> from deadtime.logs.latencies import moves_of
+    >>> time = np.arange(0.0, 60.0, 0.02)
+    >>> asked = Series(time, np.floor(time / 2.0) % 2.0, "rad", "asked")
+    >>> came = Series(time, np.floor((time - 0.1) / 2.0) % 2.0, "rad", "came")
+    >>> found = moves_of(asked, came, [(0.0, 59.0)], longest=1.0)
+    >>> found.count, abs(found.median - 0.1) < 0.011
+    (29, True)
+    """
+
+    time: Array
+    setpoint: Array
+    response: Array
+    lower: Array
+    upper: Array
+    responses: Array
+    times: Array
+    sizes: Array
+    starts: Array
+    median: float
+    interval: tuple[float, float]
+    coverage: float
+    least: float
+    moves: tuple[Move, ...] = field(repr=False)
+    reason: str = ""
+
+    @property
+    def count(self) -> int:
+        """How many moves there are."""
+        return len(self.moves)
+
+    def headline(self) -> str:
+        """The time in one line."""
+        if self.reason:
+            return f"none: {self.reason}"
+        known = f"{self.count} moves, half to half"
+        low, high = self.interval
+        if math.isnan(low):
+            return f"{known} {stated(self.median, 0.0, 's')}, too few for an interval"
+        error = 0.25 * (high - low)
+        covered = f"{100.0 * self.coverage:.0f} %"
+        return (
+            f"{known} {stated(self.median, error, 's')} "
+            f"({covered}: {ends_of(low, high, error, 's')})"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The times as plain values for JSON; without the aligned rows."""
+        names = ("count", "median", "interval", "coverage", "least", "times", "sizes", "starts")
+        return plain_fields({name: getattr(self, name) for name in (*names, "reason")})
+
+
+def moves_of(
+    setpoint: Series,
+    response: Series,
+    segments: Sequence[tuple[float, float]],
+    *,
+    longest: float,
+    between: Between | None = None,
+) -> Moves:
+    """Find all moves of a setpoint and align the response to them.
+
+    Parameters
+    ----------
+    setpoint, response : Series
+        Both signals of a loop.
+    segments : sequence of (float, float)
+        Where the setpoint is followed, s from the start of the log.
+    longest : float
+        The longest time from setpoint to response that is looked for, s.
+    between : {"held", "lines"}, optional
+        Whether the setpoint holds from row to row, or moves in lines; by default one that changes
+        on most of its rows moves.
+
+    Returns
+    -------
+    Moves
+        With no time and a reason where there are no moves.
+    """
+    if between is None:
+        between = "lines" if moves_between(setpoint) else "held"
+    least = least_size(setpoint, response, segments, longest)
+    held = between == "held"
+    grid = grid_of(setpoint, response, segments, held)
+    found = correlation_of(grid, longest)
+    rough, _ = peak_of(found.lags, found.coefficient)
+    rows = ROWS * max(setpoint.period, response.period)
+    scale = max(rough if rough > 0.0 else 0.25 * longest, rows)
+    best: list[Move] = []
+    for rests in REST:
+        moves = [
+            move
+            for segment in segments
+            for move in _moves_in(setpoint, segment, (rests * scale, scale), least, held)
+        ]
+        if len(moves) > len(best):
+            best = moves
+        if len(best) >= ENOUGH:
+            break
+    return aligned(best, setpoint, response, between=between, least=least)
+
+
+def aligned(
+    moves: Sequence[Move],
+    setpoint: Series,
+    response: Series,
+    *,
+    between: Between = "lines",
+    least: float = math.nan,
+) -> Moves:
+    """Any response, such as that of a fitted plant, to moves that were found before."""
+    if not moves:
+        empty = np.empty(0)
+        why = "the setpoint never moves from one rest to another by more than the noise"
+        nothing = (math.nan, math.nan)
+        return Moves(
+            empty, empty, empty, empty, empty, np.empty((0, 0)), empty, empty, empty,
+            math.nan, nothing, math.nan, least, (), why,
+        )  # fmt: skip
+    rough = moves[0].rough
+    time = np.linspace(-BEFORE * rough, FOLLOWED * rough, POINTS)
+    rows = [_response_to(move, response, time) for move in moves]
+    asked = [_scaled(move, value_at(setpoint, move.half + time, between == "held"), time)
+             for move in moves]  # fmt: skip
+    responses = np.stack([row for row, _ in rows])
+    times = np.array([at for _, at in rows])
+    sizes, starts = (np.array([getattr(move, name) for move in moves]) for name in ("size", "half"))
+    lower, middle, upper = _quartiles(responses)
+    median, interval, coverage = median_of(times[~np.isnan(times)])
+    reason = ""
+    if not math.isfinite(median):
+        answered = int(np.count_nonzero(np.isfinite(times)))
+        reason = f"the response answers to {answered} of {len(moves)} moves of the setpoint"
+        median, interval, coverage = math.nan, (math.nan, math.nan), math.nan
+    return Moves(
+        time, _quartiles(np.stack(asked))[1], middle, lower, upper, responses, times, sizes,
+        starts, median, interval, coverage, least, tuple(moves), reason,
+    )  # fmt: skip
+
+
+def median_of(times: Array) -> tuple[float, tuple[float, float], float]:
+    """Median, its interval by order statistics, and the coverage of that; NaN below six times."""
+    from scipy.stats import binom
+
+    n = times.size
+    if n == 0:
+        return math.nan, (math.nan, math.nan), math.nan
+    ordered = np.sort(times)
+    # The mean of the two in the middle, either of which may be infinite.
+    median = 0.5 * float(ordered[(n - 1) // 2] + ordered[n // 2])
+    k = int(binom.ppf(0.5 * (1.0 - COVERAGE), n, 0.5))
+    while k > 0 and 2.0 * binom.cdf(k - 1, n, 0.5) > 1.0 - COVERAGE:
+        k -= 1
+    if k == 0:
+        return median, (math.nan, math.nan), math.nan
+    coverage = 1.0 - 2.0 * float(binom.cdf(k - 1, n, 0.5))
+    return median, (float(ordered[k - 1]), float(ordered[n - k])), coverage
+
+
+def least_size(
+    setpoint: Series, response: Series, segments: Sequence[tuple[float, float]], longest: float
+) -> float:
+    """Size from which a change of the setpoint counts as a move, in its unit."""
+    wide = max(2, round(longest / setpoint.period))
+    told = [_rows(setpoint, segment)[1] for segment in segments]
+    came = [_rows(response, segment)[1] for segment in segments]
+    bends = np.concatenate([np.diff(values, 2) for values in came] or [np.empty(0)])
+    noise = 1.4826 * float(np.median(np.abs(bends))) / math.sqrt(6.0) if bends.size else 0.0
+    span = max((float(np.max(_spans(values, wide))) for values in told if values.size), default=0.0)
+    return max(NOISES * noise, OF_RANGE * span)
+
+
+def below_half(time: Array, level: Array, held: bool = False) -> float:
+    """Time that a signal from 0 to 1 spends below one half, s; straight between its rows."""
+    first, last, steps = level[:-1], level[1:], np.diff(time)
+    if held:
+        return float(np.sum(steps[first < 0.5]))
+    low, high = np.minimum(first, last), np.maximum(first, last)
+    wide = high - low
+    share = np.clip((0.5 - low) / np.where(wide > 0.0, wide, 1.0), 0.0, 1.0)
+    return float(np.sum(steps * np.where(wide > 0.0, share, low < 0.5)))
+
+
+def _rows(series: Series, segment: tuple[float, float]) -> tuple[Array, Array]:
+    """Times and finite values of a series in a segment."""
+    rows = (series.time >= segment[0]) & (series.time <= segment[1]) & np.isfinite(series.values)
+    return series.time[rows], series.values[rows]
+
+
+def _spans(values: Array, wide: int) -> Array:
+    """Range of each run of so many rows, or of all where there are fewer, shape (windows,)."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    wide = min(wide, values.size)
+    span = maximum_filter1d(values, wide) - minimum_filter1d(values, wide)
+    return np.asarray(span[wide // 2 : wide // 2 + values.size - wide + 1])
+
+
+def _moves_in(
+    setpoint: Series, segment: tuple[float, float], scales: tuple[float, float], least: float,
+    held: bool,
+) -> list[Move]:  # fmt: skip
+    """The moves in one segment, the largest first found, in their order in time.
+
+    `scales` are the shortest rest and the rough time from setpoint to response, s.
+    """
+    time, values = _rows(setpoint, segment)
+    rest = scales[0]
+    wide = max(2, math.ceil(rest / setpoint.period) + 1)
+    if values.size < 2 * wide or not least > 0.0:
+        return []
+    spans = _spans(values, wide)
+    found: list[Move] = []
+    scale = least * 2.0 ** max(0, math.floor(math.log2(max(float(np.ptp(values)) / least, 1.0))))
+    largest = math.inf
+    while scale >= least:
+        rests = [(a, b + wide - 2) for a, b in runs(spans <= RESTS * scale)]
+        for (_, p), (q, _) in pairwise(rests):
+            move = _move(time, values, (p, q, wide), scales, held) if q > p else None
+            if move is None or not scale <= abs(move.size) < largest:
+                continue
+            if all(move.half <= other.start or move.start >= other.half for other in found):
+                found.append(move)
+        largest, scale = scale, 0.5 * scale
+    return sorted(found)
+
+
+def _move(
+    time: Array,
+    values: Array,
+    rows: tuple[int, int, int],
+    scales: tuple[float, float],
+    held: bool,
+) -> Move | None:
+    """The move from the rest that ends in row p to that which begins in row q; None for none."""
+    (p, q, wide), (rest, rough) = rows, scales
+    before = float(np.median(values[max(0, p - wide + 1) : p + 1]))
+    size = float(np.median(values[q : q + wide])) - before
+    if size == 0.0 or time[q] - time[p] > CHANGE * rough:
+        return None
+    level = (values - before) / size
+    if np.min(level[p : q + 1]) < -RESTS or np.max(level[p : q + 1]) > 1.0 + RESTS:
+        return None
+    half = float(time[p]) + below_half(time[p : q + 1], level[p : q + 1], held)
+    until = int(np.searchsorted(time, half + FOLLOWED * rough, side="right"))
+    away = np.flatnonzero(np.abs(level[q:until] - 1.0) > RESTS)
+    last = q + int(away[0]) - 1 if away.size else until - 1
+    return Move(float(time[p]), half, float(time[max(last, q)]), before, size, rest, rough)
+
+
+def _response_to(move: Move, response: Series, axis: Array) -> tuple[Array, float]:
+    """The response to one move on the axis, and its time; NaN where it has no rows."""
+    later, part = LATER * move.rough, 0.5 * move.rest
+    start, stop = move.start + later, move.stop + later
+    time, values = _rows(response, (move.start - move.rest, stop))
+    early = values[(time >= start - part) & (time <= start)]
+    late = values[time >= stop - part]
+    if not (early.size and late.size):
+        return np.full(axis.shape, np.nan), math.nan
+    level = float(np.median(early))
+    shown = np.interp(move.half + axis, time, values)
+    shown = _scaled(move, shown, axis, level)
+    change = float(np.median(late)) - level
+    if change / move.size < ANSWERED:
+        return shown, math.inf
+    kept = time >= start - part
+    time, share = time[kept], (values[kept] - level) / change
+    return shown, float(time[0]) + below_half(time, share) - move.half
+
+
+def _scaled(move: Move, values: Array, axis: Array, level: float | None = None) -> Array:
+    """Values as shares of the move, and NaN where it is not followed."""
+    share = (values - (move.level if level is None else level)) / move.size
+    at = move.half + axis
+    outside = (at > move.stop + LATER * move.rough) | (at < move.start - move.rest)
+    return np.asarray(np.where(outside, np.nan, share))
+
+
+def _quartiles(rows: Array) -> Array:
+    """Quartiles and median of each column that enough rows have, shape (3, n)."""
+    found = np.full((3, rows.shape[1]), np.nan)
+    enough = np.mean(np.isfinite(rows), axis=0) >= SHARE
+    if enough.any():
+        found[:, enough] = np.nanpercentile(rows[:, enough], [25.0, 50.0, 75.0], axis=0)
+    return found
