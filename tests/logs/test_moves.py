@@ -44,7 +44,7 @@ def made(rate, seconds=60.0, noise=0.01, ramp=0.0, seed=1, jitter=0.0):
 )
 def test_the_median_over_jumps_is_that_of_delay_and_lag_at_any_rate(rate, jitter):
     asked, came, segments, changes = made(rate, jitter=jitter)
-    found = moves_of(asked, came, segments, longest=0.8, between="lines")
+    found = moves_of(asked, came, segments, longest=0.8, between="straight")
     assert found.count > 0.6 * changes.size
     low, high = found.interval
     # A jump is somewhere between two rows, in the middle on average.
@@ -56,7 +56,7 @@ def test_the_median_over_jumps_is_that_of_delay_and_lag_at_any_rate(rate, jitter
 
 def test_after_a_slow_ramp_the_time_is_delay_and_lag_together():
     asked, came, segments, _ = made(100.0, ramp=0.3, noise=0.003)
-    found = moves_of(asked, came, segments, longest=0.8, between="lines")
+    found = moves_of(asked, came, segments, longest=0.8, between="straight")
     assert found.median == pytest.approx(DELAY + LAG, abs=0.005)
 
 
@@ -76,7 +76,7 @@ def test_each_change_of_a_staircase_is_a_move_of_its_own():
 
 def test_gain_and_offset_of_the_response_do_not_move_the_time():
     asked, came, segments, _ = made(100.0, noise=0.0)
-    found = moves_of(asked, came, segments, longest=0.8, between="lines")
+    found = moves_of(asked, came, segments, longest=0.8, between="straight")
     other = Series(came.time, 0.6 * came.values + 3.0, "rad", "other")
     beside = aligned(found.moves, asked, other)
     assert beside.times == pytest.approx(found.times, abs=1e-9)
@@ -86,18 +86,18 @@ def test_gain_and_offset_of_the_response_do_not_move_the_time():
 
 def test_the_response_of_the_right_plant_has_the_same_times():
     asked, came, segments, _ = made(100.0, noise=0.002)
-    found = moves_of(asked, came, segments, longest=0.8, between="lines")
-    fit = modelled(FactoredPlant([LAG]), DELAY, asked, came, segments, "lines")
+    found = moves_of(asked, came, segments, longest=0.8, between="straight")
+    fit = modelled(FactoredPlant([LAG]), DELAY, asked, came, segments, "straight")
     beside = aligned(found.moves, asked, fit)
     assert beside.median == pytest.approx(found.median, abs=0.002)
-    wrong = modelled(FactoredPlant([LAG]), DELAY + 0.03, asked, came, segments, "lines")
+    wrong = modelled(FactoredPlant([LAG]), DELAY + 0.03, asked, came, segments, "straight")
     late = aligned(found.moves, asked, wrong)
     assert late.median - beside.median == pytest.approx(0.03, abs=0.002)
 
 
 def test_the_quartiles_enclose_the_median():
     asked, came, segments, _ = made(100.0, noise=0.1)
-    found = moves_of(asked, came, segments, longest=0.8, between="lines")
+    found = moves_of(asked, came, segments, longest=0.8, between="straight")
     known = np.isfinite(found.response)
     assert known.mean() > 0.5
     assert np.all(found.lower[known] <= found.response[known])
@@ -108,7 +108,7 @@ def test_the_quartiles_enclose_the_median():
 def test_a_response_that_does_not_answer_has_no_time_but_a_reason():
     asked, came, segments, _ = made(100.0)
     deaf = Series(came.time, 0.01 * np.sin(came.time), "rad", "deaf")
-    found = moves_of(asked, deaf, segments, longest=0.8, between="lines")
+    found = moves_of(asked, deaf, segments, longest=0.8, between="straight")
     assert np.isnan(found.median)
     assert "answers to" in found.reason
     assert "none" in found.headline()
@@ -128,7 +128,7 @@ def test_noise_of_the_setpoint_below_that_of_the_response_is_no_move():
 def test_moves_lie_inside_of_the_segments():
     asked, came, _, _ = made(100.0)
     segments = [(5.0, 20.0), (30.0, 50.0)]
-    found = moves_of(asked, came, segments, longest=0.8, between="lines")
+    found = moves_of(asked, came, segments, longest=0.8, between="straight")
     assert found.count > 15
     assert all(any(low <= at <= high for low, high in segments) for at in found.starts)
 

@@ -11,6 +11,9 @@ from deadtime.logs._series import Series
 #: What is followed: the setpoint of the loop, or what its controller commands.
 Command: TypeAlias = Literal["setpoint", "actuator"]
 
+#: Whether commands hold between the rows of a log, or are straight.
+Between: TypeAlias = Literal["held", "straight"]
+
 #: Rows further apart than this many periods do not hold each command.
 EACH = 1.5
 
@@ -43,7 +46,7 @@ class Sampling(NamedTuple):
         By how much the time from command to response may be wrong where that is not known, s.
     """
 
-    between: Literal["held", "straight"]
+    between: Between
     hold: float = 0.0
     unsure: float = 0.0
 
@@ -80,3 +83,10 @@ def sampling_of(log: Log, kind: Kind, told: Series) -> Sampling:
     if told.period < EACH * period.time:
         return Sampling("held")
     return Sampling("straight", period.time)
+
+
+def averaged(sampling: Sampling, together: int) -> Sampling:
+    """How commands pass between rows where so many of them are averaged."""
+    if together == 1 or sampling.between == "straight":
+        return sampling
+    return Sampling("straight", 0.0, sampling.unsure)

@@ -20,12 +20,12 @@ from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
 from deadtime.logs.latencies._budget import Stage, stages_of
 from deadtime.logs.latencies._clocks import why_two_clocks
-from deadtime.logs.latencies._commands import Command, sampling_of
+from deadtime.logs.latencies._commands import Command, averaged, sampling_of
 from deadtime.logs.latencies._contradictions import doubted_by_others
 from deadtime.logs.latencies._filters import FilterDelay, filters_of
 from deadtime.logs.latencies._live import around_the_vehicle
 from deadtime.logs.latencies._relation import LoopLatency, relation_of
-from deadtime.logs.latencies._windows import averaged, parts_of, rows_of_a_window, windows_of
+from deadtime.logs.latencies._windows import parts_of, prepared, together_of, windows_of
 from deadtime.logs.latencies._words import in_full, table_of
 from deadtime.recordings import Recording
 
@@ -301,7 +301,7 @@ def _all_of(
     last.
     """
     pool = ThreadPoolExecutor(min(len(wanted), os.cpu_count() or 1) or 1)
-    order = sorted(range(len(wanted)), key=lambda k: rows_of_a_window(wanted[k][0]))
+    order = sorted(range(len(wanted)), key=lambda k: wanted[k][0].response.rate)
     order = [*order[:1], *order[:0:-1]]
     try:
         begun = {pool.submit(latency_of, log, *wanted[k]): k for k in order}
@@ -327,11 +327,18 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
         return LoopLatency(loop.name, loop.axis, loop.kind, command, "none", why)
     told = loop.signals[command]
     sampling = sampling_of(log, loop.kind, told)
+    together = together_of(loop.response, loop.kind)
+
+    def part(start: float, stop: float) -> Recording:
+        return prepared(loop.recording(start, stop, command=command), sampling, together)
+
     found = relation_of(
-        loop.name, loop.axis, loop.kind, command, windows_of(log, loop, command),
-        lambda *ends: averaged(loop.recording(*ends, command=command), loop.kind),
-        sampling, command == "actuator",
-    )  # fmt: skip
+        LoopLatency(loop.name, loop.axis, loop.kind, command, "none", "", sampling=sampling),
+        windows_of(log, loop, command, sampling),
+        part,
+        averaged(sampling, together),
+        command == "actuator",
+    )
     # Two signals of one message have one clock.
     if found.verdict == "none" or told.topic == loop.response.topic:
         return found
@@ -352,7 +359,7 @@ def _of_recording(recording: Recording) -> Latency:
         )  # fmt: skip
     name = recording.source or "recording"
     whole, parts = parts_of(told)
-    one = relation_of(name, "", "", command, parts, whole.window)
+    one = relation_of(LoopLatency(name, "", "", command, "none", ""), parts, whole.window)
     if recording.sent is not None and one.verdict != "none":
         clocks = (("the commands", recording.sent.time), ("the rows", recording.time))
         if why := why_two_clocks(one, *clocks):

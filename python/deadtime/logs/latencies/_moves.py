@@ -24,10 +24,9 @@ from deadtime._base.arrays import Array
 from deadtime._base.digits import between as ends_of, stated
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
-from deadtime.logs._recording import moves as moves_between
 from deadtime.logs._series import Series
 from deadtime.logs._windows import runs
-from deadtime.logs.latencies._controller import Between
+from deadtime.logs.latencies._commands import Between
 from deadtime.logs.latencies._correlation import correlation_of, grid_of, peak_of, value_at
 
 #: Least size of a move, in standard deviations of the noise of the response, and as a share of the
@@ -182,7 +181,7 @@ def moves_of(
         Where the setpoint is followed, s from the start of the log.
     longest : float
         The longest time from setpoint to response that is looked for, s.
-    between : {"held", "lines"}, optional
+    between : {"held", "straight"}, optional
         Whether the setpoint holds from row to row, or moves in lines; by default one that changes
         on most of its rows moves.
 
@@ -191,8 +190,6 @@ def moves_of(
     Moves
         With no time and a reason where there are no moves.
     """
-    if between is None:
-        between = "lines" if moves_between(setpoint) else "held"
     least = least_size(setpoint, response, segments, longest)
     held = between == "held"
     grid = grid_of(setpoint, response, segments, held)
@@ -219,7 +216,7 @@ def aligned(
     setpoint: Series,
     response: Series,
     *,
-    between: Between = "lines",
+    between: Between = "straight",
     least: float = math.nan,
 ) -> Moves:
     """Any response, such as that of a fitted plant, to moves that were found before."""

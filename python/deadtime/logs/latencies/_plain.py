@@ -28,7 +28,7 @@ from deadtime._base.digits import between as ends_of, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
 from deadtime.logs._series import Series
-from deadtime.logs.latencies._controller import Between
+from deadtime.logs.latencies._commands import Between
 from deadtime.logs.latencies._correlation import (
     FEWEST,
     Grid,
@@ -171,7 +171,7 @@ def plain_times(
         Where the setpoint is followed, s from the start of the log.
     longest : float
         Longest time from setpoint to response that is looked for, s.
-    between : {"held", "lines"}
+    between : {"held", "straight"}
         Whether the setpoint holds from row to row, or moves in lines.
     moves : sequence of Move, optional
         Moves that were found before; by default they are looked for.
@@ -189,7 +189,7 @@ def plain_times(
     >>> sticks = np.repeat(np.random.default_rng(1).standard_normal(60), 50)
     >>> asked = Series(time, sticks, "rad", "asked")
     >>> came = Series(time + 0.12, sticks, "rad", "came")
-    >>> found = plain_times(asked, came, [(1.0, 59.0)], longest=1.0, between="lines")
+    >>> found = plain_times(asked, came, [(1.0, 59.0)], longest=1.0, between="straight")
     >>> [round(one.value, 2) for one in found.all]
     [0.12, 0.12, 0.12]
     """

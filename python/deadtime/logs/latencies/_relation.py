@@ -28,6 +28,14 @@ TWO_SIDED = 3.92
 #: spread and take longer.
 ALONE = 10
 
+#: Fewest numbers of a plant that a log has to determine: a sine determines two.
+TOLD = 3
+
+#: Doubts of an estimate that concern the gain of a loop and not its time, the one about residuals,
+#: and the windows that have to agree in its place.
+OF_THE_GAIN = ("classes contradict", "crossover not told", "too few told")
+NOT_WHITE, MANY = "residuals not white", 5
+
 #: A time says something if its standard error is below itself, or below so many rows.
 OF_A_ROW = 2.0
 
@@ -148,10 +156,7 @@ class LoopLatency(ReadOnlyArrays):
 
 
 def relation_of(
-    loop: str,
-    axis: str,
-    kind: str,
-    command: Command,
+    nothing: LoopLatency,
     windows: Sequence[Window],
     part: Callable[[float, float], Recording],
     sampling: Sampling | None = None,
@@ -159,27 +164,27 @@ def relation_of(
 ) -> LoopLatency:
     """The plant of a loop over its windows, or why they do not show one.
 
-    `part` gives the recording from one time to another, s.
+    `nothing` is the loop without a time, `part` gives the recording from one time to another, s, as
+    it is fitted, `sampling` how its commands pass between rows then.
     """
     chosen = best_of(windows)
-    nothing = LoopLatency(loop, axis, kind, command, "none", "", sampling=sampling)
     if not windows:
         return replace(nothing, reason="it is never followed for long enough")
     if not chosen:
-        return replace(nothing, reason=f"the {command} does not move")
+        return replace(nothing, reason=f"the {nothing.command} does not move")
     try:
-        fit = _fitted([part(*ends) for ends in chosen], kind, integrates, sampling)
+        fit = _fitted([part(*ends) for ends in chosen], nothing.kind, integrates, sampling)
     except (DeadtimeError, ValueError) as error:
         return replace(nothing, reason=str(error).partition("; ")[0])
-    found = replace(
-        nothing, verdict=fit.verdict, reason=fit.reason, windows=tuple(chosen), estimate=fit
-    )
-    if fit.verdict == "none":
-        return replace(found, estimate=None)
+    if fit.verdict == "none" and fit.determined < TOLD:
+        return replace(nothing, reason=fit.reason)
+    found = replace(nothing, verdict="reliable", windows=tuple(chosen), estimate=fit)
     found = _with_interval(found, windows)
     if why := _no_answer(found):
         return replace(found, verdict="none", reason=why, estimate=None)
-    cost = cost_of(fit, fit.recording) if command == "actuator" else None
+    if why := _why_doubtful(found):
+        found = found.doubted(why)
+    cost = cost_of(fit, fit.recording) if found.command == "actuator" else None
     return replace(found, cost=cost)
 
 
@@ -208,16 +213,32 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
     times = _alone(fit, windows)
     spread = None
     value = fit.delay_plus_lag
-    low, high = fit.ci(0.95, "delay+lag")
+    low, high = fit.intervals["delay+lag"]
     if len(times) > 1:
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
         fitted = sum(_is_in(one.at, found.windows) for one in times)
         between = _reach(spread) / math.sqrt(max(1, fitted))
         low = value - math.hypot(value - low, between)
         high = value + math.hypot(high - value, between)
+        if fit._code == NOT_WHITE:
+            low, high = min(low, spread.interval[0]), max(high, spread.interval[1])
     unsure = 0.0 if found.sampling is None else found.sampling.unsure
     interval = (max(0.0, low - unsure), high + unsure)
     return replace(found, interval=interval, times=times, spread=spread)
+
+
+def _why_doubtful(found: LoopLatency) -> str:
+    """Why the interval may not hold the time; empty where it is claimed to.
+
+    It is over all kinds of plant that explain the log alike, so that these need not agree where a
+    loop would cross over. Windows that agree stand for a noise that the model does not know.
+    """
+    fit = found.estimate
+    assert fit is not None
+    if fit.verdict == "reliable" or fit._code in OF_THE_GAIN:
+        return ""
+    many = found.spread is not None and found.spread.count >= MANY
+    return "" if fit._code == NOT_WHITE and many else fit.reason
 
 
 def _is_in(time: float, windows: Sequence[tuple[float, float]]) -> bool:

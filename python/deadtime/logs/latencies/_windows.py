@@ -9,10 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime._base.errors import RecordingError
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._names import Kind, Windows
+from deadtime.logs._series import Series
 from deadtime.logs._windows import outside, shared
-from deadtime.logs.latencies._commands import Command
+from deadtime.logs.latencies._between import moving_mean, refined
+from deadtime.logs.latencies._commands import Command, Sampling
 from deadtime.recordings import Recording
 
 #: Fewest rows of a window, most rows that are fitted together, and most runs of windows that they
@@ -21,6 +24,9 @@ FEWEST, MOST, TOGETHER = 24, 1200, 3
 
 #: Movement of a window, as a share of the largest, below which it ends a run.
 STILL = 0.1
+
+#: Most rows of a window.
+ROWS = 400
 
 #: Length of a window of each kind of loop, s.
 LENGTHS: dict[str, float] = {"rate": 4.0, "attitude": 8.0, "velocity": 12.0, "position": 20.0}
@@ -31,9 +37,9 @@ SETTLES = 0.05
 #: Longest time from command to response that is looked for, as a share of that length.
 LONGEST = 0.2
 
-#: Rows are averaged over this share of that length: more takes less time and rounds off the
-#: response.
-AVERAGED = 1e-3
+#: Rows are averaged over this share of that length: more takes less time, and shows less of what is
+#: fast.
+AVERAGED = 5e-4
 
 #: Most parts of a recording, and fewest rows of one.
 PARTS, ROWS_OF_A_PART = 8, 60
@@ -64,20 +70,34 @@ class Window(NamedTuple):
     segment: int = 0
 
 
-def windows_of(log: Log, loop: LogLoop, command: Command) -> list[Window]:
+def windows_of(log: Log, loop: LogLoop, command: Command, sampling: Sampling) -> list[Window]:
     """All windows of a loop, in order, without the time after pauses of the log."""
     told = loop.signals[command]
     settles = SETTLES * LENGTHS[loop.kind]
     pauses = [(low, high + settles) for low, high in sorted([*told.gaps, *log.gaps])]
     segments = shared(list(loop.segments), outside(pauses))
+    together = together_of(loop.response, loop.kind)
+    length = min(LENGTHS[loop.kind], ROWS * together * loop.response.period)
     found = []
     for segment, ends in enumerate(segments):
-        for start, stop in _divided(*ends, LENGTHS[loop.kind]):
+        for start, stop in _divided(*ends, length):
             inside = (loop.response.time >= start) & (loop.response.time <= stop)
-            if np.count_nonzero(inside & np.isfinite(loop.response.values)) >= FEWEST:
-                part = window_of(loop.recording(start, stop, command=command), loop.kind)
-                found.append(part._replace(start=start, stop=stop, segment=segment))
+            if np.count_nonzero(inside & np.isfinite(loop.response.values)) < together * FEWEST:
+                continue
+            try:
+                part = loop.recording(start, stop, command=command)
+                rows = prepared(part, sampling, together)
+            except RecordingError:  # repeated rows, or gaps
+                continue
+            found.append(Window(start, stop, rows, movement_of(part), segment))
     return found
+
+
+def movement_of(part: Recording) -> float:
+    """Deviation of the command of a recording from a straight line."""
+    told = part.command if part.command is not None else part.reference
+    line = np.polynomial.Polynomial.fit(part.time, told, 1)
+    return float(np.std(told - line(part.time)))
 
 
 def _divided(start: float, stop: float, length: float) -> Windows:
@@ -86,40 +106,32 @@ def _divided(start: float, stop: float, length: float) -> Windows:
     return list(pairwise(np.linspace(start, stop, count + 1).tolist()))
 
 
-def window_of(part: Recording, kind: Kind | None = None) -> Window:
-    """A recording as a window."""
-    told = part.command if part.command is not None else part.reference
-    line = np.polynomial.Polynomial.fit(part.time, told, 1)
-    moves = float(np.std(told - line(part.time)))
-    rows = part if kind is None else averaged(part, kind)
-    return Window(float(part.time[0]), float(part.time[-1]), rows, moves)
+def together_of(response: Series, kind: Kind) -> int:
+    """How many rows of a response are averaged."""
+    return max(1, int(AVERAGED * LENGTHS[kind] / response.period + 1e-6))
 
 
-def averaged(part: Recording, kind: Kind) -> Recording:
-    """The recording with means of neighbouring rows of the output, where they are many.
+def prepared(part: Recording, sampling: Sampling, together: int) -> Recording:
+    """The recording with its commands between rows, and means of so many rows of the output.
 
-    The mean of the output over a time T is that at its middle but for its curvature: to
-    (omega T)²/24, and without a delay.
+    The command is averaged over the same time, so that the plant is that of single rows.
     """
-    over = AVERAGED * LENGTHS[kind]
-    together = int(over / part.sample_time + 1e-6)
-    if together < 2 or part.sent is None:
-        return part
-    count = len(part) // together * together
-    rows = part.time[:count].reshape(-1, together)
-    whole = np.ptp(rows, axis=1) < GAP * (together - 1) * part.sample_time
-    mean = _mean(part.output[:count], together)[whole]
-    if mean.size < FEWEST:
-        return part
-    last = np.arange(together - 1, count, together)[whole]
-    return Recording(
-        rows.mean(axis=1)[whole],
-        part.reference[last],
-        mean,
-        units=part.units,
-        source=part.source,
-        sent=part.sent,
-    )
+    assert part.sent is not None
+    sent = part.sent.time, part.sent.values
+    if sampling.between == "straight":
+        sent = refined(*sent)
+    time, output, reference = part.time, part.output, part.reference
+    if together > 1:
+        count = len(part) // together * together
+        rows = time[:count].reshape(-1, together)
+        step = part.sample_time
+        whole = np.ptp(rows, axis=1) < GAP * (together - 1) * step
+        time, output = rows.mean(axis=1)[whole], _mean(output[:count], together)[whole]
+        reference = reference[together - 1 : count : together][whole]
+        sent = moving_mean(*sent, sampling.between, together * step)
+    if time.size < FEWEST:
+        raise RecordingError(f"{time.size} rows without gaps are fewer than {FEWEST}")
+    return Recording(time, reference, output, units=part.units, source=part.source, sent=sent)
 
 
 def _mean(values: Array, together: int) -> Array:
@@ -165,11 +177,6 @@ def _runs(windows: Sequence[Window], places: Sequence[int], most: int) -> list[l
     return runs
 
 
-def rows_of_a_window(loop: LogLoop) -> float:
-    """About how many rows a window of this loop has."""
-    return min(LENGTHS[loop.kind] / loop.response.period, 1.0 / AVERAGED)
-
-
 def parts_of(recording: Recording) -> tuple[Recording, list[Window]]:
     """One recording, and equal parts of it, each with the commands before it."""
     assert recording.command is not None
@@ -180,4 +187,5 @@ def parts_of(recording: Recording) -> tuple[Recording, list[Window]]:
     )  # fmt: skip
     count = min(PARTS, max(1, len(recording) // ROWS_OF_A_PART))
     edges = np.linspace(recording.time[0], recording.time[-1], count + 1).tolist()
-    return whole, [window_of(whole.window(*ends)) for ends in pairwise(edges)]
+    parts = [(ends, whole.window(*ends)) for ends in pairwise(edges)]
+    return whole, [Window(*ends, part, movement_of(part)) for ends, part in parts]

@@ -193,6 +193,9 @@ fn solved(omega: f64, of: impl Fn(f64) -> f64) -> f64 {
             break;
         }
         let step = after * (next - x) / (after - value);
+        if !step.is_finite() {
+            break;
+        }
         (x, value) = (next, after);
         next = (next - step).clamp(0.5 * next, 2.0 * next);
     }
