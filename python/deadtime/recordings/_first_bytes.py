@@ -22,6 +22,9 @@ LARGEST_FILE, PIECE = 1_000_000_000, 1 << 20
 #: A line of a DataFlash log in text form, which defines a message; lines before it may be damaged.
 _FMT = re.compile(rb"^FMT, *\d+, *\d+, *\w+, *\w+,", re.MULTILINE)
 
+#: The text that a clone without Git LFS has in place of each large file.
+LFS, LFS_WHAT = b"version https://git-lfs.github.com/spec/", "a Git LFS pointer and not the file"
+
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -69,7 +72,7 @@ def _kinds() -> list[Kind]:
     )
     logs = (
         ("ULog", "a ULog file of PX4", _starts(b"ULog\x01\x12\x35")),
-        ("DataFlash", "a DataFlash log of ArduPilot", _starts(b"\xa3\x95")),
+        ("DataFlash", "a DataFlash log of ArduPilot or PX4", _starts(b"\xa3\x95")),
         ("Blackbox", "a Blackbox log of Betaflight or INAV", _starts(b"H Product:Blackbox")),
         ("Crazyflie uSD", "a log of a Crazyflie's memory card", _is_crazyflie),
         ("DataFlash text", "a DataFlash log of ArduPilot in text form", _is_dataflash_text),
@@ -101,6 +104,7 @@ def _kinds() -> list[Kind]:
         ("a PDF document", b"%PDF-", "give the numbers behind it"),
     )
     return [
+        Kind("", LFS_WHAT, _starts(LFS), None, "run `git lfs pull` where it was cloned"),
         *(Kind(name, what, begins, "open_log") for name, what, begins in logs),
         *(Kind("", what, _starts(first), None, advice) for what, first, advice in others),
         *(Kind(name, what, begins, "read_recording") for name, what, begins in tables),
