@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from deadtime._cli import options as opt
+from deadtime._cli.exit_codes import NONE
 from deadtime._cli.fills import filled
 from deadtime._cli.show import print_json, print_points, print_table, print_text, results_table
 from deadtime.logs import Log, LogLoop, open_log
@@ -28,6 +29,8 @@ def command(
         Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD.
     loop
         Tell about this loop only, for example 'roll rate'.
+
+    Exit codes: 0 an answer, 3 the log holds no loop, 1 an error.
     """
     found = open_log(log, flight=flight)
     if loop is not None:
@@ -40,6 +43,8 @@ def command(
         print_json("log", found.to_dict())
     else:
         _print_log(found)
+    if not found.loops and found.link is None:
+        raise typer.Exit(NONE)
 
 
 def _print_log(log: Log) -> None:
