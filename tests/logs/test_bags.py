@@ -1,6 +1,8 @@
 """Bags of ROS and MCAP files: their topics, and any two fields as a recording."""
 
 import json
+import random
+import tracemalloc
 
 import bags
 import deadtime as dtm
@@ -8,10 +10,13 @@ import numpy as np
 import pytest
 from command_line import found, one_clear_line, run
 from deadtime.logs import is_bag, open_bag, recording_of_fields
+from mutations import mutated
+from small_bags import LARGEST, SMALL_BAGS, read_bag
 
 pytest.importorskip("mcap_ros2", reason="mcap-ros2-support reads MCAP files of ROS 2")
 pytest.importorskip("rosbags", reason="rosbags reads ROS bags")
 
+MEGABYTE = 1 << 20
 COMMAND, SPEED = "/cmd_vel:linear.x", "/state:speed"
 
 
@@ -73,9 +78,20 @@ def test_places_in_arrays_are_fields_and_scans_are_not(folder):
 def test_the_delay_of_the_robot_is_found_with_the_way_of_its_messages(folder):
     # Received states are older than they look: to the delay of 150 ms comes their age of 30 ms.
     recording = recording_of_fields(folder / "zstd.mcap", COMMAND, SPEED)
-    loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.1), dtm.P(1.0), delay=0.1)
-    fit = dtm.estimate_delay(recording, loop, free=("delay", "gain", "time_constant"))
-    assert fit.delay == pytest.approx(bags.DELAY + bags.AGE, abs=0.006)
+    sent, values = recording.sent
+    step = 0.001
+    grid = np.arange(sent[0], recording.time[-1], step)
+    asked = values[np.searchsorted(sent, grid, side="right") - 1]
+    speed = np.zeros(grid.size)
+    for k in range(1, grid.size):
+        speed[k] = asked[k - 1] + (speed[k - 1] - asked[k - 1]) * np.exp(-step / bags.LAG)
+    delays = np.arange(0.1, 0.3, 0.002)
+    left = [np.std(recording.output - np.interp(recording.time - d, grid, speed)) for d in delays]
+    best = delays[int(np.argmin(left))]
+    assert best == pytest.approx(bags.DELAY + bags.AGE, abs=0.003)
+    # Without the times of their own, commands are taken later than they were sent.
+    rows = dtm.Recording(recording.time, None, recording.output, recording.command)
+    assert dtm.estimate_delay(rows).delay == pytest.approx(best - bags.ROW / 2, abs=0.003)
 
 
 @pytest.mark.parametrize(
@@ -183,3 +199,60 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
     bag = open_bag(path)
     assert list(bag.topics) == ["/known"]
     assert bag.remarks == ("not decoded, in an encoding that is not known: /strange",)
+
+
+@pytest.mark.parametrize("count", [30, pytest.param(300, marks=pytest.mark.survey)])
+@pytest.mark.parametrize("name", SMALL_BAGS)
+def test_damaged_bags_are_read_or_refused(name, count, tmp_path, capfd):
+    draw = random.Random(19)
+    ending, made = SMALL_BAGS[name]
+    whole = made()
+    assert len(whole) <= LARGEST
+    path = tmp_path / f"a{ending}"
+    path.write_bytes(whole)
+    read_bag(path)  # imports the library
+    read = 0
+    tracemalloc.start()
+    try:
+        for _ in range(count):
+            data = mutated(whole, draw, largest=LARGEST)
+            path.write_bytes(data)
+            tracemalloc.reset_peak()
+            try:
+                read_bag(path)
+                read += 1
+            except dtm.RecordingError as error:
+                message = str(error)
+            else:
+                message = ""
+            assert message.isprintable()
+            assert tracemalloc.get_traced_memory()[1] < 50 * MEGABYTE + 10 * len(data)
+    finally:
+        tracemalloc.stop()
+    assert 0.1 * count < read <= count
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_chunk_that_says_it_is_large_takes_no_memory(tmp_path):
+    # 4 kB of zstd may hold 128 MB of zeros, and the chunk says so itself.
+    zstandard = pytest.importorskip("zstandard", reason="zstandard packs the chunk")
+    from mcap.records import Chunk
+    from mcap.writer import RecordBuilder
+
+    packed = zstandard.ZstdCompressor().compress(bytes(128 * MEGABYTE))
+    whole = bags.mcap("zstd", chunk_size=3000, seconds=1.0)
+    builder = RecordBuilder()
+    for size in (128 * MEGABYTE, 100):
+        Chunk("zstd", packed, 0, 0, 0, size).write(builder)
+    place = 8 + 9 + int.from_bytes(whole[9:17], "little")
+    path = tmp_path / "a.mcap"
+    path.write_bytes(whole[:place] + builder.end() + whole[place:])
+    tracemalloc.start()
+    try:
+        bag = open_bag(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 50 * MEGABYTE
+    assert list(bag.topics) == ["/cmd_vel", "/state"]
+    assert bag.remarks == ("2 damaged chunks are left out",)

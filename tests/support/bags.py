@@ -100,7 +100,7 @@ def mcap_json(header=False, **options):
     return stream.getvalue()
 
 
-def _ros_messages(store):
+def _ros_messages(store, **options):
     """Messages of ROS types with the same contents."""
     types = store.types
     twist, vector = types["geometry_msgs/msg/Twist"], types["geometry_msgs/msg/Vector3"]
@@ -108,7 +108,7 @@ def _ros_messages(store):
     header, time = types["std_msgs/msg/Header"], types["builtin_interfaces/msg/Time"]
     more = {"seq": 0} if "seq" in header.__dataclass_fields__ else {}
     zero = vector(x=0.0, y=0.0, z=0.0)
-    for at, topic, told in events():
+    for at, topic, told in events(**options):
         if topic == "/cmd_vel":
             message = twist(linear=vector(x=told["linear"]["x"], y=0.0, z=0.0), angular=zero)
             yield at, topic, "geometry_msgs/msg/Twist", message
@@ -118,7 +118,7 @@ def _ros_messages(store):
             yield at, topic, "geometry_msgs/msg/Vector3Stamped", message
 
 
-def ros1(path):
+def ros1(path, **options):
     """Write a bag of ROS 1."""
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -126,13 +126,13 @@ def ros1(path):
     store = get_typestore(Stores.ROS1_NOETIC)
     with Writer(path) as bag:
         topics = {}
-        for at, topic, kind, message in _ros_messages(store):
+        for at, topic, kind, message in _ros_messages(store, **options):
             if topic not in topics:
                 topics[topic] = bag.add_connection(topic, kind, typestore=store)
             bag.write(topics[topic], ns(at), store.serialize_ros1(message, kind))
 
 
-def ros2(path):
+def ros2(path, **options):
     """Write the folder of a bag of ROS 2."""
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -140,7 +140,7 @@ def ros2(path):
     store = get_typestore(Stores.ROS2_HUMBLE)
     with Writer(path, version=9) as bag:
         topics = {}
-        for at, topic, kind, message in _ros_messages(store):
+        for at, topic, kind, message in _ros_messages(store, **options):
             if topic not in topics:
                 topics[topic] = bag.add_connection(topic, kind, typestore=store)
             bag.write(topics[topic], ns(at), store.serialize_cdr(message, kind))

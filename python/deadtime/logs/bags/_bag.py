@@ -32,8 +32,8 @@ Message = tuple[str, int, Callable[[], Any]]
 #: Headers whose median age at reception differs by more than this, s, are of two clocks.
 ONE_CLOCK = 1.0
 
-#: Seconds of a nanosecond.
-NANOSECOND = 1e-9
+#: Seconds of a nanosecond; times are below this many, and damaged ones are left out.
+NANOSECOND, LATEST = 1e-9, 1 << 63
 
 
 @dataclass(frozen=True)
@@ -158,12 +158,13 @@ class Bag:
         """Times and values of the fields, decoded in one pass through the bag."""
         found = {signal: _Rows() for signal in places}
         wanted = {topic for topic, _ in places.values()}
-        for topic, received, decode in self._messages(wanted):
+        for topic, received, decode in sound(self._messages(wanted)):
             try:
                 message = decode()
             except Exception:  # a damaged message, for which each library raises its own
                 continue
             stamp = stamp_of(message)
+            stamp = None if stamp is None or not 0 <= stamp < LATEST else stamp
             for signal, (name, path) in places.items():
                 if name == topic:
                     found[signal].add(received, stamp, number_at(message, path))
@@ -187,6 +188,14 @@ class Bag:
         names = ("source", "format", "start", "duration", "remarks")
         found = {name: getattr(self, name) for name in names}
         return plain_fields({**found, "topics": topics})
+
+
+def sound(messages: Iterable[Message]) -> Iterator[Message]:
+    """The messages whose time of reception is one."""
+    for message in messages:
+        received = message[1]
+        if isinstance(received, int) and 0 <= received < LATEST:
+            yield message
 
 
 class _Rows:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from deadtime.logs.bags._bag import NANOSECOND, BagTopic, Message
+from deadtime.logs.bags._bag import NANOSECOND, BagTopic, Message, sound
 from deadtime.logs.bags._fields import numbers_in, stamp_of
 
 #: Messages of a topic that are decoded for one that can be.
@@ -30,7 +30,7 @@ class Index:
 
     def fill(self, messages: Iterator[Message], type_of: Callable[[str], str]) -> None:
         """Count the messages, and decode one of each topic."""
-        for topic, received, decode in messages:
+        for topic, received, decode in sound(messages):
             count = self._counts.get(topic, 0)
             self._counts[topic] = count + 1
             if count == 0:

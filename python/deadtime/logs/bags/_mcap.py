@@ -7,18 +7,18 @@ one does not have to fit into memory. Messages in CDR of ROS 2 and in JSON are d
 from __future__ import annotations
 
 import json
-import lzma
 import os
-import struct
-import zlib
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import redirect_stderr
 from dataclasses import replace
-from io import SEEK_END
+from io import StringIO
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
+from deadtime._base.errors import MissingExtraError
 from deadtime._base.extras import library
 from deadtime.logs.bags._bag import Bag, Message, bag_of
+from deadtime.logs.bags._bounded import Bounded
 from deadtime.logs.bags._index import Index
 
 EXTRA = "'deadtime[logs]'"
@@ -29,24 +29,6 @@ CHUNK, CHUNK_FACTOR = 32 << 20, 4
 
 #: Largest window of zstd, bytes: that of its strongest usual level.
 WINDOW = 8 << 20
-
-#: What the libraries raise on damaged bytes, beside their own errors.
-DAMAGE = (
-    ArithmeticError, AssertionError, AttributeError, EOFError, KeyError, LookupError, MemoryError,
-    RuntimeError, TypeError, ValueError, lzma.LZMAError, struct.error, zlib.error,
-)  # fmt: skip
-
-
-class _Bounded:
-    """A file of which no more is asked than it has."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self.size = stream.seek(0, SEEK_END)
-        stream.seek(0)
-        self._stream = stream
-
-    def read(self, length: int) -> bytes:
-        return self._stream.read(max(0, min(length, self.size - self._stream.tell())))
 
 
 class _Mcap:
@@ -59,7 +41,6 @@ class _Mcap:
         self.lost = 0
         self._reader = library("mcap.stream_reader", "reading MCAP files", EXTRA)
         self._records = library("mcap.records", "reading MCAP files", EXTRA)
-        self._error = library("mcap.exceptions", "reading MCAP files", EXTRA).McapError
         self._ros2 = library("mcap_ros2.decoder", "reading MCAP files of ROS 2", EXTRA)
 
     def messages(self, wanted: Iterable[str] | None = None) -> Iterator[Message]:
@@ -85,8 +66,7 @@ class _Mcap:
     def _all_records(self) -> Iterator[Any]:
         """All records up to the end or the first damage outside of a chunk."""
         self.cut, self.lost = False, 0
-        with open(self.path, "rb") as stream:
-            source = _Bounded(stream)
+        with Bounded(self.path) as source:
             found = self._reader.StreamReader(
                 source, emit_chunks=True, record_size_limit=source.size
             ).records
@@ -95,7 +75,7 @@ class _Mcap:
                     record = next(found)
                 except StopIteration:
                     return
-                except (self._error, *DAMAGE):
+                except Exception:  # the library raises what the damage leads to
                     self.cut = True
                     return
                 if not isinstance(record, self._records.Chunk):
@@ -103,7 +83,9 @@ class _Mcap:
                     continue
                 try:
                     parts = self._reader.breakup_chunk(_unpacked(record, source.size))
-                except (self._error, *DAMAGE):
+                except MissingExtraError:
+                    raise
+                except Exception:  # the libraries of each compression have their own errors
                     self.lost += 1
                     continue
                 yield from parts
@@ -132,7 +114,8 @@ def _decoder(factory: Any, channel: Any, schema: Any, data: bytes) -> Callable[[
     def decode() -> Any:
         if channel.message_encoding == "json":
             return json.loads(data)
-        make = factory.decoder_for(channel.message_encoding, schema)
+        with redirect_stderr(StringIO()):  # the library prints what it finds damaged
+            make = factory.decoder_for(channel.message_encoding, schema)
         if make is None:
             raise ValueError(f"the encoding {channel.message_encoding} is not known")
         return make(data)
