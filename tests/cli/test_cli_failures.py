@@ -7,6 +7,7 @@ import sys
 
 import deadtime as dtm
 import pytest
+from made_logs import copter
 
 RUN = "from deadtime._cli import main; main()"
 MADE_READABLE = "from deadtime._cli.readable import make_readable\nmake_readable()\n"
@@ -102,3 +103,18 @@ def test_json_on_a_poor_terminal_is_the_same_json():
     rich = command(before=before, PYTHONIOENCODING="utf-8").stdout
     expected = {"schema": "deadtime.any/1", "where": "σ → ω", "n": 1.5}
     assert json.loads(poor) == json.loads(rich) == expected
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["inspect", "{}", "--json"], ["inspect", "{}"]])
+def test_a_reader_that_closes_the_output_gets_its_lines_and_no_complaint(arguments, tmp_path):
+    path = tmp_path / "flight.bin"
+    path.write_bytes(copter().data)
+    arguments = [one.format(path) for one in arguments]
+    code = f"import sys\nsys.argv[1:] = {arguments!r}\n{RUN}"
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    environment = {**os.environ, "COLUMNS": "160", "NO_COLOR": "1"}
+    with subprocess.Popen([sys.executable, "-c", code], env=environment, **pipes) as process:
+        assert process.stdout.readline().strip()
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait(60) in (0, 1)

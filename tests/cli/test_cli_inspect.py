@@ -2,7 +2,7 @@
 
 import pytest
 from command_line import found, one_clear_line, run
-from made_logs import copter
+from made_logs import DataFlash, copter
 
 
 @pytest.fixture
@@ -56,3 +56,14 @@ def test_a_flight_of_a_log_with_one_is_refused(log):
     result = run("inspect", log, "--flight", 2)
     assert result.returncode != 0
     assert "DataFlash log, which holds one flight" in one_clear_line(result)
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_a_log_without_a_loop_is_no_answer(more, tmp_path):
+    log = DataFlash()
+    log.define("IMU", 9, "Qf", "TimeUS,GyrX")
+    for k in range(20):
+        log.add("IMU", 20_000 * k, 0.1)
+    path = tmp_path / "flight.bin"
+    path.write_bytes(log.data)
+    assert run("inspect", path, *more).returncode == 3

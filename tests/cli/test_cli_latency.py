@@ -4,7 +4,7 @@ import re
 
 import pytest
 from command_line import found, one_clear_line, run
-from made_logs import flown_copter
+from made_logs import copter, flown_copter
 
 
 @pytest.fixture(scope="module")
@@ -37,3 +37,14 @@ def test_what_is_wrong_is_one_line(log, tmp_path):
     assert "no loop with the axis 'yaw'" in one_clear_line(run("latency", log, "--axis", "yaw"))
     assert "give one, or two" in one_clear_line(run("latency", log, log, log))
     assert "page of one log" in one_clear_line(run("latency", log, log, "--out", "page.html"))
+
+
+def test_a_log_of_an_instant_is_answered_by_one_line(tmp_path):
+    # 32 ms of a log were answered by a line for each of six loops.
+    path = tmp_path / "flight.bin"
+    path.write_bytes(copter(rows=3, period=0.016).data)
+    result = run("latency", path)
+    assert result.returncode == 3
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1
+    assert "none: flight.bin is 42 ms long" in result.stderr

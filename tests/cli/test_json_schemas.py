@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import bags
 import deadtime as dtm
 import numpy as np
 import pytest
 from command_line import found
 from made_logs import copter, flown_copter
 
+NO_BAGS: dict[str, Any] = {
+    "condition": find_spec("mcap_ros2") is None,
+    "reason": "mcap-ros2-support reads MCAP files",
+}
 PAGE = Path(__file__).resolve().parents[2] / "docs/reference/json.md"
 
 
@@ -42,6 +48,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = np.column_stack([time, moved, command])
     np.savetxt(place / "moved.csv", table, delimiter=",", header="time,output,command", comments="")
     (place / "flight.bin").write_bytes(copter().data)
+    if not NO_BAGS["condition"]:
+        (place / "drive.mcap").write_bytes(bags.mcap_json(seconds=2.0))
     (place / "flown.bin").write_bytes(flown_copter(seconds=3.0, rate=100).data)
     return place
 
@@ -68,6 +76,7 @@ CONTINUOUS = ("estimate", "step.csv", "--kp", 2.4)
         ("check", (*STEP, "--check")),
         ("log", ("inspect", "flight.bin")),
         ("log-loop", ("inspect", "flight.bin", "--loop", "roll")),
+        pytest.param("bag", ("inspect", "drive.mcap"), marks=pytest.mark.skipif(**NO_BAGS)),
         ("latency", ("latency", "flown.bin", "--loop", "roll rate")),
         ("latency-change", ("latency", "flown.bin", "flown.bin", "--loop", "roll rate")),
         ("reproduction", ("reproduce", "--only", "figure9")),

@@ -22,9 +22,10 @@ NAMED = [
 #: LGPL: a library that a user may exchange, imported where a log is read and not passed on.
 EXCHANGEABLE = {"pymavlink"}
 
-#: Licences without conditions on programs that use the package.
+#: Licences without conditions on programs that use the package; of "any-OSI" a user chooses one.
 PERMISSIVE = re.compile(
-    r"\b(MIT|BSD|Apache|PSF|Python Software Foundation|HPND|MIT-CMU|ISC|Zlib)\b", re.IGNORECASE
+    r"\b(MIT|BSD|Apache|PSF|Python Software Foundation|HPND|MIT-CMU|ISC|Zlib|any-OSI)\b",
+    re.IGNORECASE,
 )
 COPYLEFT = re.compile(r"\b(A?GPL|GNU)\b")
 

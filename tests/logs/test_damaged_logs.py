@@ -131,6 +131,10 @@ def test_a_log_that_is_cut_off_is_read_as_far_as_it_goes(name, share, tmp_path):
         (b"\x07\x03time", "is no log of a known format: it begins with 07 03 74 69"),
         (b"time,reference\n0,1\n", rf"is a text, and no log .*: {TABLE}"),
         ("höhe\n".encode("latin-1"), rf"is a text, and no log .*: {TABLE}"),
+        (
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:da9\nsize 11927552\n",
+            "is a Git LFS pointer and not the file: run `git lfs pull`",
+        ),
         (b"\x1f\x8b\x08" + bytes(20), rf"is packed by gzip: {TABLE}"),
         (b"PAR1" + bytes(20), rf"is a Parquet table: {TABLE}"),
         (b"ARROW1\0\0" + bytes(20), rf"is an Arrow table: {TABLE}"),

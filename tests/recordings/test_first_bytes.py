@@ -17,7 +17,7 @@ TLOG = struct.pack(">Q", 1_700_000_000_000_000)
     ("head", "words"),
     [
         (b"ULog\x01\x12\x35\x00", "a ULog file of PX4: open it with dtm.open_log"),
-        (b"\xa3\x95\x80\x80", "a DataFlash log of ArduPilot: open it with dtm.open_log"),
+        (b"\xa3\x95\x80\x80", "a DataFlash log of ArduPilot or PX4: open it with dtm.open_log"),
         (b"FMT, 128, 89, FMT, BBnNZ, Type", "DataFlash log of ArduPilot in text form: open it"),
         (b"H Product:Blackbox flight data recorder", "a Blackbox log .*: open it with dtm.open_lo"),
         (b"\xbc\x01", "a Crazyflie's memory card: open it with dtm.open_log"),

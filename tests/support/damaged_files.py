@@ -2,10 +2,10 @@
 
     python tests/support/damaged_files.py DataFlash --count 1000000 --seed 1
 
-Files of at most 4 kB are changed at random and read in this process. It prints, as JSON, how many
-were read and refused, the longest time for one, and by how much the memory grew. Any other
-exception, a file that takes more than `LIMIT` seconds, and a crash end it with an error; the file
-is left in the folder that is printed then.
+Files of at most 4 kB, bags of at most 32, are changed at random and read in this process. It
+prints, as JSON, how many were read and refused, the longest time for one, and by how much the
+memory grew. Any other exception, a file that takes more than `LIMIT` seconds, and a crash end it
+with an error; the file is left in the folder that is printed then.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from pathlib import Path
 import deadtime as dtm
 import numpy as np
 from mutations import LARGEST, mutated
+from small_bags import LARGEST as LARGEST_BAG, SMALL_BAGS, read_bag
 from small_logs import SMALL
 from small_tables import FORMATS, WORDS
 
@@ -66,12 +67,16 @@ def too_long(*_) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("format", choices=[*FORMATS, *SMALL])
+    parser.add_argument("format", choices=[*FORMATS, *SMALL, *SMALL_BAGS])
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     draw = random.Random(options.seed)
-    if options.format in FORMATS:
+    largest, ending = LARGEST, ""
+    if options.format in SMALL_BAGS:
+        ending, made = SMALL_BAGS[options.format]
+        largest, contents, words, readers = LARGEST_BAG, [made()], WORDS[:4], [read_bag]
+    elif options.format in FORMATS:
         contents, words, readers = FORMATS[options.format](), WORDS, [read_table] * 9 + [load_table]
     else:
         contents, words, readers = (
@@ -80,16 +85,16 @@ def main() -> None:
             [open_log] * 9 + [show_log],
         )
     folder = Path(tempfile.mkdtemp(prefix="damaged-"))
-    path = folder / "file"
+    path = folder / f"file{ending}"
     counts = {"read": 0, "refused": 0, "slowest": 0.0}
     for content in contents:
-        assert len(content) <= LARGEST, len(content)
+        assert len(content) <= largest, len(content)
         path.write_bytes(content)
         readers[0](path)
     signal.signal(signal.SIGALRM, too_long)
     before = peak()
     for _ in range(options.count):
-        path.write_bytes(mutated(draw.choice(contents), draw, words))
+        path.write_bytes(mutated(draw.choice(contents), draw, words, largest))
         read = draw.choice(readers)
         signal.setitimer(signal.ITIMER_REAL, LIMIT)
         start = time.perf_counter()

@@ -9,7 +9,12 @@ from collections.abc import Sequence
 LARGEST = 4096
 
 
-def mutated(data: bytes, draw: random.Random, words: Sequence[bytes] = (b"\0", b"\xff")) -> bytes:
+def mutated(
+    data: bytes,
+    draw: random.Random,
+    words: Sequence[bytes] = (b"\0", b"\xff"),
+    largest: int = LARGEST,
+) -> bytes:
     """A copy with one to eight damages, of which one may be a word; the first bytes mostly stay."""
     found = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 3, 5, 8))):
@@ -39,4 +44,4 @@ def mutated(data: bytes, draw: random.Random, words: Sequence[bytes] = (b"\0", b
                 found[at : at + width] = (number % 256**width).to_bytes(width, order)
             case 8:
                 del found[at:]
-    return bytes(found[:LARGEST])
+    return bytes(found[:largest])

@@ -3,7 +3,7 @@
 import numpy as np
 from blackbox_logs import END, rate_log, rate_rows
 from crazyflie_logs import definitions, record, sealed
-from made_logs import Tlog, ULogFile, as_text, copter
+from made_logs import DataFlash, Tlog, ULogFile, as_text, copter
 
 
 def small_ulog():
@@ -66,10 +66,38 @@ def small_crazyflie():
     return sealed(definitions(events) + b"".join(frames))
 
 
+def sdlog2(rows=200, armed=lambda k: 2, landed=lambda k: 0):
+    """A log of PX4 before ULog: a message TIME before all that are logged together."""
+    log = DataFlash()
+    log.define("TIME", 0x81, "Q", "StartTime")
+    log.define("VER", 0x82, "NZ", "Arch,FwGit")
+    log.define("PARM", 0x83, "Nf", "Name,Value")
+    log.define("ATT", 2, "ffffff", "Roll,Pitch,Yaw,RollRate,PitchRate,YawRate")
+    log.define("ATSP", 3, "ffff", "RollSP,PitchSP,YawSP,ThrustSP")
+    log.define("ARSP", 4, "fff", "RollRateSP,PitchRateSP,YawRateSP")
+    log.define("LPOS", 5, "ff", "Z,VZ")
+    log.define("GVSP", 6, "fff", "VX,VY,VZ")
+    log.define("STAT", 7, "BBB", "MainState,ArmState,Landed")
+    log.add("VER", "PX4FMU_V2", "0123456789abcdef")
+    log.add("PARM", "MC_ROLLRATE_P", 0.15)
+    for k in range(rows):
+        log.add("TIME", 20_000_000 + 20_000 * k)
+        if k % 10 == 0:
+            log.add("STAT", 0 if k < 50 else 2 if k < 150 else 4, armed(k), landed(k))
+        asked, came = float(k % 50 >= 10), 0.9 * (k % 50 >= 13)
+        log.add("ATT", came, came, came, came, came, came)
+        log.add("ATSP", asked, asked, asked, 0.5)
+        log.add("ARSP", asked, asked, asked)
+        log.add("LPOS", came, came)
+        log.add("GVSP", 0.0, 0.0, asked)
+    return log
+
+
 SMALL = {
     "ULog": ("pyulog", small_ulog),
     "DataFlash": ("numpy", lambda: copter(60).data),
     "DataFlash text": ("numpy", small_text),
+    "sdlog2": ("numpy", lambda: sdlog2(22).data),
     "tlog": ("pymavlink", small_tlog),
     "Blackbox": ("numpy", small_blackbox),
     "Crazyflie uSD": ("numpy", small_crazyflie),

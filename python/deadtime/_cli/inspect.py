@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from deadtime._cli import options as opt
+from deadtime._cli.exit_codes import NONE
 from deadtime._cli.fills import filled
 from deadtime._cli.show import print_json, print_points, print_table, print_text, results_table
-from deadtime.logs import Log, LogLoop, open_log
+from deadtime.logs import Bag, Log, LogLoop, is_bag, open_bag, open_log
 
 
 @filled
@@ -25,10 +26,18 @@ def command(
     Parameters
     ----------
     log
-        Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD.
+        Log file: ULog, DataFlash (.bin or .log), tlog, Blackbox or Crazyflie uSD; or a bag of
+        messages: MCAP or ROS, whose topics and fields are listed.
     loop
         Tell about this loop only, for example 'roll rate'.
+
+    Exit codes: 0 an answer, 3 the log holds no loop, 1 an error.
     """
+    if is_bag(log):
+        if loop is not None or flight is not None:
+            raise ValueError(f"{log} is a bag, which has topics: leave --loop and --flight out")
+        _print_bag(open_bag(log), as_json)
+        return
     found = open_log(log, flight=flight)
     if loop is not None:
         one = found.loop(loop)
@@ -40,6 +49,19 @@ def command(
         print_json("log", found.to_dict())
     else:
         _print_log(found)
+    if not found.loops and found.link is None:
+        raise typer.Exit(NONE)
+
+
+def _print_bag(bag: Bag, as_json: bool) -> None:
+    """The topics of a bag with their rates, and their fields as other commands take them."""
+    if as_json:
+        print_json("bag", bag.to_dict())
+        return
+    headline, *lines = bag.summary().splitlines()
+    print_text(headline, "bold")
+    for line in lines:
+        print_text(line, wrapped=False)
 
 
 def _print_log(log: Log) -> None:

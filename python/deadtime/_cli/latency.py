@@ -8,11 +8,15 @@ from typing import Annotated
 import typer
 
 from deadtime._base.digits import between, stated
+from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.exit_codes import NONE
 from deadtime._cli.show import print_json, print_table, print_text, results, results_table
 from deadtime.logs import Latency, Log, compare_latencies, latency, loops_asked_for, open_log
+
+#: Shortest log, s: the fastest rate loop takes 30 ms to respond, and has to be seen doing it twice.
+SHORTEST = 0.1
 
 LEFT = ("loop", "from", "why")
 
@@ -50,6 +54,8 @@ def command(
         if len(logs) > 1:
             raise ValueError("--out writes the page of one log: give one, or leave it out")
     found = [_told(open_log(one, flight=flight), axis, loop, as_json) for one in logs]
+    # Before anything is printed: whoever reads the output may close it.
+    written = None if out is None else found[0].report(out)
     if as_json and len(found) == 1:
         print_json("latency", found[0].to_dict())
     elif as_json:
@@ -60,15 +66,18 @@ def command(
             _print(one)
         if len(found) == 2:
             _print_changes(*found)
-    if out is not None:
-        written = found[0].report(out)
-        if not as_json:
-            print_text(f"report: {written}")
+    if written is not None and not as_json:
+        print_text(f"report: {written}")
     if not any(one.estimated for one in found):
         raise typer.Exit(NONE)
 
 
 def _told(log: Log, axes: list[str] | None, loops: list[str] | None, quiet: bool) -> Latency:
+    if log.duration < SHORTEST:
+        raise NotIdentifiableError(
+            f"{log.source} is {stated(log.duration, 0.0, 's')} long, in which no loop of a vehicle "
+            "responds: give a longer log"
+        )
     count = loops_asked_for(log, axes, loops)
     with results(f"{log.source}, {count} times", count, quiet=quiet) as tell:
         return latency(log, axes=axes, loops=loops, progress=tell)

@@ -5,6 +5,7 @@ from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
 from deadtime.logs._series import Series
+from deadtime.logs.bags import Bag, BagTopic, is_bag, open_bag, recording_of_fields
 from deadtime.logs.latencies import (
     FilterDelay,
     GainCost,
@@ -18,6 +19,8 @@ from deadtime.logs.latencies import (
 from deadtime.logs.latencies._latency import loops_asked_for as loops_asked_for
 
 __all__ = [
+    "Bag",
+    "BagTopic",
     "FilterDelay",
     "GainCost",
     "Latency",
@@ -31,6 +34,9 @@ __all__ = [
     "Stage",
     "Topic",
     "compare_latencies",
+    "is_bag",
     "latency",
+    "open_bag",
     "open_log",
+    "recording_of_fields",
 ]

@@ -28,4 +28,8 @@ def names_of(contents: LogContents) -> AutopilotNames:
         from deadtime.logs._mavlink import LOOPS
 
         return AutopilotNames(LOOPS, found.key_parameters)
+    if contents.format == "sdlog2":
+        from deadtime.logs._sdlog2 import sdlog2_names
+
+        return sdlog2_names(found)
     return found

@@ -12,6 +12,11 @@ from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER, SUB
 from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._dataflash_messages import Messages
 from deadtime.logs._dataflash_vehicle import vehicle_of
+from deadtime.logs._sdlog2 import MODES as PX4_MODES
+from deadtime.logs._windows import changes_of
+
+#: Letters of a commit that are shown.
+SHORT_COMMIT = 10
 
 #: Numbers of events.
 ARMED, DISARMED, LANDED, FLYING = 10, 11, 18, 28
@@ -31,6 +36,8 @@ def contents_of(form: str, source: str, messages: Messages, remarks: list[str]) 
         raise RecordingError(
             f"{source} begins as a DataFlash log, but holds no message whose format it tells"
         )
+    if messages.of_px4:
+        return _contents_of_px4(messages, remarks)
     texts = messages.texts("MSG", "Message")
     parameters = _parameters(messages)
     vehicle, firmware, how = vehicle_of(messages, parameters)
@@ -44,6 +51,27 @@ def contents_of(form: str, source: str, messages: Messages, remarks: list[str]) 
         parameters=parameters,
         modes=_modes(messages, vehicle),
         remarks=(*remarks, *filter(None, [how])),
+    )
+
+
+def _contents_of_px4(messages: Messages, remarks: list[str]) -> LogContents:
+    """What PX4 wrote in this frame before it had ULog."""
+    modes: tuple[tuple[float, str], ...] = ()
+    status = messages.get("STAT")
+    if status is not None and "MainState" in status.columns:
+        known = np.isfinite(status.time)
+        numbers = status.columns["MainState"][known].astype(np.int64)
+        changes = changes_of(status.time[known], numbers) if numbers.size else []
+        modes = tuple((at, PX4_MODES.get(number, f"mode {number}")) for at, number in changes)
+    return LogContents(
+        format="sdlog2",
+        autopilot="PX4",
+        vehicle=next(iter(messages.texts("VER", "Arch")), ""),
+        firmware=next(iter(messages.texts("VER", "FwGit")), "")[:SHORT_COMMIT],
+        topics=messages,
+        parameters=_parameters(messages),
+        modes=modes,
+        remarks=tuple(remarks),
     )
 
 

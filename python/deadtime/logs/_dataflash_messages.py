@@ -52,12 +52,19 @@ class Layout:
         return [name for name, letter in pairs if letter in DIVISORS]
 
     @property
+    def holds_time(self) -> bool:
+        """Whether it is the message of PX4 that holds the time of all that follow it."""
+        return self.name == "TIME" and "StartTime" in self.numbers
+
+    @property
     def clock(self) -> tuple[str, float] | None:
         """The column of the vehicle's clock, and its unit in s; None if there is none.
 
         Logs since 2015 hold µs, older ones ms. In the old GPS message that column is the time of
-        the satellites, and T that of the vehicle.
+        the satellites, and T that of the vehicle. In PX4's, one message holds that of others.
         """
+        if self.holds_time:
+            return "StartTime", 1e-6
         if "TimeUS" in self.numbers:
             return "TimeUS", 1e-6
         name = "T" if {"T", "TimeMS", "Week"} <= set(self.numbers) else "TimeMS"
@@ -85,6 +92,11 @@ class Messages(Mapping[str, Topic], ABC):
         timed = [name for name, layout in layouts.items() if layout.clock is not None]
         self._densest = max(timed, key=lambda name: places[name].size, default=None)
         self._rows = self._instances()
+
+    @property
+    def of_px4(self) -> bool:
+        """Whether PX4 has written them, by sdlog2."""
+        return any(layout.holds_time for layout in self._layouts.values())
 
     @abstractmethod
     def columns(self, layout: Layout, places: NDArray[np.int64]) -> Mapping[str, Array]:
@@ -124,7 +136,10 @@ class Messages(Mapping[str, Topic], ABC):
     def _time(
         self, layout: Layout, places: NDArray[np.int64], columns: Mapping[str, Array]
     ) -> Array:
-        """Times of the messages; of those without one, that of the next message that has one."""
+        """Times of the messages; of those without one, that of the next message that has one.
+
+        In logs of PX4 it is that of the message before them that holds the time.
+        """
         if layout.clock is not None:
             name, unit = layout.clock
             return columns[name] * unit
@@ -132,6 +147,8 @@ class Messages(Mapping[str, Topic], ABC):
             return np.full(places.size, np.nan)
         timed, at = self._layouts[self._densest], self._places[self._densest]
         time = self._time(timed, at, self.columns(timed, at))
+        if timed.holds_time:
+            return time[np.maximum(np.searchsorted(at, places, side="right") - 1, 0)]
         return time[np.minimum(np.searchsorted(at, places), time.size - 1)]
 
     def _instances(self) -> dict[str, tuple[Layout, NDArray[np.int64]]]:

@@ -28,7 +28,8 @@ class LogLoop(ReadOnlyArrays):
     name : str
         For example ``"roll rate"``, ``"pitch"``, ``"vertical speed"``, ``"north position"``.
     axis : str
-        ``"roll"``, ``"pitch"``, ``"yaw"``, ``"north"``, ``"east"`` or ``"vertical"``.
+        ``"roll"``, ``"pitch"``, ``"yaw"``, ``"north"``, ``"east"``, ``"vertical"`` or, of a
+        rover, ``"forward"``.
     kind : str
         ``"rate"``, ``"attitude"``, ``"velocity"`` or ``"position"``; an altitude is a position.
     setpoint, response : Series
@@ -175,8 +176,8 @@ class Log(ReadOnlyArrays):
     source : str
         Name of the file.
     format : str
-        ``"ULog"``, ``"DataFlash"``, ``"DataFlash text"``, ``"tlog"``, ``"Blackbox"`` or
-        ``"Crazyflie uSD"``.
+        ``"ULog"``, ``"DataFlash"``, ``"DataFlash text"``, ``"sdlog2"`` (PX4 before ULog),
+        ``"tlog"``, ``"Blackbox"`` or ``"Crazyflie uSD"``.
     autopilot, vehicle, firmware : str
         As the log tells; empty if it does not.
     start : float

@@ -100,7 +100,7 @@ class LoopNames:
     name : str
         ``"roll rate"``, ``"pitch"``, ``"vertical speed"``, ``"altitude"``, ``"north position"``.
     axis : str
-        ``"roll"``, ``"pitch"``, ``"yaw"``, ``"north"``, ``"east"`` or ``"vertical"``.
+        ``"roll"``, ``"pitch"``, ``"yaw"``, ``"north"``, ``"east"``, ``"vertical"``, ``"forward"``.
     kind : str
         ``"rate"``, ``"attitude"``, ``"velocity"`` or ``"position"``.
     setpoint, response, actuator : sequence of Signal

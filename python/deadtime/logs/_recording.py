@@ -15,7 +15,7 @@ EARLIER = 0.5
 
 def recording_of(
     name: str,
-    setpoint: Series,
+    setpoint: Series | None,
     response: Series,
     told: Series,
     part: tuple[float | None, float | None],
@@ -41,10 +41,12 @@ def recording_of(
     time, output = time[fresh], output[fresh]
     kept = sent >= time[0] - EARLIER * (time[-1] - time[0])
     kept |= sent >= sent[np.searchsorted(sent, time[0], side="right") - 1]
-    units = {"output": response.unit, "reference": setpoint.unit, "command": told.unit}
+    units = {"output": response.unit, "command": told.unit}
+    if setpoint is not None:
+        units["reference"] = setpoint.unit
     return Recording(
         time,
-        _held(setpoint, time),
+        None if setpoint is None else _held(setpoint, time),
         output,
         units={signal: unit for signal, unit in units.items() if unit},
         source=f"{name}, {told.source} to {response.source}",

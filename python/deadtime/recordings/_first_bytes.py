@@ -11,7 +11,7 @@ from typing import Literal
 
 from deadtime._base.errors import RecordingError
 
-Opener = Literal["read_recording", "open_log"]
+Opener = Literal["read_recording", "open_log", "open_bag"]
 
 #: So many bytes tell the format.
 HEAD = 8192
@@ -21,6 +21,9 @@ LARGEST_FILE, PIECE = 1_000_000_000, 1 << 20
 
 #: A line of a DataFlash log in text form, which defines a message; lines before it may be damaged.
 _FMT = re.compile(rb"^FMT, *\d+, *\d+, *\w+, *\w+,", re.MULTILINE)
+
+#: The text that a clone without Git LFS has in place of each large file.
+LFS, LFS_WHAT = b"version https://git-lfs.github.com/spec/", "a Git LFS pointer and not the file"
 
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -69,11 +72,16 @@ def _kinds() -> list[Kind]:
     )
     logs = (
         ("ULog", "a ULog file of PX4", _starts(b"ULog\x01\x12\x35")),
-        ("DataFlash", "a DataFlash log of ArduPilot", _starts(b"\xa3\x95")),
+        ("DataFlash", "a DataFlash log of ArduPilot or PX4", _starts(b"\xa3\x95")),
         ("Blackbox", "a Blackbox log of Betaflight or INAV", _starts(b"H Product:Blackbox")),
         ("Crazyflie uSD", "a log of a Crazyflie's memory card", _is_crazyflie),
         ("DataFlash text", "a DataFlash log of ArduPilot in text form", _is_dataflash_text),
         ("tlog", "a MAVLink log of a ground station (tlog)", _is_tlog),
+    )
+    bags = (
+        ("MCAP", "an MCAP file", _starts(b"\x89MCAP0\r\n")),
+        ("ROS 1 bag", "a ROS bag", _starts(b"#ROSBAG V")),
+        ("ROS 2 bag", "an SQLite database, as a bag of ROS 2 is", _starts(b"SQLite format 3\0")),
     )
     others = (
         (
@@ -92,16 +100,15 @@ def _kinds() -> list[Kind]:
         ("packed by xz", b"\xfd7zXZ\0", "unpack it"),
         ("packed by zstd", b"\x28\xb5\x2f\xfd", "unpack it"),
         ("a 7z archive", b"7z\xbc\xaf\x27\x1c", "unpack it"),
-        ("an SQLite database", b"SQLite format 3\0", "give a table of it as a DataFrame"),
-        ("a ROS bag", b"#ROSBAG V", "export its topic as CSV"),
-        ("an MCAP file", b"\x89MCAP0\r\n", "export its topic as CSV"),
         ("a Feather file of version 1", b"FEA1", "write version 2, or Parquet"),
         ("a PNG picture", b"\x89PNG\r\n\x1a\n", "give the numbers behind it"),
         ("a JPEG picture", b"\xff\xd8\xff", "give the numbers behind it"),
         ("a PDF document", b"%PDF-", "give the numbers behind it"),
     )
     return [
+        Kind("", LFS_WHAT, _starts(LFS), None, "run `git lfs pull` where it was cloned"),
         *(Kind(name, what, begins, "open_log") for name, what, begins in logs),
+        *(Kind(name, what, begins, "open_bag") for name, what, begins in bags),
         *(Kind("", what, _starts(first), None, advice) for what, first, advice in others),
         *(Kind(name, what, begins, "read_recording") for name, what, begins in tables),
         Kind("text", "a text, and no log of an autopilot", _is_text, "read_recording"),
@@ -156,5 +163,6 @@ def format_of(path: object, head: bytes, opener: Opener) -> str | None:
         return None
     if kind.opener == opener:
         return kind.name
-    advice = kind.advice or f"open it with dtm.{kind.opener}(path)"
+    place = "deadtime.logs" if kind.opener == "open_bag" else "dtm"
+    advice = kind.advice or f"open it with {place}.{kind.opener}(path)"
     raise RecordingError(f"{path} is {kind.what}: {advice}")
