@@ -49,6 +49,10 @@ PAUSE = 2.5
 #: Times after which a plant has forgotten its input, and relative step of differences.
 MEMORY, STEP = 6.0, 1e-4
 
+#: A slope in errors of a row that rounding leaves of a setpoint at rest, and the condition of an
+#: information, with numbers of like size, that is singular to rounding.
+NOTHING, SINGULAR = 1e-30, 1e12
+
 #: Mean square of a change less the mean of its neighbours, for changes of unit variance.
 BEYOND = 1.5
 
@@ -106,10 +110,10 @@ def _moved(plant: Plant, change: Array) -> Plant:
 def _error(information: Array, turn: Array) -> float:
     """Standard error of the time; infinite where the information is singular."""
     scale = np.sqrt(np.diag(information))
-    if not np.all(scale > 0.0):
+    if not np.all(scale > NOTHING):
         return np.inf
     scaled = information / np.outer(scale, scale)
-    if np.linalg.cond(scaled) > 1e12:
+    if np.linalg.cond(scaled) > SINGULAR:
         return np.inf
     along = turn / scale
     return float(np.sqrt(along @ np.linalg.solve(scaled, along)))
