@@ -24,6 +24,7 @@ from tempfile import TemporaryDirectory
 
 import deadtime as dtm
 import numpy as np
+from deadtime.logs import LoopLatency
 from flown_cases import CASES
 from flown_files import SUFFIXES
 from flown_logs import fly
@@ -39,6 +40,9 @@ CASES_OF_THE_TEST = (3, 6, 9, 11, 15, 18, 22, 28)
 
 #: A log tells its time if half the interval of the bound is below this share of it.
 TELLS = 0.2
+
+#: Where a loop says why it is not reliable.
+REASONS = ("reason", "refusal")
 
 #: Half an interval of 95 % in standard errors.
 TWO_SIDED = 1.96
@@ -100,17 +104,20 @@ def answer(number: int, seed: int) -> Answer:
     return Answer(number, seed, truth, bound.error, bound.block, *said, seconds)
 
 
-def _said(loop: object) -> tuple[str, float, float, float, str]:
+def _said(loop: LoopLatency) -> tuple[str, float, float, float, str]:
     """Verdict, time, interval and reason of a loop."""
-    fit = getattr(loop, "estimate", None)
-    if fit is None:
-        return "none", np.nan, np.nan, np.nan, getattr(loop, "refusal", "")
-    verdict = getattr(loop, "verdict", None) or fit.verdict
+    # A loop with an estimate, or with none and a refusal, has no verdict of its own.
+    fit = loop.estimate
+    verdict = getattr(loop, "verdict", None) or ("none" if fit is None else fit.verdict)
+    reason = next((said for said in (getattr(loop, name, "") for name in REASONS) if said), "")
+    if verdict == "none":
+        return verdict, np.nan, np.nan, np.nan, reason
     if hasattr(loop, "interval"):
         value, (low, high) = loop.time, loop.interval
     else:
         value, _, (low, high) = loop.sum_of()
-    reason = "" if verdict == "reliable" else getattr(loop, "reason", None) or fit.reason
+    if verdict != "reliable":
+        reason = reason or fit.reason
     return verdict, float(value), float(low), float(high), reason
 
 
