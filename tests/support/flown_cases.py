@@ -150,12 +150,12 @@ CASES: tuple[Case, ...] = (
     _ulog(RATE, 1000, (100, 200), 60, "smooth", 0.4, 0.7, "pair", COPTER, LOUD, gust=0.2),
     _ulog(RATE, 1000, (1000, 1000), 30, "jumps", 0.4, 0.3, "pair", COPTER, LOUD, colour=0.2),
     # controller Hz, rows Hz, seconds, …
-    _box(1000, 250, 60, "smooth", 0.4, 0.3, "lag", RACER, QUIET),
-    _box(2000, 500, 40, "jumps", 0.3, 0.3, "pair", RACER, QUIET, vibration=0.05),
+    _box(1000, 250, 60, "smooth", 0.4, 0.3, "lag", RACER, QUIET, gust=0.1),
+    _box(2000, 500, 40, "jumps", 0.3, 0.3, "pair", RACER, QUIET, gust=0.1, vibration=0.05),
     _box(8000, 1000, 30, "smooth", 0.3, 0.2, "lags", RACER, QUIET, gust=0.1, colour=0.03),
-    _box(2000, 2000, 30, "doublets", 0.2, 0.5, "pair", RACER, QUIET, damping=RINGING),
+    _box(2000, 2000, 30, "doublets", 0.2, 0.5, "pair", RACER, QUIET, gust=0.2, damping=RINGING),
     # controller Hz, rows Hz (setpoint, response), seconds, …
-    _tlog(400, (4, 4), 120, "smooth", 2.0, 0.1, "lag", LARGE, QUIET),
+    _tlog(400, (4, 4), 120, "smooth", 2.0, 0.1, "lag", LARGE, QUIET, gust=0.05),
     _tlog(400, (4, 10), 120, "jumps", 2.0, 0.2, "pair", LARGE, QUIET, gust=0.1, lost=0.05),
     _tlog(400, (10, 10), 120, "smooth", 1.2, 0.3, "pair", ANGLE, QUIET, gust=0.1),
     _tlog(250, (20, 20), 90, "jumps", 1.0, 0.3, "lags", ANGLE, QUIET, lost=0.05),
