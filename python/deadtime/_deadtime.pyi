@@ -773,6 +773,7 @@ def fit_family(
     level: float = 0.95,
     omega: Sequence[float] | None = None,
     progress: _Progress = None,
+    known: FamilyFit | None = None,
 ) -> FamilyFit: ...
 def whitened_columns(
     num: Sequence[float],

@@ -43,7 +43,7 @@ from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
 from deadtime.estimation.evidence._candidate import PlantCandidate
 from deadtime.estimation.evidence._estimate import PlantEstimate
-from deadtime.estimation.evidence._find import fit_alone as fit_alone
+from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
 from deadtime.estimation.evidence._words import Advice

@@ -2,7 +2,7 @@
 
 use deadtime::estimation::{
     Between, Candidate, Class, Family, FamilyNoise, Grade, Named, Question, Record,
-    fit_family as fit,
+    fit_family as fit, refine_family,
 };
 use numpy::{PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
@@ -294,10 +294,10 @@ type Columns<'py> = (
     f64,
 );
 
-/// Fit the family of plants to records of one plant.
+/// Fit the family of plants to records of one plant; with what some of them show, only beside that.
 #[pyfunction]
 #[pyo3(signature = (records, *, kind="held", controller=false, at_rest=None, largest_delay=None,
-    plant=None, integrating=None, noise=None, level=0.95, omega=None, progress=None))]
+    plant=None, integrating=None, noise=None, level=0.95, omega=None, progress=None, known=None))]
 #[expect(clippy::too_many_arguments, reason = "given by name")]
 pub(crate) fn fit_family(
     py: Python<'_>,
@@ -312,6 +312,7 @@ pub(crate) fn fit_family(
     level: f64,
     omega: Option<Vec<f64>>,
     progress: Option<Py<PyAny>>,
+    known: Option<Py<FamilyFit>>,
 ) -> PyResult<FamilyFit> {
     let record = |(time, command, output, earlier, sent, hold): &Columns<'_>| {
         PyResult::Ok(Record {
@@ -338,7 +339,11 @@ pub(crate) fn fit_family(
     };
     let core = run(py, Some(1), progress.as_ref(), |task| {
         let records = records.into_iter().map(Record::checked);
-        fit(&records.collect::<Result<Vec<_>, _>>()?, &question, task)
+        let records = records.collect::<Result<Vec<_>, _>>()?;
+        match &known {
+            Some(known) => refine_family(&known.get().core, &records, &question, task),
+            None => fit(&records, &question, task),
+        }
     })?;
     let candidates = core.candidates.iter();
     let candidates = candidates.map(|one| Py::new(py, FamilyCandidate::new(py, one)));

@@ -96,8 +96,12 @@ class Question(ReadOnlyArrays):
         level: float = 0.95,
         omega: Sequence[float] = (),
         progress: Callable[[int], object] | None = None,
+        known: native.FamilyFit | None = None,
     ) -> native.FamilyFit:
-        """Ask the kernel; every interval of the answer has this level."""
+        """Ask the kernel; every interval of the answer has this level.
+
+        With the answer to fewer rows, plants are looked for beside those alone.
+        """
         records = [one.record for one in self.each]
         return native.fit_family(
             records,
@@ -110,6 +114,7 @@ class Question(ReadOnlyArrays):
             level=level,
             omega=tuple(omega),
             progress=progress,
+            known=known,
         )
 
     def of(self, plant: str | None) -> Question:

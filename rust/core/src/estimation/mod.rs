@@ -46,7 +46,7 @@ mod whiten;
 pub use disturbance::{Disturbance, Entry};
 pub use family::{
     Between, Candidate, Class, Coefficients, Family, Grade, Named, Noise as FamilyNoise, Numbers,
-    Question, Record, Triple, Verdict, fit_family,
+    Question, Record, Triple, Verdict, fit_family, refine_family,
 };
 pub use fit::{Fit, Model, Search};
 pub use flight::{

@@ -4,7 +4,7 @@ use super::candidate::Candidate;
 use super::class::{Class, Numbers};
 use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, Triple, at, hull, turning};
-use super::minima::{Minimum, Plan, minima, without_plant};
+use super::minima::{Minimum, Plan, beside, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Part, Record, Rows, Start};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
@@ -134,10 +134,8 @@ fn check_level(level: f64) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Argument`] for numbers out of range or too few rows, and as a task ends.
 pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Result<Family, Error> {
-    let shortest = records
-        .iter()
-        .fold(f64::INFINITY, |least, one| least.min(one.span()));
-    refuse_if!(records.is_empty(), "0 records: give at least one");
+    let starts = starts_of(records, question)?;
+    let shortest = shortest(records);
     if let Some(delay) = question.largest_delay {
         refuse_if!(
             !(delay > 0.0 && delay <= shortest),
@@ -145,12 +143,6 @@ pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Resul
         );
     }
     check_level(question.level)?;
-    let start = |record: &Record| match question.at_rest {
-        Some(true) => Start::Rest,
-        None if record.begins_at_rest() => Start::Held,
-        _ => Start::Unknown,
-    };
-    let starts: Vec<Start> = records.iter().map(start).collect();
     let kinds: &[bool] = match question.between {
         Between::Held => &[false],
         Between::Straight => &[true],
@@ -166,6 +158,69 @@ pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Resul
     }
     let out = joined(found, task)?;
     moved(records, question, &starts, &out, task).map(|moved| moved.unwrap_or(out))
+}
+
+/// What is known of the plant at the first row of each record.
+fn starts_of(records: &[Record], question: &Question) -> Result<Vec<Start>, Error> {
+    refuse_if!(records.is_empty(), "0 records: give at least one");
+    let start = |record: &Record| match question.at_rest {
+        Some(true) => Start::Rest,
+        None if record.begins_at_rest() => Start::Held,
+        _ => Start::Unknown,
+    };
+    Ok(records.iter().map(start).collect())
+}
+
+/// The length of the shortest record, s.
+fn shortest(records: &[Record]) -> f64 {
+    let spans = records.iter().map(Record::span);
+    spans.fold(f64::INFINITY, f64::min)
+}
+
+fn check_rows(rows: &Rows, largest: f64) -> Result<(), Error> {
+    for part in &rows.parts {
+        refuse_if!(
+            part.used.len() < FEWEST_ROWS,
+            "{} rows count, those after the largest delay of {largest} s whose output is known; a fit \
+             needs {FEWEST_ROWS}: give more rows, or a smaller largest delay",
+            part.used.len()
+        );
+    }
+    Ok(())
+}
+
+/// The plants that some records leave, fitted to more rows of the same plant: searched only beside the
+/// numbers that are known, so that many rows take little time.
+///
+/// # Errors
+/// As of [`fit_family`].
+pub fn refine_family(
+    known: &Family,
+    records: &[Record],
+    question: &Question,
+    task: &Task,
+) -> Result<Family, Error> {
+    let starts = starts_of(records, question)?;
+    let longest = known.minima.iter().map(|one| one.numbers.delay);
+    let longest = longest.fold(0.0, f64::max);
+    let row = records.iter().map(Record::row).fold(0.0, f64::max);
+    let largest = question.largest_delay.unwrap_or(known.largest_delay);
+    let room = largest.min(ROOM.0 * longest + ROOM.1 * row);
+    let mut rows = Rows::new(records, &starts, room, known.straight, question.in_loop);
+    check_rows(&rows, room)?;
+    let mut rounds = 0;
+    loop {
+        let found = beside(&known.minima, &rows, task)?;
+        let now = weights_of(&found);
+        if rounds < REWEIGHTED && differ(&now, &rows.weights) {
+            rows.weights = now;
+            rounds += 1;
+            continue;
+        }
+        let mut out = answer(&found, f64::INFINITY, question, largest, task)?;
+        (out.room, out.weights, out.decided) = (room, rows.weights.clone(), known.decided);
+        return Ok(out);
+    }
 }
 
 /// The more likely kind of command; where neither is, its intervals are those of both.
@@ -278,22 +333,12 @@ fn one_kind(
     known: Option<&Family>,
     task: &Task,
 ) -> Result<Family, Error> {
-    let shortest = records
-        .iter()
-        .fold(f64::INFINITY, |least, one| least.min(one.span()));
     let largest = question
         .largest_delay
-        .unwrap_or(RANGES.delay_share * shortest);
+        .unwrap_or(RANGES.delay_share * shortest(records));
     let (mut classes, noises) = asked(question);
     let mut rows = Rows::new(records, starts, largest, straight, question.in_loop);
-    for part in &rows.parts {
-        refuse_if!(
-            part.used.len() < FEWEST_ROWS,
-            "{} rows count, those after the largest delay of {largest} s whose output is known; a fit \
-             needs {FEWEST_ROWS}: give more rows, or a smaller largest delay",
-            part.used.len()
-        );
-    }
+    check_rows(&rows, largest)?;
     let (mut room, mut seeds, mut weights);
     if let Some(known) = known {
         (room, seeds, weights) = (known.room, known.seeds(), known.weights.clone());

@@ -1,5 +1,6 @@
 //! The minima of every class under every noise that may be the true one.
 
+use super::candidate::Candidate;
 use super::class::{Class, Numbers};
 use super::model::{Model, Point};
 use super::noise::Noise;
@@ -294,6 +295,62 @@ fn under<'a>(
         all.extend(distinct(&model, starts, (STARTS.refined, best), task)?);
     }
     Ok(all)
+}
+
+/// The minima beside these candidates on other rows, each under its own noise or a richer one, the best
+/// first.
+pub(super) fn beside<'a>(
+    known: &[Candidate],
+    rows: &'a Rows,
+    task: &Task,
+) -> Result<Vec<Minimum<'a>>, Error> {
+    let mut out: Vec<Minimum<'a>> = Vec::new();
+    for one in known {
+        let mut best: Option<Minimum<'a>> = None;
+        for kind in Noise::ALL {
+            if kind.order() < one.noise.order() {
+                continue;
+            }
+            let model = Model {
+                rows,
+                class: one.class,
+                noise: kind,
+                responds: true,
+                level: true,
+            };
+            let (start, before) = match &best {
+                Some(found) => (found.point.clone(), found.point.x.clone()),
+                None => {
+                    let white = Model {
+                        noise: Noise::White,
+                        ..model
+                    };
+                    let x = white.point_of(&one.numbers, &[]);
+                    (white.at(x.clone()), x)
+                }
+            };
+            let plant = model.plant_numbers();
+            let mut x = before[..plant].to_vec();
+            x.extend(noise(&model, &start, &before[plant..]));
+            let point = minimum(&model, model.at(x), f64::INFINITY, task)?;
+            let found = Minimum::new(model, point);
+            if best.as_ref().is_some_and(|best| best.bic <= found.bic) {
+                break;
+            }
+            best = Some(found);
+        }
+        let is_new = |found: &Minimum<'a>| {
+            let alike = out
+                .iter()
+                .filter(|other| other.model.class == found.model.class);
+            alike
+                .clone()
+                .all(|other| are_apart(&found.model, &other.point.x, &found.point.x))
+        };
+        out.extend(best.filter(is_new));
+    }
+    out.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    Ok(out)
 }
 
 /// The best model in which the command does nothing.

@@ -31,7 +31,7 @@ mod verdict;
 
 pub use candidate::Candidate;
 pub use class::{Class, Numbers};
-pub use fit::{Between, Family, Question, fit_family};
+pub use fit::{Between, Family, Question, fit_family, refine_family};
 pub use hull::{Named, Triple};
 pub use noise::{Coefficients, Noise};
 pub use rows::Record;
