@@ -1,7 +1,10 @@
 """Bags of ROS and MCAP files: their topics, and any two fields as a recording."""
 
 import json
+import pickle
 import random
+import subprocess
+import sys
 import tracemalloc
 
 import bags
@@ -127,6 +130,32 @@ def test_times_of_all_topics_are_of_one_kind(tmp_path, header, asked, used, why)
 def test_a_wrong_name_is_answered_by_those_that_exist(folder, command, output, message):
     with pytest.raises(dtm.RecordingError, match=message):
         recording_of_fields(folder / "zstd.mcap", command, output)
+
+
+@pytest.mark.parametrize("name", ["zstd.mcap", "old.bag", "new"])
+def test_bags_can_be_copied_and_stay_read_only(folder, name):
+    bag = open_bag(folder / name)
+    again = pickle.loads(pickle.dumps(bag))
+    assert again.to_dict() == bag.to_dict()
+    field = next(iter(bag.topics["/state"].fields[-1:]))
+    assert len(again.recording(COMMAND, f"/state:{field}")) == 998
+    with pytest.raises(TypeError):
+        bag.topics["/cmd"] = None
+
+
+@pytest.mark.parametrize(("name", "library"), [("zstd.mcap", "mcap"), ("old.bag", "rosbags")])
+def test_without_its_library_a_bag_names_the_line_that_installs_it(folder, name, library):
+    code = (
+        "import sys\n"
+        f"sys.modules[{library!r}] = None\n"
+        "import deadtime as dtm, deadtime.logs\n"
+        f"try: deadtime.logs.open_bag({str(folder / name)!r})\n"
+        "except dtm.MissingExtraError as error: print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert "pip install 'deadtime[logs]'" in done.stdout
 
 
 def test_headers_that_are_missing_are_named(folder):

@@ -409,3 +409,18 @@ def test_modes_of_px4_in_a_tlog(opened):
     found = opened(log)
     assert found.autopilot == "PX4"
     assert [name for _, name in found.modes] == ["Manual", "Position", "Takeoff", "Return"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode"),
+    [(2, "LOITER"), (1, "FBWA"), (10, "LOITER"), (11, "LOITER"), (12, "mode 5"), (27, "mode 5")],
+)
+def test_a_mode_has_the_name_of_its_vehicle(opened, kind, mode):
+    # A submarine's modes had the names of a rover's.
+    pytest.importorskip("pymavlink", reason="pymavlink reads tlogs")
+    log = Tlog()
+    m = log.dialect
+    for k in range(20):
+        log.add(1.7e9 + k, m.MAVLink_heartbeat_message(kind, 3, 128, 5, 4, 3))
+        log.add(1.7e9 + k, m.MAVLink_attitude_message(1000 + 1000 * k, 0, 0, 0, 0, 0, 0))
+    assert [name for _, name in opened(log).modes] == [mode]

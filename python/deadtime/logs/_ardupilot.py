@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from deadtime.logs._ardupilot_modes import HORIZONTAL, UNCONTROLLED, VERTICAL
-from deadtime.logs._ardupilot_units import unit_of_rate
 from deadtime.logs._ardupilot_vehicles import FILTERED, injected, plane, rover
 from deadtime.logs._conditions import closed_where, in_modes, in_the_air, not_in_modes, state
 from deadtime.logs._contents import LogContents
 from deadtime.logs._names import AutopilotNames, Condition, LoopNames, Signal
 from deadtime.logs._rotations import heading
+
+DEGREE = np.pi / 180.0
 
 #: The message of a controller is taken where it has this many times the rows of RATE, because its
 #: setpoint is the one behind a filter.
@@ -35,16 +38,14 @@ AXES = (("roll", "R", "Roll"), ("pitch", "P", "Pitch"), ("yaw", "Y", "Yaw"))
 DOWN = "downwards to upwards"
 
 
-def _inner_loops(contents: LogContents) -> list[LoopNames]:
+def _inner_loops(contents: LogContents, rate: str) -> list[LoopNames]:
     """Rate and attitude of each axis; the yaw in ATT jumps at north."""
     rates, angles = [], []
     for axis, letter, column in AXES:
-        unit = unit_of_rate(contents, axis, "RATE", letter, "deg/s")
-        asked, came = Signal("RATE", (f"{letter}Des",), unit), Signal("RATE", (letter,), unit)
+        asked, came = Signal("RATE", (f"{letter}Des",), rate), Signal("RATE", (letter,), rate)
         pid = f"PID{letter}"
-        unit = unit_of_rate(contents, axis, pid, "Act", "rad/s")
-        fast = Signal(pid, ("Tar",), unit, rule=FILTERED), Signal(pid, ("Act",), unit)
-        setpoint, response = [asked, fast[0]], [came, fast[1]]
+        setpoint = [asked, Signal(pid, ("Tar",), "rad/s", rule=FILTERED)]
+        response = [came, Signal(pid, ("Act",), "rad/s")]
         if _denser(contents, pid, "RATE"):
             setpoint, response = setpoint[::-1], response[::-1]
         rates.append(
@@ -128,6 +129,18 @@ def _vertical() -> list[LoopNames]:
     return [speed, altitude]
 
 
+def _unit_of_rates(contents: LogContents) -> str:
+    """Unit of the messages RATE: firmware of 2014 and 2015 logs hundredths of a degree.
+
+    Logs without units of their own are told apart by the gyroscope, which is in rad/s.
+    """
+    rate, gyro = contents.topics.get("RATE"), contents.topics.get("IMU")
+    if rate is None or gyro is None or "R" not in rate.columns or "GyrX" not in gyro.columns:
+        return "deg/s"
+    logged, measured = np.nanstd(rate.columns["R"]), np.nanstd(gyro.columns["GyrX"])
+    return "cdeg/s" if logged * DEGREE > 10.0 * measured else "deg/s"
+
+
 KEY_PARAMETERS = (
     "ATC_RAT_*_[PID]", "ATC_RAT_*_FF", "ATC_RAT_*_FLT[TED]", "ATC_ANG_*_P", "ATC_INPUT_TC",
     "ATC_RATE_*_MAX", "RATE_*_[PID]", "STB_*_P", "PSC_*_[PID]", "PSC_*_FLT[TED]", "PSC_POSXY_P",
@@ -141,10 +154,11 @@ KEY_PARAMETERS = (
 def names(contents: LogContents) -> AutopilotNames:
     """The loops of ArduPilot in the messages of all its versions since 2014."""
     vehicle = contents.vehicle.partition(" ")[0]
+    rate = _unit_of_rates(contents)
     places = [*_horizontal("north", 0), *_horizontal("east", 1), *_vertical()]
     if vehicle == "Rover":
         return AutopilotNames([*rover(ARMED), *places], KEY_PARAMETERS)
     if vehicle == "Plane":
-        return AutopilotNames([*plane(contents, (ARMED, IN_THE_AIR)), *places], KEY_PARAMETERS)
-    loops = [*_inner_loops(contents), *places, *injected((ARMED, IN_THE_AIR))]
+        return AutopilotNames([*plane(rate, (ARMED, IN_THE_AIR)), *places], KEY_PARAMETERS)
+    loops = [*_inner_loops(contents, rate), *places, *injected((ARMED, IN_THE_AIR))]
     return AutopilotNames(loops, KEY_PARAMETERS)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from deadtime.logs._ardupilot_modes import HORIZONTAL, PLANE_ANGLES, Q_ANGLES, Q_RATES, STEERED
-from deadtime.logs._ardupilot_units import unit_of_rate
 from deadtime.logs._conditions import closed_where, in_modes, state
-from deadtime.logs._contents import LogContents
 from deadtime.logs._names import Condition, LoopNames, Signal
 from deadtime.logs._rotations import heading
 
@@ -29,20 +27,20 @@ HOVERING = closed_where(in_modes(Q_RATES))
 TURNED = closed_where(in_modes(Q_ANGLES))
 
 
-def plane(contents: LogContents, flying: tuple[Condition, ...]) -> list[LoopNames]:
+def plane(rate: str, flying: tuple[Condition, ...]) -> list[LoopNames]:
     """Attitude of a plane, its rates, and those of the rotors of a QuadPlane.
 
-    The message RATE is of the rotors alone, and a plane without them logs 0 for a desired yaw.
+    The message RATE, whose unit is `rate`, is of the rotors alone, and a plane without them logs 0
+    for a desired yaw. The controllers of its surfaces log degrees, those of its rotors radians.
     """
     rates, hovering, angles = [], [], []
     for axis, letter in (("roll", "R"), ("pitch", "P"), ("yaw", "Y")):
-        unit = unit_of_rate(contents, axis, "RATE", letter, "deg/s")
         rotors = f"PIQ{letter}"
         hovering.append(
             LoopNames(
                 f"hover {axis} rate", axis, "rate",
-                (Signal("RATE", (f"{letter}Des",), unit), Signal(rotors, ("Tar",), "rad/s")),
-                response=(Signal("RATE", (letter,), unit), Signal(rotors, ("Act",), "rad/s")),
+                (Signal("RATE", (f"{letter}Des",), rate), Signal(rotors, ("Tar",), "rad/s")),
+                response=(Signal("RATE", (letter,), rate), Signal(rotors, ("Act",), "rad/s")),
                 actuator=(Signal("RATE", (f"{letter}Out",)),),
                 conditions=(*flying, HOVERING),
             )
@@ -52,11 +50,10 @@ def plane(contents: LogContents, flying: tuple[Condition, ...]) -> list[LoopName
             angles.append(LoopNames(axis, axis, "attitude", *turned, (), (*flying, TURNED)))
             continue
         name, surfaces = axis.capitalize(), f"PID{letter}"
-        unit = unit_of_rate(contents, axis, surfaces, "Act", "deg/s")
-        asked = Signal(surfaces, ("Tar",), unit, rule=FILTERED)
+        asked = Signal(surfaces, ("Tar",), "deg/s", rule=FILTERED)
         rates.append(
             LoopNames(
-                f"{axis} rate", axis, "rate", (asked,), (Signal(surfaces, ("Act",), unit),),
+                f"{axis} rate", axis, "rate", (asked,), (Signal(surfaces, ("Act",), "deg/s"),),
                 conditions=(*flying, FORWARD),
             )
         )  # fmt: skip

@@ -30,8 +30,9 @@ def open_log(path: str | os.PathLike[str], *, flight: int | None = None) -> Log:
     ----------
     path : path-like
         The file. Its format is told by its first bytes, whatever its name: ULog (PX4), DataFlash
-        (ArduPilot, binary or text), tlog (MAVLink, of a ground station), Blackbox (Betaflight,
-        INAV) or Crazyflie uSD.
+        (ArduPilot, binary or text; PX4 before ULog), tlog (MAVLink, of a ground station), Blackbox
+        (Betaflight, Cleanflight, INAV) or Crazyflie uSD. `deadtime.logs.open_bag` opens bags of
+        ROS and MCAP files.
     flight : int, optional
         Which flight of a Blackbox file that holds several, counted from 1; by default the longest,
         with a remark that names the others.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from deadtime._base.arrays import Array
 from deadtime._base.errors import RecordingError
 from deadtime._base.extras import library
-from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER
+from deadtime.logs._ardupilot_modes import COPTER, PLANE, ROVER, SUB
 from deadtime.logs._contents import LogContents, Topic
 from deadtime.logs._link import Link, half_round_trip, lost_packets, transport_of
 from deadtime.logs._mavlink_packets import (
@@ -36,6 +36,7 @@ NOT_AN_AUTOPILOT = 8
 #: Flight modes of ArduPilot by ``MAV_TYPE``.
 COPTERS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
 PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25})
+ROVERS, SUBS = frozenset({10, 11}), frozenset({12})
 
 #: Flight modes of PX4 by main mode, those of "auto" by sub mode.
 PX4_MAIN = {1: 0, 2: 1, 3: 2, 5: 10, 6: 14, 7: 15}
@@ -313,5 +314,6 @@ def _mode(number: int, autopilot: str, kind: int) -> str:
         main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
         state = PX4_AUTO.get(sub) if main == AUTO else PX4_MAIN.get(main)
         return f"mode {number}" if state is None else MODES[state]
-    table = COPTER if kind in COPTERS else PLANE if kind in PLANES else ROVER
-    return table.get(number, f"mode {number}") if autopilot else f"mode {number}"
+    tables = ((COPTERS, COPTER), (PLANES, PLANE), (ROVERS, ROVER), (SUBS, SUB))
+    table = next((modes for kinds, modes in tables if autopilot and kind in kinds), {})
+    return table.get(number, f"mode {number}")

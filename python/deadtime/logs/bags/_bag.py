@@ -137,7 +137,7 @@ class Bag:
             if not len(one) or not np.isfinite(one.values).any():
                 raise RecordingError(f"{named[signal]} holds no number in {self.source}")
         name = f"{self.source}, {why}"
-        return recording_of(name, series.get("reference"), came, told, (None, None), "held")
+        return recording_of(name, series.get("reference"), came, told, (None, None))
 
     def _place(self, name: str) -> tuple[str, str]:
         """Topic and field of a name, or an error with those that exist."""

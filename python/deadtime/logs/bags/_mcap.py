@@ -39,22 +39,21 @@ class _Mcap:
         self.types: dict[str, str] = {}
         self.cut = False
         self.lost = 0
-        self._reader = library("mcap.stream_reader", "reading MCAP files", EXTRA)
-        self._records = library("mcap.records", "reading MCAP files", EXTRA)
-        self._ros2 = library("mcap_ros2.decoder", "reading MCAP files of ROS 2", EXTRA)
 
     def messages(self, wanted: Iterable[str] | None = None) -> Iterator[Message]:
         """The messages of these topics, or all."""
         names = None if wanted is None else set(wanted)
-        factory = self._ros2.DecoderFactory()
+        decoders = library("mcap_ros2.decoder", "reading MCAP files of ROS 2", EXTRA)
+        kinds = library("mcap.records", "reading MCAP files", EXTRA)
+        factory = decoders.DecoderFactory()
         schemas: dict[int, Any] = {}
         channels: dict[int, Any] = {}
         for record in self._all_records():
-            if isinstance(record, self._records.Schema):
+            if isinstance(record, kinds.Schema):
                 schemas.setdefault(record.id, record)
-            elif isinstance(record, self._records.Channel):
+            elif isinstance(record, kinds.Channel):
                 channels.setdefault(record.id, record)
-            elif isinstance(record, self._records.Message) and record.channel_id in channels:
+            elif isinstance(record, kinds.Message) and record.channel_id in channels:
                 channel = channels[record.channel_id]
                 if names is None or channel.topic in names:
                     schema = schemas.get(channel.schema_id)
@@ -65,9 +64,11 @@ class _Mcap:
 
     def _all_records(self) -> Iterator[Any]:
         """All records up to the end or the first damage outside of a chunk."""
+        streams = library("mcap.stream_reader", "reading MCAP files", EXTRA)
+        kinds = library("mcap.records", "reading MCAP files", EXTRA)
         self.cut, self.lost = False, 0
         with Bounded(self.path) as source:
-            found = self._reader.StreamReader(
+            found = streams.StreamReader(
                 source, emit_chunks=True, record_size_limit=source.size
             ).records
             while True:
@@ -78,11 +79,11 @@ class _Mcap:
                 except Exception:  # the library raises what the damage leads to
                     self.cut = True
                     return
-                if not isinstance(record, self._records.Chunk):
+                if not isinstance(record, kinds.Chunk):
                     yield record
                     continue
                 try:
-                    parts = self._reader.breakup_chunk(_unpacked(record, source.size))
+                    parts = streams.breakup_chunk(_unpacked(record, source.size))
                 except MissingExtraError:
                     raise
                 except Exception:  # the libraries of each compression have their own errors

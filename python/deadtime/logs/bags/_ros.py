@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from deadtime._base.errors import RecordingError, printable
+from deadtime._base.errors import MissingExtraError, RecordingError, printable
 from deadtime._base.extras import library
 from deadtime.logs.bags._bag import Bag, Message, bag_of
 from deadtime.logs.bags._bounded import BoundedPath
@@ -26,21 +26,24 @@ class _RosBag:
     def __init__(self, path: Path) -> None:
         self.path = path if path.is_dir() else BoundedPath(path)
         self.types: dict[str, str] = {}
-        self._highlevel = library("rosbags.highlevel", "reading ROS bags", EXTRA)
-        typesys = library("rosbags.typesys", "reading ROS bags", EXTRA)
-        # Bags of ROS 2 before Iron hold no definitions; those of common messages are the same.
-        self._types = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+        self.damage: Exception | None = None
 
     def messages(self, wanted: Iterable[str] | None = None) -> Iterator[Message]:
         """The messages of these topics, or all, up to the first damage."""
-        self.damage: Exception | None = None
+        self.damage = None
         try:
             yield from self._messages(wanted)
+        except MissingExtraError:
+            raise
         except Exception as error:  # the library raises what the damage leads to
             self.damage = error
 
     def _messages(self, wanted: Iterable[str] | None) -> Iterator[Message]:
-        with self._highlevel.AnyReader([self.path], default_typestore=self._types) as reader:
+        highlevel = library("rosbags.highlevel", "reading ROS bags", EXTRA)
+        typesys = library("rosbags.typesys", "reading ROS bags", EXTRA)
+        # Bags of ROS 2 before Iron hold no definitions; those of common messages are the same.
+        common = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+        with highlevel.AnyReader([self.path], default_typestore=common) as reader:
             chosen: list[Any] = reader.connections
             if wanted is not None:
                 names = set(wanted)
