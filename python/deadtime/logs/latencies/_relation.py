@@ -1,4 +1,10 @@
-"""The time from a command of one loop to its response, over the windows of a log."""
+"""The time from a command of one loop to its response, over the windows of a log.
+
+The time is the equivalent delay -arg G/omega of the plant from the command to the response, at the
+frequency at which the response moves: the rate of change of its modelled part over that part, both
+as root mean squares. It is what a cross-correlation sees, and so what a pilot feels. Of a plant that
+integrates it is that where half of the largest proportional gain crosses over.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +20,11 @@ from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
 from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed
-from deadtime.estimation import PlantEstimate, estimate_delay, fit_alone
+from deadtime.estimation import PlantEstimate, estimate_delay, refit
 from deadtime.logs.latencies._commands import Command, Sampling
 from deadtime.logs.latencies._cost import GainCost, cost_of
 from deadtime.logs.latencies._spread import Spread, spread_of
-from deadtime.logs.latencies._windows import LENGTHS, LONGEST, Window, best_of
+from deadtime.logs.latencies._windows import LENGTHS, LONGEST, Window, best_of, whole_of
 from deadtime.recordings import Recording
 
 #: Width of a 95 % interval in standard errors.
@@ -75,8 +81,12 @@ class LoopLatency(ReadOnlyArrays):
         Whether `interval` is claimed to hold; whether there is a time at all.
     reason : str
         Why it is not ``"reliable"``; empty where it is.
+    time : float
+        Equivalent delay from the command to the response at `frequency`, s; NaN if there is none.
     interval : (float, float)
         95 % interval of `time`, s, with the spread between windows.
+    frequency : float
+        Where the response moves, or where the loop crosses over, rad/s.
     windows : tuple of (float, float)
         Where it was estimated, s from the start of the log.
     estimate : PlantEstimate or None
@@ -97,7 +107,9 @@ class LoopLatency(ReadOnlyArrays):
     command: Command
     verdict: Verdict
     reason: str
+    time: float = math.nan
     interval: tuple[float, float] = (math.nan, math.nan)
+    frequency: float = math.nan
     windows: tuple[tuple[float, float], ...] = ()
     estimate: PlantEstimate | None = None
     times: tuple[WindowTime, ...] = ()
@@ -109,11 +121,6 @@ class LoopLatency(ReadOnlyArrays):
     def name(self) -> str:
         """Such as ``"roll rate, setpoint to response"``."""
         return f"{self.loop}, {self.command} to response"
-
-    @property
-    def time(self) -> float:
-        """From the command to the response, delay and lags together, s; NaN if there is none."""
-        return math.nan if self.estimate is None else self.estimate.delay_plus_lag
 
     @property
     def stderr(self) -> float:
@@ -143,7 +150,9 @@ class LoopLatency(ReadOnlyArrays):
 
     def to_dict(self) -> dict[str, Any]:
         """The time as plain values for JSON."""
-        names = ("loop", "axis", "kind", "command", "verdict", "reason", "time", "windows")
+        names = (
+            "loop", "axis", "kind", "command", "verdict", "reason", "time", "frequency", "windows"
+        )  # fmt: skip
         parts = {
             name: None if part is None else part.to_dict()
             for name, part in (
@@ -174,10 +183,11 @@ def relation_of(
         return replace(nothing, reason=f"the {nothing.command} does not move")
     try:
         fit = _fitted([part(*ends) for ends in chosen], nothing.kind, integrates, sampling)
+        if fit.verdict == "none" and fit.determined < TOLD:
+            return replace(nothing, reason=fit.reason)
+        fit = refit(fit, [part(*ends) for ends in whole_of(windows)])
     except (DeadtimeError, ValueError) as error:
         return replace(nothing, reason=str(error).partition("; ")[0])
-    if fit.verdict == "none" and fit.determined < TOLD:
-        return replace(nothing, reason=fit.reason)
     found = replace(nothing, verdict="reliable", windows=tuple(chosen), estimate=fit)
     found = _with_interval(found, windows)
     if why := _no_answer(found):
@@ -210,10 +220,10 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
     """The time with its interval: that of the fit, the spread, and what the log leaves unknown."""
     fit = found.estimate
     assert fit is not None
-    times = _alone(fit, windows)
+    omega = _frequency_of(fit)
+    times = _alone(fit, windows, omega)
     spread = None
-    value = fit.delay_plus_lag
-    low, high = fit.intervals["delay+lag"]
+    value, low, high = _time_at(fit, omega)
     if len(times) > 1:
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
         fitted = sum(_is_in(one.at, found.windows) for one in times)
@@ -224,7 +234,9 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
             low, high = min(low, spread.interval[0]), max(high, spread.interval[1])
     unsure = 0.0 if found.sampling is None else found.sampling.unsure
     interval = (max(0.0, low - unsure), high + unsure)
-    return replace(found, interval=interval, times=times, spread=spread)
+    return replace(
+        found, time=value, interval=interval, frequency=omega, times=times, spread=spread
+    )
 
 
 def _why_doubtful(found: LoopLatency) -> str:
@@ -252,22 +264,43 @@ def _reach(spread: Spread) -> float:
     return spread.between * float(stdtrit(spread.count - 1, 0.975))
 
 
-def _alone(fit: PlantEstimate, windows: Sequence[Window]) -> tuple[WindowTime, ...]:
+def _frequency_of(fit: PlantEstimate) -> float:
+    """The frequency at which the time is told, rad/s."""
+    if fit.best.integrates and math.isfinite(fit.crossover):
+        return fit.crossover
+    moves = rates = 0.0
+    for run in fit.runs:
+        known = np.isfinite(run.fitted)
+        time, values = run.recording.time[known], run.fitted[known]
+        line = np.polynomial.Polynomial.fit(time, values, 1)
+        moves += float(np.sum((values - line(time)) ** 2))
+        rates += float(np.sum(np.gradient(values, time) ** 2))
+    return math.sqrt(rates / moves) if moves > 0.0 else math.nan
+
+
+def _time_at(fit: PlantEstimate, omega: float) -> tuple[float, float, float]:
+    """The equivalent delay at a frequency, and its 95 % interval, s."""
+    seen = fit.at([omega])
+    low, high = seen.delay_ci[:, 0].tolist()
+    return float(seen.delay[0]), low, high
+
+
+def _alone(fit: PlantEstimate, windows: Sequence[Window], omega: float) -> tuple[WindowTime, ...]:
     """The time of each window by itself, where it tells one."""
     moving = sorted(windows, key=lambda one: one.movement, reverse=True)[:ALONE]
     found = []
     for one in sorted(moving, key=lambda one: one.start):
         try:
-            alone = fit_alone(fit, one.recording)
+            alone = refit(fit, [one.recording])
         except (DeadtimeError, ValueError):
             continue
-        if alone.verdict == "none" or "delay+lag" not in alone.intervals:
+        if not alone.candidates or alone.best.parameters["gain"] <= 0.0:
             continue
-        low, high = alone.ci(0.95, "delay+lag")
+        value, low, high = _time_at(alone, omega)
         error = (high - low) / TWO_SIDED
-        if _says_something(alone.delay_plus_lag, error, one.recording):
+        if _says_something(value, error, one.recording):
             middle = 0.5 * (one.start + one.stop)
-            found.append(WindowTime(middle, alone.delay_plus_lag, error, one.movement))
+            found.append(WindowTime(middle, value, error, one.movement))
     return tuple(found)
 
 
@@ -281,7 +314,7 @@ def _no_answer(found: LoopLatency) -> str:
     assert fit is not None
     if fit.best.parameters["gain"] <= 0.0:
         return f"the response moves against its command (gain {fit.best.parameters['gain']:.3g})"
-    if not _says_something(found.time, found.stderr, fit.recording):
+    if not (found.time > 0.0 and _says_something(found.time, found.stderr, fit.recording)):
         value = stated(found.time, found.stderr, "s")
-        return f"delay and lag together come out as {value}: that says nothing"
+        return f"the time comes out as {value}: that says nothing"
     return ""

@@ -22,6 +22,9 @@ from deadtime.recordings import Recording
 #: come from: more are surer and take longer.
 FEWEST, MOST, TOGETHER = 24, 1200, 3
 
+#: Most rows, and most segments, to which the plants of these are fitted then.
+ALL, SEGMENTS = 15000, 8
+
 #: Movement of a window, as a share of the largest, below which it ends a run.
 STILL = 0.1
 
@@ -159,6 +162,32 @@ def best_of(windows: Sequence[Window]) -> Windows:
         most = max(left, key=lambda k: windows[k].movement)
         chosen = [(windows[most].start, windows[most].stop)]
     return sorted(chosen)
+
+
+def whole_of(windows: Sequence[Window]) -> Windows:
+    """The segments of the windows that move, from the first to the last of them in each.
+
+    Those with the most movement, where there are many or they are long.
+    """
+    least = STILL * max((one.movement for one in windows), default=0.0)
+    parts: dict[int, list[Window]] = {}
+    for one in windows:
+        if one.movement > least:
+            parts.setdefault(one.segment, []).append(one)
+    moving = sorted(parts.values(), key=lambda some: -sum(one.movement**2 for one in some))
+    chosen: Windows = []
+    rows = 0
+    for some in moving[:SEGMENTS]:
+        kept = some[: max(1, (ALL - rows) * len(some) // max(1, _rows(some)))]
+        rows += _rows(kept)
+        chosen.append((kept[0].start, kept[-1].stop))
+        if rows >= ALL:
+            break
+    return sorted(chosen)
+
+
+def _rows(windows: Sequence[Window]) -> int:
+    return sum(len(one.recording) for one in windows)
 
 
 def _runs(windows: Sequence[Window], places: Sequence[int], most: int) -> list[list[int]]:
