@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime._base.digits import between as ends_of, stated
+from deadtime._base.digits import between as ends_of, shown, stated
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
 from deadtime.logs._series import Series
@@ -112,7 +112,7 @@ class Moves(ReadOnlyArrays):
     --------
     >>> import numpy as np
     >>> from deadtime.logs import Series
-    >>> from deadtime.logs.latencies import moves_of
+    >>> from deadtime.logs import moves_of
     >>> time = np.arange(0.0, 60.0, 0.02)
     >>> asked = Series(time, np.floor(time / 2.0) % 2.0, "rad", "asked")
     >>> came = Series(time, np.floor((time - 0.1) / 2.0) % 2.0, "rad", "came")
@@ -142,6 +142,11 @@ class Moves(ReadOnlyArrays):
         """How many moves there are."""
         return len(self.moves)
 
+    def shown(self, time: float) -> str:
+        """A time with the digits that the interval of the median leaves, such as ``"125 ms"``."""
+        error = 0.25 * (self.interval[1] - self.interval[0])
+        return shown(time, error if math.isfinite(error) else 0.0, "s")
+
     def headline(self) -> str:
         """The time in one line."""
         if self.reason:
@@ -169,7 +174,7 @@ def moves_of(
     segments: Sequence[tuple[float, float]],
     *,
     longest: float,
-    between: Between | None = None,
+    between: Between = "straight",
 ) -> Moves:
     """Find all moves of a setpoint and align the response to them.
 
@@ -182,8 +187,7 @@ def moves_of(
     longest : float
         The longest time from setpoint to response that is looked for, s.
     between : {"held", "straight"}, optional
-        Whether the setpoint holds from row to row, or moves in lines; by default one that changes
-        on most of its rows moves.
+        Whether the setpoint holds from row to row, or is straight between rows.
 
     Returns
     -------
@@ -273,11 +277,13 @@ def least_size(
 ) -> float:
     """Size from which a change of the setpoint counts as a move, in its unit."""
     wide = max(2, round(longest / setpoint.period))
-    told = [_rows(setpoint, segment)[1] for segment in segments]
+    asked = [_rows(setpoint, segment)[1] for segment in segments]
     came = [_rows(response, segment)[1] for segment in segments]
     bends = np.concatenate([np.diff(values, 2) for values in came] or [np.empty(0)])
     noise = 1.4826 * float(np.median(np.abs(bends))) / math.sqrt(6.0) if bends.size else 0.0
-    span = max((float(np.max(_spans(values, wide))) for values in told if values.size), default=0.0)
+    span = max(
+        (float(np.max(_spans(values, wide))) for values in asked if values.size), default=0.0
+    )
     return max(NOISES * noise, OF_RANGE * span)
 
 
