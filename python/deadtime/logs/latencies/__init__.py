@@ -7,7 +7,7 @@ from deadtime.logs.latencies._cost import GainCost
 from deadtime.logs.latencies._filters import FilterDelay, filter_lines, filters_of
 from deadtime.logs.latencies._latency import Latency, latency
 from deadtime.logs.latencies._modelled import modelled
-from deadtime.logs.latencies._moves import Move, Moves, aligned, moves_of
+from deadtime.logs.latencies._moves import Moves, aligned, moves_of
 from deadtime.logs.latencies._plain import (
     Difference,
     PlainTime,
@@ -18,6 +18,7 @@ from deadtime.logs.latencies._plain import (
 )
 from deadtime.logs.latencies._promise import Promise, promised, promises_of
 from deadtime.logs.latencies._relation import LoopLatency
+from deadtime.logs.latencies._setpoint_moves import Move
 from deadtime.logs.latencies._spread import Spread, spread_of
 
 __all__ = [

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
 from deadtime.logs.latencies._correlation import BLOCKS, Grid
-from deadtime.logs.latencies._moves import below_half
+from deadtime.logs.latencies._setpoint_moves import below_half
 
 Spectrum: TypeAlias = NDArray[np.complex128]
 

@@ -38,7 +38,8 @@ from deadtime.logs.latencies._correlation import (
     peak_of,
 )
 from deadtime.logs.latencies._deconvolution import half_of_step
-from deadtime.logs.latencies._moves import COVERAGE, Move, Moves, aligned, median_of, moves_of
+from deadtime.logs.latencies._moves import COVERAGE, Moves, aligned, median_of, moves_of
+from deadtime.logs.latencies._setpoint_moves import Move
 
 #: Standard deviations of a correlation without any relation that a peak has to be above.
 ABOVE = 4.0
