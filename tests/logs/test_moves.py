@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from deadtime.logs import Series
 from deadtime.logs.latencies import aligned, modelled, moves_of
-from deadtime.logs.latencies._moves import below_half, median_of
+from deadtime.logs.latencies._moves import median_of
+from deadtime.logs.latencies._setpoint_moves import below_half
 from deadtime.loops import FactoredPlant, open_response
 
 DELAY, LAG = 0.04, 0.06

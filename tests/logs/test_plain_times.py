@@ -24,7 +24,7 @@ def flown(seed, rate=50.0, seconds=60.0, noise=0.1, lag=LAG, delay=DELAY, uneven
     exact = Series(fine, asked, "rad", "asked")
     came = modelled(
         FactoredPlant([lag]), delay, exact,
-        Series(stamps[1], stamps[1], "rad", "came"), [(0.0, seconds)], "lines",
+        Series(stamps[1], stamps[1], "rad", "came"), [(0.0, seconds)], "straight",
     )  # fmt: skip
     # Air is slow against the rows.
     air = gaussian_filter1d(random.standard_normal(fine.size), 0.1 / 2e-3)
@@ -35,7 +35,7 @@ def flown(seed, rate=50.0, seconds=60.0, noise=0.1, lag=LAG, delay=DELAY, uneven
 
 
 def plain(told, came, segments, **given):
-    return plain_times(told, came, segments, longest=0.6, between="lines", **given)
+    return plain_times(told, came, segments, longest=0.6, between="straight", **given)
 
 
 def test_a_pure_delay_is_found_by_all_three():
@@ -62,7 +62,7 @@ def test_the_coefficient_is_that_of_the_rows_that_are_in_segments():
     found = correlation_of(grid, 0.6)
     lag = 8
     k = int(np.argmin(np.abs(found.lags - lag * grid.step)))
-    pairs = [(p.told[: p.told.size - lag], p.came[lag:]) for p in grid.pieces]
+    pairs = [(p.asked[: p.asked.size - lag], p.came[lag:]) for p in grid.pieces]
     wanted = np.corrcoef(*(np.concatenate(side) for side in zip(*pairs, strict=True)))[0, 1]
     assert found.coefficient[k] == pytest.approx(wanted, abs=1e-9)
     # Without a block: the first segment begins later.
@@ -74,7 +74,7 @@ def test_intervals_hold_the_number_of_the_fit_as_often_as_they_say():
     for seed in range(60):
         told, came, segments = flown(100 + seed, noise=0.3)
         found = plain(told, came, segments)
-        right = modelled(FactoredPlant([LAG]), DELAY, told, came, segments, "lines")
+        right = modelled(FactoredPlant([LAG]), DELAY, told, came, segments, "straight")
         beside = plain(told, right, segments, moves=found.aligned.moves)
         for one in differences(found, beside):
             held[one.name].append(not one.disagrees)
@@ -86,7 +86,7 @@ def test_intervals_hold_the_number_of_the_fit_as_often_as_they_say():
 def test_a_wrong_fit_disagrees():
     told, came, segments = flown(5, noise=0.1)
     found = plain(told, came, segments)
-    late = modelled(FactoredPlant([LAG]), DELAY + 0.03, told, came, segments, "lines")
+    late = modelled(FactoredPlant([LAG]), DELAY + 0.03, told, came, segments, "straight")
     beside = plain(told, late, segments, moves=found.aligned.moves)
     compared = {one.name: one for one in differences(found, beside)}
     assert compared["cross-correlation"].disagrees

@@ -11,7 +11,19 @@ from deadtime._cli import options as opt
 from deadtime._cli.exit_codes import NONE
 from deadtime._cli.fills import filled
 from deadtime._cli.show import print_json, print_points, print_table, print_text, results_table
-from deadtime.logs import Bag, Log, LogLoop, is_bag, open_bag, open_log
+from deadtime.logs import (
+    Bag,
+    Log,
+    LogLoop,
+    Promise,
+    advice,
+    filter_lines,
+    filters_of,
+    is_bag,
+    open_bag,
+    open_log,
+    promises_of,
+)
 
 
 @filled
@@ -46,7 +58,9 @@ def command(
         else:
             _print_loop(one)
     elif as_json:
-        print_json("log", found.to_dict())
+        filters = [one._asdict() for one in filters_of(found)]
+        promises = {name: one.to_dict() for name, one in promises_of(found).items()}
+        print_json("log", {**found.to_dict(), "filters": filters, "promises": promises})
     else:
         _print_log(found)
     if not found.loops and found.link is None:
@@ -74,22 +88,30 @@ def _print_log(log: Log) -> None:
         spans = ", ".join(f"{name} from {at:.2f} s" for at, name in log.modes)
         print_text(f"modes: {spans}")
     if log.loops:
-        heads = ("loop", "setpoint", "response", "unit", "Hz", "followed, s", "actuator")
-        left = ("loop", "setpoint", "response", "unit", "actuator")
-        print_table(results_table(heads, map(_row, log.loops.values()), left=left))
+        heads = ("loop", "setpoint", "response", "unit", "Hz", "followed, s", "actuator", "time")
+        left = ("loop", "setpoint", "response", "unit", "actuator", "time")
+        promises = promises_of(log)
+        rows = [_row(loop, promises.get(loop.name)) for loop in log.loops.values()]
+        print_table(results_table(heads, rows, left=left))
+        print_text("time: how well these rows can tell it, from setpoint to response")
         print_points(_reasons(log))
     else:
         print_text("no loop: setpoint and response of none are in the log", "yellow")
     if log.key_parameters:
         shown = ", ".join(f"{name} {value:g}" for name, value in log.key_parameters.items())
         print_text(f"parameters: {shown}")
+    for line in filter_lines(log):
+        print_text(line)
+    if more := advice(log):
+        print_text("to know more:")
+        print_points([one.line() for one in more])
     if log.link is not None:
         print_text(log.link.summary())
     for remark in log.remarks:
         print_text(remark, "yellow")
 
 
-def _row(loop: LogLoop) -> tuple[str, ...]:
+def _row(loop: LogLoop, promise: Promise | None) -> tuple[str, ...]:
     return (
         loop.name,
         loop.setpoint.source,
@@ -98,6 +120,7 @@ def _row(loop: LogLoop) -> tuple[str, ...]:
         f"{loop.setpoint.rate:.4g}, {loop.response.rate:.4g}",
         f"{loop.followed:.2f}" if loop.segments else "never",
         "" if loop.actuator is None else loop.actuator.source,
+        "" if promise is None else promise.short(),
     )
 
 

@@ -243,6 +243,8 @@ class Log(ReadOnlyArrays):
 
     def summary(self) -> str:
         """The log in lines of text."""
+        from deadtime.logs.latencies._filters import filter_lines
+
         kind = f"{self.source}: {self.format}, {self.duration:.2f} s"
         lines = [", ".join(part for part in (kind, self.autopilot, self.vehicle) if part)]
         if self.firmware:
@@ -256,6 +258,7 @@ class Log(ReadOnlyArrays):
         if self.key_parameters:
             shown = ", ".join(f"{name} = {value:g}" for name, value in self.key_parameters.items())
             lines.append(f"parameters: {shown}")
+        lines.extend(filter_lines(self))
         if self.link is not None:
             lines.append(self.link.summary())
         lines.extend(self.remarks)

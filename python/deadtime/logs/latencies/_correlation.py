@@ -29,7 +29,7 @@ FINER, FINEST = 2.0, 5e-4
 #: Blocks of a record for the jackknife: more are less independent, fewer have longer tails.
 BLOCKS = 12
 
-#: Shortest block, in longest lags; fewest blocks whose scatter is told.
+#: Shortest block, in longest lags; fewest blocks whose scatter is asked.
 BLOCK, FEWEST = 2.0, 4
 
 #: Least lag that is tried, as a share of the longest: a response before its setpoint is a fault of
@@ -41,7 +41,7 @@ class Piece(NamedTuple):
     """One segment on the grid: setpoint and response, each less its mean, and the first time."""
 
     start: float
-    told: Array
+    asked: Array
     came: Array
 
 
@@ -54,7 +54,7 @@ class Grid(NamedTuple):
     @property
     def length(self) -> float:
         """Length of all segments, s."""
-        return self.step * sum(piece.told.size for piece in self.pieces)
+        return self.step * sum(piece.asked.size for piece in self.pieces)
 
 
 class Correlation(NamedTuple):
@@ -68,19 +68,19 @@ class Correlation(NamedTuple):
 def grid_of(
     setpoint: Series, response: Series, segments: Sequence[tuple[float, float]], held: bool
 ) -> Grid:
-    """Both signals over the segments; the setpoint holds from row to row or moves in lines."""
+    """Both signals over the segments; the setpoint holds from row to row or is straight."""
     step = max(min(setpoint.period, response.period) / FINER, FINEST)
     pieces = []
     for low, high in segments:
         time = np.arange(low, high, step)
-        told = value_at(setpoint, time, held)
+        asked = value_at(setpoint, time, held)
         came = value_at(response, time, False)
-        if time.size > 1 and np.isfinite(told).all() and np.isfinite(came).all():
-            pieces.append(Piece(low, told, came))
+        if time.size > 1 and np.isfinite(asked).all() and np.isfinite(came).all():
+            pieces.append(Piece(low, asked, came))
     if not pieces:
         return Grid(step, [])
     means = [float(np.mean(np.concatenate([piece[k] for piece in pieces]))) for k in (1, 2)]
-    return Grid(step, [Piece(p.start, p.told - means[0], p.came - means[1]) for p in pieces])
+    return Grid(step, [Piece(p.start, p.asked - means[0], p.came - means[1]) for p in pieces])
 
 
 def value_at(series: Series, time: Array, held: bool) -> Array:
@@ -103,8 +103,8 @@ def correlation_of(grid: Grid, longest: float) -> Correlation:
     length = max(grid.length / BLOCKS, BLOCK * longest)
     blocks = []
     for piece in grid.pieces:
-        count = max(1, round(piece.told.size * grid.step / length))
-        edges = np.linspace(0, piece.told.size, count + 1).astype(int)
+        count = max(1, round(piece.asked.size * grid.step / length))
+        edges = np.linspace(0, piece.asked.size, count + 1).astype(int)
         blocks += [_sums(piece, lags, a, b) for a, b in pairwise(edges.tolist())]
     if not blocks:
         return Correlation(times, np.full(lags.size, np.nan), np.empty((0, lags.size)))
@@ -119,16 +119,16 @@ def _sums(piece: Piece, lags: NDArray[np.int64], start: int, stop: int) -> Array
     from scipy.signal import correlate
 
     first, last = start - int(lags[-1]), stop - int(lags[0])
-    ends = max(0, -first), max(0, last - piece.told.size)
-    inside = piece.told[max(0, first) : last]
-    told = np.pad(inside, ends)
+    ends = max(0, -first), max(0, last - piece.asked.size)
+    inside = piece.asked[max(0, first) : last]
+    asked = np.pad(inside, ends)
     known = np.pad(np.ones(inside.size), ends)
     came = piece.came[start:stop]
-    pairs = [(known, None), (told, None), (told**2, None), (known, came), (known, came**2)]
+    pairs = [(known, None), (asked, None), (asked**2, None), (known, came), (known, came**2)]
     ones = np.ones_like(came)
     found = [
         correlate(one, ones if other is None else other, "valid", "fft")
-        for one, other in [*pairs, (told, came)]
+        for one, other in [*pairs, (asked, came)]
     ]
     return np.asarray(np.stack(found)[:, ::-1])
 
@@ -161,13 +161,13 @@ def independent_rows(grid: Grid, longest: float) -> float:
     total, power = 0.0, [0.0, 0.0]
     shared = np.zeros(1)
     for piece in grid.pieces:
-        reach = min(round(longest / grid.step), piece.told.size - 1)
-        parts = [_autocovariance(values, reach) for values in (piece.told, piece.came)]
-        both = parts[0] * parts[1] / piece.told.size
+        reach = min(round(longest / grid.step), piece.asked.size - 1)
+        parts = [_autocovariance(values, reach) for values in (piece.asked, piece.came)]
+        both = parts[0] * parts[1] / piece.asked.size
         shared = np.pad(shared, (0, max(0, both.size - shared.size)))
         shared[: both.size] += both
         power = [old + float(part[0]) for old, part in zip(power, parts, strict=True)]
-        total += piece.told.size
+        total += piece.asked.size
     if not (power[0] > 0.0 and power[1] > 0.0):
         return 0.0
     ratio = shared * total / (power[0] * power[1])

@@ -9,7 +9,7 @@ x_w, y_w under a Hann window, half over one another, and their transforms X_w, Y
 and the step response is the sum of the impulse response of H. Its time is that at which it passes
 half of its level over the second half of the times that are kept. Of a plant of one lag that is
 delay + 0.69 lag. What the same division makes of the setpoint itself has to be a step that rises
-faster than the time found: a setpoint that moves at few frequencies tells none.
+faster than the time found: a setpoint that moves at few frequencies gives none.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from deadtime._base.arrays import Array
 from deadtime._base.digits import stated
 from deadtime.logs.latencies._correlation import BLOCKS, Grid
-from deadtime.logs.latencies._moves import below_half
+from deadtime.logs.latencies._setpoint_moves import below_half
 
 Spectrum: TypeAlias = NDArray[np.complex128]
 
@@ -81,14 +81,14 @@ def _spectra(grid: Grid, longest: float) -> tuple[Spectrum, Array]:
     weight = np.hanning(rows)
     crosses, powers = [], []
     for piece in grid.pieces:
-        if piece.told.size < rows:
+        if piece.asked.size < rows:
             continue
-        told, came = (
+        asked, came = (
             np.fft.rfft(sliding_window_view(part, rows)[:: rows // 2] * weight, size)
-            for part in (piece.told, piece.came)
+            for part in (piece.asked, piece.came)
         )
-        crosses.append(np.conj(told) * came)
-        powers.append(np.abs(told) ** 2)
+        crosses.append(np.conj(asked) * came)
+        powers.append(np.abs(asked) ** 2)
     if not crosses:
         return np.empty((0, 0), complex), np.empty((0, 0))
     return np.concatenate(crosses), np.concatenate(powers)

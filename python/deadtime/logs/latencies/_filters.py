@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from deadtime.logs._log import Log
+from deadtime._base.digits import stated
+
+#: Motors of the usual vehicle: Betaflight's head does not name their number.
+MOTORS = 4
 
 #: Types of low-pass filters in Betaflight's header.
 PT1, BIQUAD, PT2, PT3 = 0, 1, 2, 3
@@ -36,6 +39,23 @@ class FilterDelay(NamedTuple):
     path: str
     delay: float
     source: str
+
+    def line(self) -> str:
+        """The filter in one line."""
+        on = "" if self.path == "response" else f", on {self.path} alone"
+        return f"{self.name}: {stated(self.delay, 0.0, 's')} ({self.source}){on}"
+
+
+class Configured(Protocol):
+    """What names filters: a log."""
+
+    @property
+    def autopilot(self) -> str:
+        """Which autopilot it is."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Its parameters."""
 
 
 def one_pole(corner: float) -> float:
@@ -67,11 +87,66 @@ LOW_PASSES: Mapping[int, Callable[[float], float]] = {
 }
 
 
-def filters_of(log: Log) -> tuple[FilterDelay, ...]:
-    """The filters on the rates that the parameters of a log name."""
-    readers = {"PX4": _px4, "ArduPilot": _ardupilot, "Betaflight": _betaflight}
+def filters_of(log: Configured) -> tuple[FilterDelay, ...]:
+    """The filters on the rates that the parameters of a log name, with their delays.
+
+    Parameters
+    ----------
+    log : Log
+        Of PX4, ArduPilot, Betaflight or INAV.
+
+    Returns
+    -------
+    tuple of FilterDelay
+        Empty where the log holds no such parameters.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from deadtime.logs import filters_of
+    >>> log = SimpleNamespace(autopilot="PX4", parameters={"IMU_GYRO_CUTOFF": 40.0})
+    >>> [(one.name, round(one.delay, 5)) for one in filters_of(log)]
+    [('gyro low-pass', 0.00563)]
+    """
+    readers = {
+        "PX4": _px4, "ArduPilot": _ardupilot, "Betaflight": _betaflight, "INAV": _betaflight,
+    }  # fmt: skip
     reader = readers.get(log.autopilot)
     return tuple(reader(log.parameters)) if reader else ()
+
+
+def filter_lines(log: Configured) -> list[str]:
+    r"""The filters of a log, one line each, and one of their sum on the gyro path.
+
+    Parameters
+    ----------
+    log : Log
+        Of PX4, ArduPilot, Betaflight or INAV.
+
+    Returns
+    -------
+    list of str
+        Empty where the log names no filter.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from deadtime.logs import filter_lines
+    >>> told = {"IMU_GYRO_CUTOFF": 40.0, "IMU_DGYRO_CUTOFF": 30.0}
+    >>> print("\n".join(filter_lines(SimpleNamespace(autopilot="PX4", parameters=told))))
+    gyro low-pass: 5.627 ms (IMU_GYRO_CUTOFF 40)
+    low-pass of the derivative: 7.503 ms (IMU_DGYRO_CUTOFF 30), on D alone
+    gyro path together: 5.627 ms (1 filter)
+    """
+    found = filters_of(log)
+    gyro = [one for one in found if one.path == "response"]
+    lines = [one.line() for one in found]
+    if gyro:
+        most = "at most " if any(one.name.endswith("at most") for one in gyro) else ""
+        total = stated(math.fsum(one.delay for one in gyro), 0.0, "s")
+        count = f"{len(gyro)} filter{'s' if len(gyro) > 1 else ''}"
+        lines.append(f"gyro path together: {most}{total} ({count})")
+    return lines
 
 
 def _px4(told: Mapping[str, float]) -> list[FilterDelay]:
@@ -87,10 +162,15 @@ def _px4(told: Mapping[str, float]) -> list[FilterDelay]:
 def _ardupilot(told: Mapping[str, float]) -> list[FilterDelay]:
     """INS_GYRO_FILTER has two poles, the filters of the rate controller have one each."""
     found = _low_pass(told, "gyro low-pass", "response", "INS_GYRO_FILTER", two_poles)
-    if told.get("INS_HNTCH_ENABLE", 0.0) > 0.0:
-        found += _notch(told, "harmonic notch", "INS_HNTCH_FREQ", "INS_HNTCH_BW")
+    for prefix, which in (("INS_HNTCH", "harmonic notch"), ("INS_HNTC2", "second harmonic notch")):
+        if told.get(f"{prefix}_ENABLE", 0.0) > 0.0:
+            found += _harmonics(told, prefix, which)
     for axis, name in (("RLL", "roll"), ("PIT", "pitch"), ("YAW", "yaw")):
-        for letter, what, path in (("D", "derivative", "D"), ("E", "error", f"{name} error")):
+        for letter, what, path in (
+            ("T", "target", f"the {name} target"),
+            ("E", "error", f"the {name} error"),
+            ("D", "derivative", "D"),
+        ):
             parameter = f"ATC_RAT_{axis}_FLT{letter}"
             found += _low_pass(told, f"low-pass of the {name} {what}", path, parameter, one_pole)
     return found
@@ -129,12 +209,44 @@ def _betaflight(told: Mapping[str, float]) -> list[FilterDelay]:
             found.append(
                 FilterDelay(f"gyro notch {k + 1}", "response", notch(centre, quality), source)
             )
+    centre, cutoff = told.get("dterm_notch_hz", 0.0), told.get("dterm_notch_cutoff", 0.0)
+    if centre > cutoff > 0.0:
+        quality = centre * cutoff / (centre**2 - cutoff**2)
+        source = f"dterm_notch_hz {centre:g}, dterm_notch_cutoff {cutoff:g}"
+        found.append(FilterDelay("notch of the derivative", "D", notch(centre, quality), source))
+    found += _rpm_notches(told)
     quality, lowest = told.get("dyn_notch_q", 0.0) / 100.0, told.get("dyn_notch_min_hz", 0.0)
     count = told.get("dyn_notch_count", 1.0)
     if quality > 0.0 and lowest > 0.0 and count > 0.0:
         source = f"dyn_notch_min_hz {lowest:g}, dyn_notch_q {100.0 * quality:g}, {count:g} of them"
         delay = count * notch(lowest, quality)
         found.append(FilterDelay("dynamic notch, at most", "response", delay, source))
+    return found
+
+
+def _rpm_notches(told: Mapping[str, float]) -> list[FilterDelay]:
+    """Notches on the harmonics of each motor: slower motors delay more, down to the lowest."""
+    for harmonics, quality, lowest in (
+        ("rpm_filter_harmonics", "rpm_filter_q", "rpm_filter_min_hz"),
+        ("gyro_rpm_notch_harmonics", "gyro_rpm_notch_q", "gyro_rpm_notch_min"),
+    ):
+        count, q, least = (told.get(name, 0.0) for name in (harmonics, quality, lowest))
+        if told.get("dshot_bidir", 0.0) > 0.0 and count > 0.0 and q > 0.0 and least > 0.0:
+            each = sum(notch(k * least, 0.01 * q) for k in range(1, int(count) + 1))
+            source = f"{harmonics} {count:g}, {quality} {q:g}, {lowest} {least:g}, {MOTORS} motors"
+            return [FilterDelay("rpm notches, at most", "response", MOTORS * each, source)]
+    return []
+
+
+def _harmonics(told: Mapping[str, float], prefix: str, name: str) -> list[FilterDelay]:
+    """A notch of ArduPilot at each harmonic that its bits name, all of one relative width."""
+    first = _notch(told, name, f"{prefix}_FREQ", f"{prefix}_BW")
+    bits = int(told.get(f"{prefix}_HMNCS", 1.0))
+    orders = [k + 1 for k in range(bits.bit_length()) if bits >> k & 1] or [1]
+    found = []
+    for order in orders if first else ():
+        which = name if order == 1 else f"{name}, harmonic {order}"
+        found.append(first[0]._replace(name=which, delay=first[0].delay / order))
     return found
 
 

@@ -34,12 +34,12 @@ def modelled(
     for low, high in segments:
         inside |= (response.time >= low) & (response.time <= high)
     values = np.full(len(response), np.nan)
-    told, commands = _held(setpoint, between)
-    if inside.any() and told.size:
+    asked, commands = _held(setpoint, between)
+    if inside.any() and asked.size:
         # Before the first command the plant rests under it.
-        times = np.maximum(response.time[inside] - delay, told[0])
+        times = np.maximum(response.time[inside] - delay, asked[0])
         later, place = np.unique(times, return_inverse=True)
-        values[inside] = open_response(plant, plant.parameters, later, told, commands)[place]
+        values[inside] = open_response(plant, plant.parameters, later, asked, commands)[place]
     return replace(response, values=values, source="fit", conversion="")
 
 

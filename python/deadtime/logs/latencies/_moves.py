@@ -15,37 +15,33 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime._base.digits import between as ends_of, stated
+from deadtime._base.digits import between as ends_of, shown, stated
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
 from deadtime.logs._series import Series
-from deadtime.logs._windows import runs
 from deadtime.logs.latencies._commands import Between
 from deadtime.logs.latencies._correlation import correlation_of, grid_of, peak_of, value_at
+from deadtime.logs.latencies._setpoint_moves import (
+    FOLLOWED,
+    Move,
+    below_half,
+    least_size,
+    moves_in,
+    rows_of,
+)
 
-#: Least size of a move, in standard deviations of the noise of the response, and as a share of the
-#: most by which the setpoint changes within the longest time: smaller ones are hidden by others.
-NOISES, OF_RANGE = 6.0, 0.1
-
-#: How much a setpoint that rests may change, as a share of the size of the move beside it.
-RESTS = 0.2
-
-#: How long it rests before and after a move, in rough times from setpoint to response: the longest
-#: with which there are enough moves. A response measured too early has not come all the way, and
-#: in most flights the setpoint hardly rests: a slow swing from one side to the other is a move too.
+#: How long a setpoint rests before and after a move, in rough times from setpoint to response: the
+#: longest with which there are enough moves. A response measured too early has not come all the
+#: way, and in most flights the setpoint hardly rests: a slow swing to the other side is a move too.
 REST, ENOUGH = (4.0, 3.0, 2.0, 1.5, 1.0), 12
 
 #: Fewest rows of the slower series in such a rest.
 ROWS = 2.0
-
-#: Longest change of a move, and how long the response is followed after half of it, in rough times.
-CHANGE, FOLLOWED = 4.0, 8.0
 
 #: Where the levels of the response are read, in rough times after the rests of the setpoint.
 LATER = 0.5
@@ -59,23 +55,6 @@ BEFORE, POINTS, SHARE = 3.0, 241, 0.5
 
 #: Coverage that the interval of the median has at least; fewer than six moves do not allow it.
 COVERAGE = 0.95
-
-
-class Move(NamedTuple):
-    """One move of the setpoint: times in s, levels in its unit.
-
-    `start` is the end of its rest before the move, `half` the time of half of the change, and
-    `stop` the end of its rest afterwards; it goes from `level` to `level + size`. Each rest is
-    `rest` or longer, and `rough` a rough time from setpoint to response.
-    """
-
-    start: float
-    half: float
-    stop: float
-    level: float
-    size: float
-    rest: float
-    rough: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +91,7 @@ class Moves(ReadOnlyArrays):
     --------
     >>> import numpy as np
     >>> from deadtime.logs import Series
-    >>> from deadtime.logs.latencies import moves_of
+    >>> from deadtime.logs import moves_of
     >>> time = np.arange(0.0, 60.0, 0.02)
     >>> asked = Series(time, np.floor(time / 2.0) % 2.0, "rad", "asked")
     >>> came = Series(time, np.floor((time - 0.1) / 2.0) % 2.0, "rad", "came")
@@ -142,6 +121,11 @@ class Moves(ReadOnlyArrays):
         """How many moves there are."""
         return len(self.moves)
 
+    def shown(self, time: float) -> str:
+        """A time with the digits that the interval of the median leaves, such as ``"125 ms"``."""
+        error = 0.25 * (self.interval[1] - self.interval[0])
+        return shown(time, error if math.isfinite(error) else 0.0, "s")
+
     def headline(self) -> str:
         """The time in one line."""
         if self.reason:
@@ -169,7 +153,7 @@ def moves_of(
     segments: Sequence[tuple[float, float]],
     *,
     longest: float,
-    between: Between | None = None,
+    between: Between = "straight",
 ) -> Moves:
     """Find all moves of a setpoint and align the response to them.
 
@@ -182,8 +166,7 @@ def moves_of(
     longest : float
         The longest time from setpoint to response that is looked for, s.
     between : {"held", "straight"}, optional
-        Whether the setpoint holds from row to row, or moves in lines; by default one that changes
-        on most of its rows moves.
+        Whether the setpoint holds from row to row, or is straight between rows.
 
     Returns
     -------
@@ -202,7 +185,7 @@ def moves_of(
         moves = [
             move
             for segment in segments
-            for move in _moves_in(setpoint, segment, (rests * scale, scale), least, held)
+            for move in moves_in(setpoint, segment, (rests * scale, scale), least, held)
         ]
         if len(moves) > len(best):
             best = moves
@@ -268,102 +251,11 @@ def median_of(times: Array) -> tuple[float, tuple[float, float], float]:
     return median, (float(ordered[k - 1]), float(ordered[n - k])), coverage
 
 
-def least_size(
-    setpoint: Series, response: Series, segments: Sequence[tuple[float, float]], longest: float
-) -> float:
-    """Size from which a change of the setpoint counts as a move, in its unit."""
-    wide = max(2, round(longest / setpoint.period))
-    told = [_rows(setpoint, segment)[1] for segment in segments]
-    came = [_rows(response, segment)[1] for segment in segments]
-    bends = np.concatenate([np.diff(values, 2) for values in came] or [np.empty(0)])
-    noise = 1.4826 * float(np.median(np.abs(bends))) / math.sqrt(6.0) if bends.size else 0.0
-    span = max((float(np.max(_spans(values, wide))) for values in told if values.size), default=0.0)
-    return max(NOISES * noise, OF_RANGE * span)
-
-
-def below_half(time: Array, level: Array, held: bool = False) -> float:
-    """Time that a signal from 0 to 1 spends below one half, s; straight between its rows."""
-    first, last, steps = level[:-1], level[1:], np.diff(time)
-    if held:
-        return float(np.sum(steps[first < 0.5]))
-    low, high = np.minimum(first, last), np.maximum(first, last)
-    wide = high - low
-    share = np.clip((0.5 - low) / np.where(wide > 0.0, wide, 1.0), 0.0, 1.0)
-    return float(np.sum(steps * np.where(wide > 0.0, share, low < 0.5)))
-
-
-def _rows(series: Series, segment: tuple[float, float]) -> tuple[Array, Array]:
-    """Times and finite values of a series in a segment."""
-    rows = (series.time >= segment[0]) & (series.time <= segment[1]) & np.isfinite(series.values)
-    return series.time[rows], series.values[rows]
-
-
-def _spans(values: Array, wide: int) -> Array:
-    """Range of each run of so many rows, or of all where there are fewer, shape (windows,)."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
-    wide = min(wide, values.size)
-    span = maximum_filter1d(values, wide) - minimum_filter1d(values, wide)
-    return np.asarray(span[wide // 2 : wide // 2 + values.size - wide + 1])
-
-
-def _moves_in(
-    setpoint: Series, segment: tuple[float, float], scales: tuple[float, float], least: float,
-    held: bool,
-) -> list[Move]:  # fmt: skip
-    """The moves in one segment, the largest first found, in their order in time.
-
-    `scales` are the shortest rest and the rough time from setpoint to response, s.
-    """
-    time, values = _rows(setpoint, segment)
-    rest = scales[0]
-    wide = max(2, math.ceil(rest / setpoint.period) + 1)
-    if values.size < 2 * wide or not least > 0.0:
-        return []
-    spans = _spans(values, wide)
-    found: list[Move] = []
-    scale = least * 2.0 ** max(0, math.floor(math.log2(max(float(np.ptp(values)) / least, 1.0))))
-    largest = math.inf
-    while scale >= least:
-        rests = [(a, b + wide - 2) for a, b in runs(spans <= RESTS * scale)]
-        for (_, p), (q, _) in pairwise(rests):
-            move = _move(time, values, (p, q, wide), scales, held) if q > p else None
-            if move is None or not scale <= abs(move.size) < largest:
-                continue
-            if all(move.half <= other.start or move.start >= other.half for other in found):
-                found.append(move)
-        largest, scale = scale, 0.5 * scale
-    return sorted(found)
-
-
-def _move(
-    time: Array,
-    values: Array,
-    rows: tuple[int, int, int],
-    scales: tuple[float, float],
-    held: bool,
-) -> Move | None:
-    """The move from the rest that ends in row p to that which begins in row q; None for none."""
-    (p, q, wide), (rest, rough) = rows, scales
-    before = float(np.median(values[max(0, p - wide + 1) : p + 1]))
-    size = float(np.median(values[q : q + wide])) - before
-    if size == 0.0 or time[q] - time[p] > CHANGE * rough:
-        return None
-    level = (values - before) / size
-    if np.min(level[p : q + 1]) < -RESTS or np.max(level[p : q + 1]) > 1.0 + RESTS:
-        return None
-    half = float(time[p]) + below_half(time[p : q + 1], level[p : q + 1], held)
-    until = int(np.searchsorted(time, half + FOLLOWED * rough, side="right"))
-    away = np.flatnonzero(np.abs(level[q:until] - 1.0) > RESTS)
-    last = q + int(away[0]) - 1 if away.size else until - 1
-    return Move(float(time[p]), half, float(time[max(last, q)]), before, size, rest, rough)
-
-
 def _response_to(move: Move, response: Series, axis: Array) -> tuple[Array, float]:
     """The response to one move on the axis, and its time; NaN where it has no rows."""
     later, part = LATER * move.rough, 0.5 * move.rest
     start, stop = move.start + later, move.stop + later
-    time, values = _rows(response, (move.start - move.rest, stop))
+    time, values = rows_of(response, (move.start - move.rest, stop))
     early = values[(time >= start - part) & (time <= start)]
     late = values[time >= stop - part]
     if not (early.size and late.size):

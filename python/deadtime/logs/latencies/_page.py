@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from deadtime._base.digits import between
 from deadtime._base.verdicts import NOT_CLAIMED, claimed
 from deadtime.logs.latencies._budget import Stage
-from deadtime.logs.latencies._plots import plot_fit
+from deadtime.logs.latencies._moves import Moves
+from deadtime.logs.latencies._plots import plot_fit, plot_moves
 from deadtime.logs.latencies._relation import LoopLatency
 from deadtime.logs.latencies._words import said_of
 
@@ -30,17 +31,42 @@ def budget_of(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:
     return rows
 
 
-def fit_of(one: LoopLatency) -> dict[str, object]:
-    """A fit with its picture, its numbers and what they cost."""
+def fit_of(
+    one: LoopLatency, moves: Moves | None = None, fitted: Moves | None = None
+) -> dict[str, object]:
+    """A fit with its number, its pictures and what it costs.
+
+    `moves` are those of the setpoint of the loop, `fitted` the same with the response of the fit.
+    """
     start, stop = one.windows[0]
     number = len(one.windows)
     more = f", the best of {number} that were fitted together" if number > 1 else ""
+    _, command, verdict, time, ends = row_of(one)
     return {
         "heading": _capital(one.name),
+        "number": time,
+        "beside": f"{verdict}, delay and lag from the {command}; 95 %: {ends}"
+        if verdict == "reliable"
+        else f"{verdict}, delay and lag from the {command}; {ends}",
         "sentences": [sentence(words) for words in said_of(one)],
+        "moves": None if moves is None else moves_of_page(moves, fitted),
         "figure": plot_fit(one),
         "caption": f"The window from {start:.1f} to {stop:.1f} s{more}.",
     }
+
+
+def moves_of_page(moves: Moves, fitted: Moves | None = None) -> dict[str, object]:
+    """The picture of all moves, and what it shows in words; no picture without a move."""
+    if not moves.count:
+        return {"figure": None, "caption": sentence(moves.headline())}
+    if fitted is None or fitted.reason:
+        figure, of_fit = plot_moves(moves), ""
+    else:
+        figure = plot_moves(moves, fitted.median, fitted.response)
+        of_fit = f"; the fit, at the same rows, {moves.shown(fitted.median)}"
+    caption = sentence(f"{moves.headline()}{of_fit}")
+    drawn = "Thin: the response to each move, as a share of the change; band: quartiles."
+    return {"figure": figure, "caption": f"{caption} {drawn}"}
 
 
 def sentence(words: str) -> str:

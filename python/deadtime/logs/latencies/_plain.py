@@ -38,7 +38,8 @@ from deadtime.logs.latencies._correlation import (
     peak_of,
 )
 from deadtime.logs.latencies._deconvolution import half_of_step
-from deadtime.logs.latencies._moves import COVERAGE, Move, Moves, aligned, median_of, moves_of
+from deadtime.logs.latencies._moves import COVERAGE, Moves, aligned, median_of, moves_of
+from deadtime.logs.latencies._setpoint_moves import Move
 
 #: Standard deviations of a correlation without any relation that a peak has to be above.
 ABOVE = 4.0
@@ -58,7 +59,7 @@ class PlainTime(ReadOnlyArrays):
     meaning : str
         What it is of.
     value : float
-        s; NaN where the record tells nothing.
+        s; NaN where the record determines none.
     interval : (float, float)
         95 % interval of its own scatter, s; NaN where that is not known.
     quality : float
@@ -172,7 +173,7 @@ def plain_times(
     longest : float
         Longest time from setpoint to response that is looked for, s.
     between : {"held", "straight"}
-        Whether the setpoint holds from row to row, or moves in lines.
+        Whether the setpoint holds from row to row, or is straight between rows.
     moves : sequence of Move, optional
         Moves that were found before; by default they are looked for.
 
@@ -184,7 +185,7 @@ def plain_times(
     --------
     >>> import numpy as np
     >>> from deadtime.logs import Series
-    >>> from deadtime.logs.latencies import plain_times
+    >>> from deadtime.logs import plain_times
     >>> time = np.arange(0.0, 60.0, 0.02)
     >>> sticks = np.repeat(np.random.default_rng(1).standard_normal(60), 50)
     >>> asked = Series(time, sticks, "rad", "asked")

@@ -1,4 +1,4 @@
-"""Pictures of latencies: delay and lag of each loop, and each fit over its data."""
+"""Pictures of latencies: delay and lag of each loop, its moves aligned, and each fit."""
 
 from __future__ import annotations
 
@@ -6,12 +6,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import time_unit
 from deadtime._base.drawing import COLOURS, DATA, REFERENCE, Axes, Figure, bare_axes, new_figure
+from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._relation import LoopLatency
 
 #: Height of a bar's row, and of what is around them, in inches.
 ROW, AROUND = 0.34, 1.3
+
+#: Size of the picture of the moves, in inches: it fits a phone as it is.
+MOVES = (4.8, 3.6)
+
+#: Most responses that are drawn under their median, and every how many of their points.
+DRAWN, EVERY = 40, 2
+
+#: Room above and below the quartiles of the responses, as a share of the move.
+ROOM = 0.3
 
 
 def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
@@ -42,6 +53,57 @@ def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     handles += ax.plot([], [], color="0.15", lw=1.4, marker="|")
     names = ["delay", "lag", "95 % of both"]
     figure.legend(handles, names, loc="outside upper center", ncols=3, frameon=False)
+    return figure
+
+
+def plot_moves(
+    moves: Moves, fit_time: float | None = None, fit_response: Array | None = None
+) -> Figure:
+    """All moves of the setpoint aligned, with the responses, and what the fit answers to them.
+
+    Parameters
+    ----------
+    moves : Moves
+        The moves of a loop; at least one.
+    fit_time : float, optional
+        Half to half over the same moves for the fitted plant, s.
+    fit_response : ndarray, shape (n,), optional
+        Its median response on the time axis of the moves.
+    """
+    if not moves.count:
+        raise ValueError(f"there is nothing to draw: {moves.reason}")
+    figure, ax = new_figure(*MOVES)
+    unit, factor = time_unit(float(moves.time[-1]) / 3.0)
+    time = moves.time / factor
+    every = max(1, -(-moves.count // DRAWN))
+    rows = moves.responses[::every, ::EVERY]
+    ax.plot(time[::EVERY], rows.T, color="0.5", lw=0.5, alpha=0.4)
+    ax.fill_between(time, moves.lower, moves.upper, color=COLOURS[0], alpha=0.2, lw=0.0)
+    ax.plot(time, moves.setpoint, color="0.0", lw=1.2, ls="--", label="setpoint")
+    ax.plot(time, moves.response, color=COLOURS[0], lw=2.0, label="response, median and quartiles")
+    if fit_response is not None:
+        ax.plot(time, fit_response, color=COLOURS[1], lw=1.4, label="fit")
+    marks = [(moves.median, moves.response, COLOURS[0], "response"),
+             (fit_time, fit_response, COLOURS[1], "fit")]  # fmt: skip
+    for place, (at, path, colour, name) in enumerate(marks):
+        if at is None or not np.isfinite(at):
+            continue
+        half = 0.5 if path is None else float(np.interp(at, moves.time, np.nan_to_num(path)))
+        ax.plot([at / factor] * 2, [0.0, half], color=colour, lw=1.2, ls=":")
+        ax.plot(at / factor, half, color=colour, marker="o", ms=6)
+        label = f"{name} {moves.shown(at)}"
+        ax.annotate(
+            label, (at / factor, half), (10, -4 - 14 * place),
+            textcoords="offset points", color="0.0", fontweight="bold",
+        )  # fmt: skip
+    known = np.isfinite(moves.response)
+    if known.any():
+        ax.set_xlim(time[known][0], time[known][-1])
+        low = min(0.0, float(np.nanmin(moves.lower))) - ROOM
+        ax.set_ylim(low, max(1.0, float(np.nanmax(moves.upper))) + ROOM)
+    ax.set_xlabel(f"time from half of the change of the setpoint [{unit}]")
+    ax.set_ylabel("share of the change")
+    figure.legend(loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return figure
 
 

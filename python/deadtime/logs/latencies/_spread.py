@@ -1,6 +1,6 @@
 """Times of many windows together: their mean, the spread between them, and its cause.
 
-Window i tells a time t_i with a standard error s_i. Around a line in some x_i, or a mean alone,
+Window i gives a time t_i with a standard error s_i. Around a line in some x_i, or a mean alone,
 
     t_i = x_i b + u_i + e_i,    u_i of variance tau^2,  e_i of variance s_i^2.
 
@@ -28,7 +28,7 @@ from deadtime._base.plain import plain_fields
 #: Fewest windows of a mean, and of a slope on the size of the movement.
 FEWEST, FEWEST_OF_SLOPE = 2, 4
 
-#: Least range of sizes, as a factor, over which a slope is told.
+#: Least range of sizes, as a factor, over which a slope is given.
 RANGE = 1.5
 
 
