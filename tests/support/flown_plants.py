@@ -43,6 +43,13 @@ class Plant:
         """Delay and lags together, less the zero, s."""
         return self.delay + self.lag - self.zero
 
+    def delay_at(self, omega: Array) -> Array:
+        """Equivalent delay -arg G/omega, s; that as omega goes to zero at zero."""
+        safe = np.where(omega > 0.0, omega, 1.0)
+        lags = np.angle(1.0 - self.square * safe**2 + 1j * safe * self.lag)
+        found = self.delay + (lags - np.arctan(safe * self.zero)) / safe
+        return np.where(omega > 0.0, found, self.time)
+
     @property
     def poles(self) -> NDArray[np.complex128]:
         """One pole, or two that differ."""

@@ -65,9 +65,12 @@ class Bound:
     block: float
 
 
-def bound_of(flown: Flown) -> Bound:
-    """The bound of a flight at its truth."""
-    turn = _turn(flown.plant)
+def bound_of(flown: Flown, omega: Array | None = None, weight: Array | None = None) -> Bound:
+    """The bound of a flight at its truth: for its mean equivalent delay, weighted over frequencies.
+
+    Without frequencies, rad/s, for that as the frequency goes to zero.
+    """
+    turn = _turn(flown.plant, np.zeros(1) if omega is None else omega, weight)
     whole = np.zeros((turn.size, turn.size))
     best = np.inf
     for slopes, _ in _blocks(flown, flown.plant):
@@ -93,10 +96,17 @@ def _names(plant: Plant) -> tuple[str, ...]:
     return ("gain", *FREE[plant.kind])
 
 
-def _turn(plant: Plant) -> Array:
-    """How the time changes with each free number."""
-    signs = {"delay": 1.0, "lag": 1.0, "zero": -1.0}
-    return np.array([signs.get(name, 0.0) for name in _names(plant)])
+def _turn(plant: Plant, omega: Array, weight: Array | None) -> Array:
+    """How the mean equivalent delay changes with each free number."""
+    time = plant.time
+    size = {"gain": 1.0, "square": time**2}
+    slopes = []
+    for k, name in enumerate(_names(plant)):
+        step = STEP * size.get(name, time)
+        change = step * np.eye(len(_names(plant)))[k]
+        ahead, behind = (_moved(plant, way * change).delay_at(omega) for way in (1.0, -1.0))
+        slopes.append(np.average(ahead - behind, weights=weight) / (2.0 * step))
+    return np.array(slopes)
 
 
 def _moved(plant: Plant, change: Array) -> Plant:

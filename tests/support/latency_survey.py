@@ -41,9 +41,6 @@ CASES_OF_THE_TEST = (3, 6, 9, 11, 15, 18, 22, 28)
 #: A log tells its time if half the interval of the bound is below this share of it.
 TELLS = 0.2
 
-#: Where a loop says why it is not reliable.
-REASONS = ("reason", "refusal")
-
 #: Half an interval of 95 % in standard errors.
 TWO_SIDED = 1.96
 
@@ -90,35 +87,27 @@ def answer(number: int, seed: int) -> Answer:
     """The answer to one log of a case."""
     case = CASES[number]
     flown = fly(case, seed)
-    bound = bound_of(flown)
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"flown{SUFFIXES[case.writer]}"
         path.write_bytes(flown.data(np.random.default_rng([seed, number, 1])))
         start = time.process_time()
         try:
-            said = _said(dtm.latency(path, loops=[case.loop]).loop(case.loop, "setpoint"))
+            loop = dtm.latency(path, loops=[case.loop]).loop(case.loop, "setpoint")
         except Exception as error:  # whatever it is, it is an answer that nobody can use
-            said = "failed", np.nan, np.nan, np.nan, f"{type(error).__name__}: {error}"
+            loop, why = None, f"{type(error).__name__}: {error}"
         seconds = time.process_time() - start
+    seen = () if loop is None or loop.verdict == "none" else (loop.frequencies, loop.weights)
+    said = ("failed", np.nan, np.nan, np.nan, why) if loop is None else _said(loop)
+    bound = bound_of(flown, *seen)
     truth = flown.plant.time
+    if seen:
+        truth = float(flown.plant.delay_at(loop.frequencies) @ loop.weights)
     return Answer(number, seed, truth, bound.error, bound.block, *said, seconds)
 
 
 def _said(loop: LoopLatency) -> tuple[str, float, float, float, str]:
     """Verdict, time, interval and reason of a loop."""
-    # A loop with an estimate, or with none and a refusal, has no verdict of its own.
-    fit = loop.estimate
-    verdict = getattr(loop, "verdict", None) or ("none" if fit is None else fit.verdict)
-    reason = next((said for said in (getattr(loop, name, "") for name in REASONS) if said), "")
-    if verdict == "none":
-        return verdict, np.nan, np.nan, np.nan, reason
-    if hasattr(loop, "interval"):
-        value, (low, high) = loop.time, loop.interval
-    else:
-        value, _, (low, high) = loop.sum_of()
-    if verdict != "reliable":
-        reason = reason or fit.reason
-    return verdict, float(value), float(low), float(high), reason
+    return loop.verdict, loop.time, *loop.interval, loop.reason
 
 
 def answers(jobs: Iterable[tuple[int, int]], workers: int) -> Iterator[Answer]:

@@ -1,9 +1,9 @@
 """The command of a log between its rows.
 
 Rows that are rarer than the changes of a command leave open what it was between them. A command
-that is smooth over a few rows is the cubic through them: each row is predicted from the second and
-the fourth of its neighbours to either side, by a straight line and by a cubic, and the better one is
-taken. Of one that jumps a straight line is the mean of what it may have been.
+that is smooth over a few rows is the cubic through them: each row is predicted from the second
+and the fourth of its neighbours to either side, by a straight line and by a cubic; the better one
+is taken. Of one that jumps a straight line is the mean of what it may have been.
 
 The mean of many rows of the output over a time w is the response to the mean of the command over w,
 for filters commute. That of a command that holds is straight between corners.

@@ -18,12 +18,15 @@ from deadtime._base.progress import Stages, stage_report
 from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
+from deadtime.logs.latencies._advice import advice
+from deadtime.logs.latencies._beside import beside_plain_numbers
 from deadtime.logs.latencies._budget import Stage, stages_of
 from deadtime.logs.latencies._clocks import why_two_clocks
 from deadtime.logs.latencies._commands import Command, averaged, sampling_of
 from deadtime.logs.latencies._contradictions import doubted_by_others
 from deadtime.logs.latencies._filters import FilterDelay, filters_of
 from deadtime.logs.latencies._live import around_the_vehicle
+from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._relation import LoopLatency, relation_of
 from deadtime.logs.latencies._windows import parts_of, prepared, together_of, windows_of
 from deadtime.logs.latencies._words import in_full, table_of
@@ -148,7 +151,7 @@ class Latency(ReadOnlyArrays, Pictured):
                 for one in self.filters
             ],
             link="" if self.link is None else sentence(self.link.summary()),
-            fits=[fit_of(one) for one in found],
+            fits=[fit_of(one, *_moves_of(one)) for one in found],
             refused=[one for one in self.loops if one.verdict == "none"],
             remarks=self.remarks,
             around=around_the_vehicle(found),
@@ -157,6 +160,10 @@ class Latency(ReadOnlyArrays, Pictured):
 
     def __repr__(self) -> str:
         return f"<Latency of {self.source}: {len(self.estimated)} of {len(self.loops)} loops>"
+
+
+def _moves_of(one: LoopLatency) -> tuple[Moves | None, Moves | None]:
+    return (None if one.plain is None else one.plain.aligned), one.answered
 
 
 def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
@@ -245,6 +252,7 @@ def latency(
         filters=filters,
         remarks=(*log.remarks, *_sent_from_the_ground(log, chosen)),
         link=log.link,
+        advice=tuple(one.line() for one in advice(log, [loop.name for loop in chosen])),
     )
 
 
@@ -339,6 +347,8 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
         averaged(sampling, together),
         command == "actuator",
     )
+    if command == "setpoint":
+        found = beside_plain_numbers(found, loop, sampling)
     # Two signals of one message have one clock.
     if found.verdict == "none" or told.topic == loop.response.topic:
         return found

@@ -1,9 +1,11 @@
 """The time from a command of one loop to its response, over the windows of a log.
 
-The time is the equivalent delay -arg G/omega of the plant from the command to the response, at the
-frequency at which the response moves: the rate of change of its modelled part over that part, both
-as root mean squares. It is what a cross-correlation sees, and so what a pilot feels. Of a plant that
-integrates it is that where half of the largest proportional gain crosses over.
+The time is the equivalent delay -arg G/omega of the plant from the command to the response, in the
+mean over the frequencies at which the response moves: each has the power of the rate of change of
+the modelled response as its weight. So weighs a cross-correlation, and so does a pilot. Of a plant
+that integrates it is the equivalent delay where half of the largest proportional gain crosses over.
+
+Where windows differ by more than their errors, the time is the mean over the windows.
 """
 
 from __future__ import annotations
@@ -11,10 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime._base.digits import between as ends_of, stated
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays
@@ -23,8 +26,17 @@ from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed
 from deadtime.estimation import PlantEstimate, estimate_delay, refit
 from deadtime.logs.latencies._commands import Command, Sampling
 from deadtime.logs.latencies._cost import GainCost, cost_of
+from deadtime.logs.latencies._moves import Moves
+from deadtime.logs.latencies._plain import Difference, PlainTimes
 from deadtime.logs.latencies._spread import Spread, spread_of
-from deadtime.logs.latencies._windows import LENGTHS, LONGEST, Window, best_of, whole_of
+from deadtime.logs.latencies._windows import (
+    LENGTHS,
+    LONGEST,
+    Window,
+    best_of,
+    that_follow,
+    whole_of,
+)
 from deadtime.recordings import Recording
 
 #: Width of a 95 % interval in standard errors.
@@ -41,6 +53,15 @@ TOLD = 3
 #: and the windows that have to agree in its place.
 OF_THE_GAIN = ("classes contradict", "crossover not told", "too few told")
 NOT_WHITE, MANY = "residuals not white", 5
+
+#: Bands of frequency over which the time is averaged: more see more of its change and take longer.
+BANDS = 24
+
+#: Share of the power below which a band is left out.
+NEGLIGIBLE = 1e-3
+
+#: Probability of the scatter of windows below which they differ.
+DIFFER = 0.01
 
 #: A time says something if its standard error is below itself, or below so many rows.
 OF_A_ROW = 2.0
@@ -82,11 +103,11 @@ class LoopLatency(ReadOnlyArrays):
     reason : str
         Why it is not ``"reliable"``; empty where it is.
     time : float
-        Equivalent delay from the command to the response at `frequency`, s; NaN if there is none.
+        From the command to the response, s: its mean equivalent delay; NaN if there is none.
     interval : (float, float)
         95 % interval of `time`, s, with the spread between windows.
-    frequency : float
-        Where the response moves, or where the loop crosses over, rad/s.
+    frequencies, weights : ndarray, shape (n,)
+        Where the response moves, rad/s, and the weight of each, which add up to one.
     windows : tuple of (float, float)
         Where it was estimated, s from the start of the log.
     estimate : PlantEstimate or None
@@ -99,6 +120,12 @@ class LoopLatency(ReadOnlyArrays):
         Gains of a proportional controller for the estimated vehicle.
     sampling : Sampling or None
         How commands pass between the rows of the log.
+    plain : PlainTimes or None
+        The plain numbers of the field, from the setpoint.
+    differences : tuple of Difference
+        These less what the same methods give for the fit.
+    answered : Moves or None
+        The moves of the setpoint with the response of the fit.
     """
 
     loop: str
@@ -109,13 +136,17 @@ class LoopLatency(ReadOnlyArrays):
     reason: str
     time: float = math.nan
     interval: tuple[float, float] = (math.nan, math.nan)
-    frequency: float = math.nan
+    frequencies: Array = field(default_factory=lambda: np.empty(0), repr=False)
+    weights: Array = field(default_factory=lambda: np.empty(0), repr=False)
     windows: tuple[tuple[float, float], ...] = ()
     estimate: PlantEstimate | None = None
     times: tuple[WindowTime, ...] = ()
     spread: Spread | None = None
     cost: GainCost | None = None
     sampling: Sampling | None = field(default=None, repr=False)
+    plain: PlainTimes | None = None
+    differences: tuple[Difference, ...] = ()
+    answered: Moves | None = field(default=None, repr=False)
 
     @property
     def name(self) -> str:
@@ -150,13 +181,12 @@ class LoopLatency(ReadOnlyArrays):
 
     def to_dict(self) -> dict[str, Any]:
         """The time as plain values for JSON."""
-        names = (
-            "loop", "axis", "kind", "command", "verdict", "reason", "time", "frequency", "windows"
-        )  # fmt: skip
+        names = ("loop", "axis", "kind", "command", "verdict", "reason", "time", "windows")
         parts = {
             name: None if part is None else part.to_dict()
             for name, part in (
-                ("estimate", self.estimate), ("spread", self.spread), ("cost", self.cost)
+                ("estimate", self.estimate), ("spread", self.spread), ("cost", self.cost),
+                ("plain", self.plain),
             )
         }  # fmt: skip
         known = {"interval_95": self.interval if self.verdict == "reliable" else None}
@@ -176,9 +206,10 @@ def relation_of(
     `nothing` is the loop without a time, `part` gives the recording from one time to another, s, as
     it is fitted, `sampling` how its commands pass between rows then.
     """
-    chosen = best_of(windows)
     if not windows:
         return replace(nothing, reason="it is never followed for long enough")
+    windows = that_follow(windows)
+    chosen = best_of(windows)
     if not chosen:
         return replace(nothing, reason=f"the {nothing.command} does not move")
     try:
@@ -220,23 +251,26 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
     """The time with its interval: that of the fit, the spread, and what the log leaves unknown."""
     fit = found.estimate
     assert fit is not None
-    omega = _frequency_of(fit)
-    times = _alone(fit, windows, omega)
+    where = _moving_frequencies(fit)
+    times = _alone(fit, windows, where)
     spread = None
-    value, low, high = _time_at(fit, omega)
+    value, low, high = where.mean_of(fit)
     if len(times) > 1:
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
-        fitted = sum(_is_in(one.at, found.windows) for one in times)
-        between = _reach(spread) / math.sqrt(max(1, fitted))
-        low = value - math.hypot(value - low, between)
-        high = value + math.hypot(high - value, between)
+        if spread.p_value < DIFFER:
+            value, (low, high) = spread.mean, spread.interval
+        else:
+            between = _reach(spread) / math.sqrt(spread.count)
+            low = value - math.hypot(value - low, between)
+            high = value + math.hypot(high - value, between)
         if fit._code == NOT_WHITE:
             low, high = min(low, spread.interval[0]), max(high, spread.interval[1])
     unsure = 0.0 if found.sampling is None else found.sampling.unsure
     interval = (max(0.0, low - unsure), high + unsure)
     return replace(
-        found, time=value, interval=interval, frequency=omega, times=times, spread=spread
-    )
+        found, time=value, interval=interval, times=times, spread=spread,
+        frequencies=where.omega, weights=where.weight,
+    )  # fmt: skip
 
 
 def _why_doubtful(found: LoopLatency) -> str:
@@ -253,10 +287,6 @@ def _why_doubtful(found: LoopLatency) -> str:
     return "" if fit._code == NOT_WHITE and many else fit.reason
 
 
-def _is_in(time: float, windows: Sequence[tuple[float, float]]) -> bool:
-    return any(start <= time <= stop for start, stop in windows)
-
-
 def _reach(spread: Spread) -> float:
     """How far the true time of one window may lie from the mean, s, at 95 %."""
     from scipy.special import stdtrit
@@ -264,28 +294,45 @@ def _reach(spread: Spread) -> float:
     return spread.between * float(stdtrit(spread.count - 1, 0.975))
 
 
-def _frequency_of(fit: PlantEstimate) -> float:
-    """The frequency at which the time is told, rad/s."""
+class Frequencies(NamedTuple):
+    """Frequencies, rad/s, and their weights, which add up to one."""
+
+    omega: Array
+    weight: Array
+
+    def mean_of(self, fit: PlantEstimate) -> tuple[float, float, float]:
+        """The mean equivalent delay, and its 95 % interval, s."""
+        seen = fit.at(self.omega)
+        low, high = (seen.delay_ci @ self.weight).tolist()
+        return float(seen.delay @ self.weight), low, high
+
+
+def _moving_frequencies(fit: PlantEstimate) -> Frequencies:
+    """Where the modelled response moves, in bands; where a loop crosses over if it integrates."""
     if fit.best.integrates and math.isfinite(fit.crossover):
-        return fit.crossover
-    moves = rates = 0.0
+        return Frequencies(np.array([fit.crossover]), np.ones(1))
+    longest = max(run.recording.time[-1] - run.recording.time[0] for run in fit.runs)
+    step = min(run.recording.sample_time for run in fit.runs)
+    edges = np.geomspace(2.0 * math.pi / longest, math.pi / step, BANDS + 1)
+    power = np.zeros(BANDS)
+    moment = np.zeros(BANDS)
     for run in fit.runs:
         known = np.isfinite(run.fitted)
         time, values = run.recording.time[known], run.fitted[known]
-        line = np.polynomial.Polynomial.fit(time, values, 1)
-        moves += float(np.sum((values - line(time)) ** 2))
-        rates += float(np.sum(np.gradient(values, time) ** 2))
-    return math.sqrt(rates / moves) if moves > 0.0 else math.nan
+        even = np.arange(time[0], time[-1], step)
+        rate = np.diff(np.interp(even, time, values))
+        spectrum = np.abs(np.fft.rfft(rate * np.hanning(rate.size))) ** 2
+        omega = 2.0 * math.pi * np.fft.rfftfreq(rate.size, step)
+        power += np.histogram(omega, edges, weights=spectrum)[0]
+        moment += np.histogram(omega, edges, weights=spectrum * omega)[0]
+    some = power > NEGLIGIBLE * power.sum()
+    weight = power[some] / power[some].sum()
+    return Frequencies(moment[some] / power[some], weight)
 
 
-def _time_at(fit: PlantEstimate, omega: float) -> tuple[float, float, float]:
-    """The equivalent delay at a frequency, and its 95 % interval, s."""
-    seen = fit.at([omega])
-    low, high = seen.delay_ci[:, 0].tolist()
-    return float(seen.delay[0]), low, high
-
-
-def _alone(fit: PlantEstimate, windows: Sequence[Window], omega: float) -> tuple[WindowTime, ...]:
+def _alone(
+    fit: PlantEstimate, windows: Sequence[Window], where: Frequencies
+) -> tuple[WindowTime, ...]:
     """The time of each window by itself, where it tells one."""
     moving = sorted(windows, key=lambda one: one.movement, reverse=True)[:ALONE]
     found = []
@@ -296,7 +343,7 @@ def _alone(fit: PlantEstimate, windows: Sequence[Window], omega: float) -> tuple
             continue
         if not alone.candidates or alone.best.parameters["gain"] <= 0.0:
             continue
-        value, low, high = _time_at(alone, omega)
+        value, low, high = where.mean_of(alone)
         error = (high - low) / TWO_SIDED
         if _says_something(value, error, one.recording):
             middle = 0.5 * (one.start + one.stop)

@@ -25,6 +25,10 @@ FEWEST, MOST, TOGETHER = 24, 1200, 3
 #: Most rows, and most segments, to which the plants of these are fitted then.
 ALL, SEGMENTS = 15000, 8
 
+#: A window is like the others if its response follows to this share of what it does in most, and is
+#: as late to this factor and so many rows; and how many others there have to be for that.
+FOLLOWS, FACTOR, ROWS_OFF, OTHERS = 0.4, 2.5, 2.0, 4
+
 #: Movement of a window, as a share of the largest, below which it ends a run.
 STILL = 0.1
 
@@ -61,9 +65,13 @@ class Window(NamedTuple):
     recording : Recording
         Its rows, averaged where they are many.
     movement : float
-        Deviation of the command from a straight line.
+        Deviation of the command from a straight line, times the share of the response that follows.
     segment : int
         The segment of the log that it is a part of.
+    follows : float
+        Largest correlation of command and response, squared.
+    late : float
+        The time by which the response is later there, s.
     """
 
     start: float
@@ -71,6 +79,8 @@ class Window(NamedTuple):
     recording: Recording
     movement: float
     segment: int = 0
+    follows: float = 1.0
+    late: float = 0.0
 
 
 def windows_of(log: Log, loop: LogLoop, command: Command, sampling: Sampling) -> list[Window]:
@@ -92,8 +102,47 @@ def windows_of(log: Log, loop: LogLoop, command: Command, sampling: Sampling) ->
                 rows = prepared(part, sampling, together)
             except RecordingError:  # repeated rows, or gaps
                 continue
-            found.append(Window(start, stop, rows, movement_of(part), segment))
+            follows, late = _follows(rows, LONGEST * LENGTHS[loop.kind])
+            moves = movement_of(part) * follows
+            found.append(Window(start, stop, rows, moves, segment, follows, late))
     return found
+
+
+def that_follow(windows: Sequence[Window]) -> list[Window]:
+    """The windows in which the response follows the command as it does in most of the others.
+
+    On the ground, in a crash or a flip it does not, and moves the most.
+    """
+    moving = [one for one in windows if one.movement > 0.0]
+    if len(moving) < OTHERS:
+        return list(windows)
+    follows = float(np.median([one.follows for one in moving]))
+    late = float(np.median([one.late for one in moving]))
+    kept = []
+    for one in windows:
+        slack = ROWS_OFF * one.recording.sample_time
+        near = late / FACTOR - slack <= one.late <= FACTOR * late + slack
+        if near and one.follows >= FOLLOWS * follows:
+            kept.append(one)
+    return kept
+
+
+def _follows(part: Recording, longest: float) -> tuple[float, float]:
+    """The largest squared correlation of command and response, and how much later that is, s."""
+    assert part.sent is not None
+    step = part.sample_time
+    even = np.arange(part.time[0], part.time[-1], step)
+    line = np.polynomial.Polynomial.fit
+    told = np.interp(even, *part.sent)
+    came = np.interp(even, part.time, part.output)
+    told, came = told - line(even, told, 1)(even), came - line(even, came, 1)(even)
+    power = float(told @ told) * float(came @ came)
+    most = min(int(longest / step) + 1, even.size // 2)
+    if power <= 0.0 or most < 1:
+        return 0.0, 0.0
+    products = np.correlate(came, told[: even.size - most], "valid")
+    best = int(np.argmax(products))
+    return max(0.0, float(products[best])) ** 2 / power, best * step
 
 
 def movement_of(part: Recording) -> float:

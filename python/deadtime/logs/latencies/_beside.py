@@ -1,0 +1,57 @@
+"""A fit beside the plain numbers of the field, from the same rows.
+
+Each method is applied to the log and to what the fitted plant answers to the same setpoint at the
+same rows. Where both differ by more than their intervals allow, the plant is not that of the log.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from deadtime._base.digits import shown
+from deadtime.logs._log import LogLoop
+from deadtime.logs.latencies._commands import Sampling
+from deadtime.logs.latencies._modelled import modelled
+from deadtime.logs.latencies._plain import Difference, differences, plain_times
+from deadtime.logs.latencies._relation import LoopLatency
+from deadtime.logs.latencies._windows import LENGTHS, LONGEST
+
+
+def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) -> LoopLatency:
+    """The time of a loop from its setpoint with the plain numbers, doubted where they differ."""
+    fit = found.estimate
+    if fit is None or fit.plant is None:
+        return found
+    both = loop.setpoint, loop.response
+    longest = LONGEST * LENGTHS[loop.kind]
+    between = sampling.between
+    own = plain_times(*both, loop.segments, longest=longest, between=between)
+    answer = modelled(fit.plant, fit.delay, *both, loop.segments, between)
+    of_fit = plain_times(
+        loop.setpoint, answer, loop.segments,
+        longest=longest, between=between, moves=own.aligned.moves,
+    )  # fmt: skip
+    differ = differences(own, of_fit)
+    found = replace(found, plain=own, differences=differ, answered=of_fit.aligned)
+    half = 0.5 * (found.interval[1] - found.interval[0])
+    for one in differ:
+        if why := _why_apart(one, half):
+            found = found.doubted(why)
+    return found
+
+
+def _why_apart(one: Difference, half: float) -> str:
+    """How far a plain number is from that of the fit; empty where it may be the same.
+
+    `half` is half the interval of the time of the fit, s.
+    """
+    low, high = one.interval
+    apart = abs(one.measured - one.modelled)
+    if not (one.disagrees and apart > math.hypot(0.5 * (high - low), half)):
+        return ""
+    error = 0.25 * (high - low)
+    return (
+        f"by {one.name} the log gives {shown(one.measured, error, 's')} and the fit "
+        f"{shown(one.modelled, error, 's')}"
+    )
