@@ -755,6 +755,9 @@ class FamilyFit:
     phase_at_crossover: Final[float]
     delay_at_crossover: Final[float]
     def hull_at(self, level: float) -> dict[str, _Pair]: ...
+    def mean_delay(
+        self, omega: Sequence[float], weight: Sequence[float], level: float | None = None
+    ) -> tuple[float, float, float]: ...
     def pieces_at(self, level: float) -> dict[str, list[_Pair]]: ...
     def at(
         self, omega: Sequence[float], level: float | None = None

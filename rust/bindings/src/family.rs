@@ -222,6 +222,22 @@ impl FamilyFit {
         self.value("delay_at_crossover")
     }
 
+    /// The mean equivalent delay over frequencies with weights that add up to one: value, ends.
+    #[pyo3(signature = (omega, weight, level=None))]
+    fn mean_delay(
+        &self,
+        py: Python<'_>,
+        omega: Vec<f64>,
+        weight: Vec<f64>,
+        level: Option<f64>,
+    ) -> PyResult<(f64, f64, f64)> {
+        check_frequencies(&omega)?;
+        let level = level.unwrap_or(self.level);
+        Ok(run_here(py, |task| {
+            self.core.mean_delay(&omega, &weight, level, task)
+        })?)
+    }
+
     /// Gain, phase and equivalent delay at frequencies; each a list of values, lower and upper ends.
     #[pyo3(signature = (omega, level=None))]
     fn at<'py>(
@@ -230,14 +246,7 @@ impl FamilyFit {
         omega: Vec<f64>,
         level: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        if let Some(wrong) = omega
-            .iter()
-            .find(|omega| !(omega.is_finite() && **omega > 0.0))
-        {
-            return Err(PyValueError::new_err(format!(
-                "frequency {wrong} rad/s: give frequencies above 0"
-            )));
-        }
+        check_frequencies(&omega)?;
         let found = run_here(py, |task| {
             self.core.at(&omega, level.unwrap_or(self.level), task)
         })?;
@@ -250,6 +259,16 @@ impl FamilyFit {
             out.set_item(name, (parts(|x| x.0), parts(|x| x.1), parts(|x| x.2)))?;
         }
         Ok(out)
+    }
+}
+
+fn check_frequencies(omega: &[f64]) -> PyResult<()> {
+    let is_wrong = |omega: &&f64| !(omega.is_finite() && **omega > 0.0);
+    match omega.iter().find(is_wrong) {
+        Some(wrong) => Err(PyValueError::new_err(format!(
+            "frequency {wrong} rad/s: give frequencies above 0"
+        ))),
+        None => Ok(()),
     }
 }
 

@@ -73,9 +73,7 @@ def refit(fit: PlantEstimate, recordings: Sequence[Recording]) -> PlantEstimate:
         When a recording has too few rows.
     """
     own = {"earlier": 0, "window": None, "shift": 0}
-    first, *others = (
-        replace(fit._question, recording=one, others=(), **own) for one in recordings
-    )
+    first, *others = (replace(fit._question, recording=one, others=(), **own) for one in recordings)
     question = replace(first, others=tuple(others))
     return estimate_of(question, question.answer(known=fit._answer()))
 

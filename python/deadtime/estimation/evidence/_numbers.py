@@ -231,6 +231,28 @@ class FoundPlant(ReadOnlyArrays):
         ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}
         return LoopView(given, **values, **ends)
 
+    def mean_delay(self, omega: ArrayLike, weight: ArrayLike) -> tuple[float, tuple[float, float]]:
+        """Mean of the equivalent delay over frequencies, and its 95 % interval.
+
+        Parameters
+        ----------
+        omega : array_like, shape (n,)
+            Frequencies above zero, rad/s.
+        weight : array_like, shape (n,)
+            What each counts; scaled so that they add up to one.
+
+        Returns
+        -------
+        float, (float, float)
+            s. The interval is over the kinds of plant that the recording does not rule out and
+            whose numbers it determines.
+        """
+        given = one_dimensional("weight", np.asarray(weight, dtype=float))
+        places = one_dimensional("omega", np.asarray(omega, dtype=float))
+        share = (given / given.sum()).tolist()
+        value, low, high = self._answer().mean_delay(places.tolist(), share)
+        return value, (low, high)
+
     def loop(
         self,
         controller: Controller,

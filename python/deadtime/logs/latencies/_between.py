@@ -16,8 +16,9 @@ import numpy as np
 from deadtime._base.arrays import Array
 from deadtime.logs.latencies._commands import Between
 
-#: Points for each row of a cubic, straight between them: their error falls with the number squared.
-FINER = 4
+#: Points for each row of a cubic, straight between them, of few rows and of more than so many: the
+#: error falls with the number squared.
+FINER, LESS, MANY = 4, 2, 2000
 
 #: Rows of which at least some tell whether a command is smooth.
 FEWEST = 12
@@ -43,7 +44,8 @@ def refined(time: Array, values: Array) -> tuple[Array, Array]:
 
     if not is_smooth(values):
         return time, values
-    rows = np.arange(FINER * (time.size - 1) + 1) / FINER
+    finer = FINER if time.size <= MANY else LESS
+    rows = np.arange(finer * (time.size - 1) + 1) / finer
     fine = np.interp(rows, np.arange(time.size), time)
     return fine, np.asarray(CubicSpline(time, values)(fine))
 

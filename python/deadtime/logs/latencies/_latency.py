@@ -338,7 +338,8 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     together = together_of(loop.response, loop.kind)
 
     def part(start: float, stop: float) -> Recording:
-        return prepared(loop.recording(start, stop, command=command), sampling, together)
+        rows = loop.recording(start, stop, command=command)
+        return prepared(rows, loop.kind, sampling, together)
 
     found = relation_of(
         LoopLatency(loop.name, loop.axis, loop.kind, command, "none", "", sampling=sampling),

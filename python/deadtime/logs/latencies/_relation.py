@@ -251,10 +251,11 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
     """The time with its interval: that of the fit, the spread, and what the log leaves unknown."""
     fit = found.estimate
     assert fit is not None
-    where = _moving_frequencies(fit)
-    times = _alone(fit, windows, where)
+    crossover = fit.best.integrates and math.isfinite(fit.crossover)
+    where = _moving_frequencies(fit, crossover)
+    value, (low, high) = fit.mean_delay(*where)
+    times = _alone(fit, windows, value, crossover)
     spread = None
-    value, low, high = where.mean_of(fit)
     if len(times) > 1:
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
         if spread.p_value < DIFFER:
@@ -300,16 +301,10 @@ class Frequencies(NamedTuple):
     omega: Array
     weight: Array
 
-    def mean_of(self, fit: PlantEstimate) -> tuple[float, float, float]:
-        """The mean equivalent delay, and its 95 % interval, s."""
-        seen = fit.at(self.omega)
-        low, high = (seen.delay_ci @ self.weight).tolist()
-        return float(seen.delay @ self.weight), low, high
 
-
-def _moving_frequencies(fit: PlantEstimate) -> Frequencies:
-    """Where the modelled response moves, in bands; where a loop crosses over if it integrates."""
-    if fit.best.integrates and math.isfinite(fit.crossover):
+def _moving_frequencies(fit: PlantEstimate, crossover: bool) -> Frequencies:
+    """Where the modelled response moves, in bands, or where a loop crosses over."""
+    if crossover:
         return Frequencies(np.array([fit.crossover]), np.ones(1))
     longest = max(run.recording.time[-1] - run.recording.time[0] for run in fit.runs)
     step = min(run.recording.sample_time for run in fit.runs)
@@ -331,9 +326,12 @@ def _moving_frequencies(fit: PlantEstimate) -> Frequencies:
 
 
 def _alone(
-    fit: PlantEstimate, windows: Sequence[Window], where: Frequencies
+    fit: PlantEstimate, windows: Sequence[Window], time: float, crossover: bool
 ) -> tuple[WindowTime, ...]:
-    """The time of each window by itself, where it tells one."""
+    """The time of each window by itself, where it tells one.
+
+    A window moves at frequencies of its own: there its delay is compared with that of the whole.
+    """
     moving = sorted(windows, key=lambda one: one.movement, reverse=True)[:ALONE]
     found = []
     for one in sorted(moving, key=lambda one: one.start):
@@ -343,7 +341,11 @@ def _alone(
             continue
         if not alone.candidates or alone.best.parameters["gain"] <= 0.0:
             continue
-        value, low, high = where.mean_of(alone)
+        where = _moving_frequencies(fit if crossover else alone, crossover)
+        if not where.omega.size:
+            continue
+        value, (low, high) = alone.mean_delay(*where)
+        value += time - fit.mean_delay(*where)[0]
         error = (high - low) / TWO_SIDED
         if _says_something(value, error, one.recording):
             middle = 0.5 * (one.start + one.stop)

@@ -44,6 +44,9 @@ SETTLES = 0.05
 #: Longest time from command to response that is looked for, as a share of that length.
 LONGEST = 0.2
 
+#: Commands are used from so much before the first row on, as a share of that length.
+BEFORE = 0.25
+
 #: Rows are averaged over this share of that length: more takes less time, and shows less of what is
 #: fast.
 AVERAGED = 5e-4
@@ -99,7 +102,7 @@ def windows_of(log: Log, loop: LogLoop, command: Command, sampling: Sampling) ->
                 continue
             try:
                 part = loop.recording(start, stop, command=command)
-                rows = prepared(part, sampling, together)
+                rows = prepared(part, loop.kind, sampling, together)
             except RecordingError:  # repeated rows, or gaps
                 continue
             follows, late = _follows(rows, LONGEST * LENGTHS[loop.kind])
@@ -163,13 +166,15 @@ def together_of(response: Series, kind: Kind) -> int:
     return max(1, int(AVERAGED * LENGTHS[kind] / response.period + 1e-6))
 
 
-def prepared(part: Recording, sampling: Sampling, together: int) -> Recording:
+def prepared(part: Recording, kind: Kind, sampling: Sampling, together: int) -> Recording:
     """The recording with its commands between rows, and means of so many rows of the output.
 
-    The command is averaged over the same time, so that the plant is that of single rows.
+    The command is averaged over the same time, so that the plant is that of single rows. Those that
+    arrive before the first row are left out: the state there is unknown.
     """
     assert part.sent is not None
-    sent = part.sent.time, part.sent.values
+    first = np.searchsorted(part.sent.time, part.time[0] - BEFORE * LENGTHS[kind])
+    sent = part.sent.time[first:], part.sent.values[first:]
     if sampling.between == "straight":
         sent = refined(*sent)
     time, output, reference = part.time, part.output, part.reference

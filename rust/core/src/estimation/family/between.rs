@@ -7,15 +7,20 @@
 //! holds for a while is known for so long of each interval.
 //!
 //! With W the whitened sensitivities, C their covariance and g the whitened response to A, the numbers
-//! move by C Wᵀg/σ², and their covariance grows by that of all intervals.
+//! move by C Wᵀg/σ², and their covariance grows by that of all intervals. Their own part of the residuals
+//! is no noise of the output.
 
 use super::model::{Model, Point};
 use super::response::pulse;
 use super::rows::Part;
 use crate::linear_algebra::vectors::dot;
 
-/// Share of the variance of all areas that is left out with the smallest of them: more takes less time.
-const LEFT_OUT: f64 = 1e-3;
+/// Most areas of a record that are followed, the largest; the others count as if they were alike: more are
+/// nearer to all and take longer.
+const FOLLOWED: usize = 200;
+
+/// Most of the variance of residuals that is taken for open areas: the rest is noise.
+const MOST_SHARE: f64 = 0.8;
 
 /// The intervals of a record whose areas count, with the standard deviation of each.
 fn areas(part: &Part) -> Vec<((f64, f64), f64)> {
@@ -37,49 +42,63 @@ fn areas(part: &Part) -> Vec<((f64, f64), f64)> {
         })
         .collect();
     out.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let all: f64 = out.iter().map(|(_, size)| size * size).sum();
-    let mut sum = 0.0;
-    out.retain(|(_, size)| {
-        let counts = *size > 0.0 && sum < (1.0 - LEFT_OUT) * all;
-        sum += size * size;
-        counts
-    });
+    let squares =
+        |some: &[((f64, f64), f64)]| some.iter().map(|(_, size)| size * size).sum::<f64>();
+    let all = squares(&out);
+    out.truncate(FOLLOWED);
+    out.retain(|(_, size)| *size > 0.0);
+    let scale = (all / squares(&out).max(f64::MIN_POSITIVE)).sqrt();
+    out.iter_mut().for_each(|(_, size)| *size *= scale);
     out
 }
 
-/// The covariance of the numbers that the open areas add to `inner`, row-major; `scale` is the variance
-/// of the whitened residuals with its dispersion.
-pub(super) fn open_covariance(
+/// What the open areas do to the numbers, and to the residuals.
+pub(super) struct Open {
+    /// The covariance that they add, row-major.
+    pub(super) covariance: Vec<f64>,
+    /// Their share of the variance of the whitened residuals.
+    pub(super) share: f64,
+}
+
+/// What the open areas add to the covariance `inner` of the numbers; `scale` is the variance of the
+/// whitened residuals with its dispersion.
+pub(super) fn open(
     model: &Model<'_>,
     point: &Point,
     sensitivities: &[Vec<f64>],
     inner: &[f64],
     scale: f64,
-) -> Vec<f64> {
+) -> Open {
     let n = sensitivities.len();
-    let mut out = vec![0.0; n * n];
+    let mut out = Open {
+        covariance: vec![0.0; n * n],
+        share: 0.0,
+    };
     if !model.rows.straight || !model.responds || !(scale > 0.0) {
         return out;
     }
     let (numbers, gain) = (model.numbers(&point.x), model.gain(point));
+    let mut squares = 0.0;
     for (at, part) in model.rows.parts.iter().enumerate() {
         let (place, whitener) = model.whitener_of(at, point);
         for (interval, size) in areas(part) {
             let mut response = pulse(part, interval, model.class, &numbers);
-            response.iter_mut().for_each(|y| *y *= gain * size / scale);
+            response.iter_mut().for_each(|y| *y *= gain * size);
             let whitened = whitener.whiten(&response);
+            squares += dot(&whitened, &whitened);
             let score: Vec<f64> = sensitivities
                 .iter()
-                .map(|column| dot(&column[place.clone()], &whitened))
+                .map(|column| dot(&column[place.clone()], &whitened) / scale)
                 .collect();
             let moved: Vec<f64> = (0..n).map(|i| dot(&inner[i * n..][..n], &score)).collect();
             for (i, left) in moved.iter().enumerate() {
                 for (j, right) in moved.iter().enumerate() {
-                    out[i * n + j] += left * right;
+                    out.covariance[i * n + j] += left * right;
                 }
             }
         }
     }
+    out.share = (squares / dot(&point.whitened, &point.whitened)).min(MOST_SHARE);
     out
 }
 

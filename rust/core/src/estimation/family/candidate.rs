@@ -1,6 +1,6 @@
 //! A minimum with the errors of its numbers and how many of them the input tells.
 
-use super::between::open_covariance;
+use super::between::open;
 use super::class::{Class, Numbers};
 use super::dispersion::dispersion;
 use super::loop_view::Seen;
@@ -89,8 +89,11 @@ impl Candidate {
             .collect();
         let information = products(&sensitivities, &scales, variance);
         let mut inner = covariance(&information, &scales, factor);
-        let open = open_covariance(model, point, &sensitivities, &inner, factor * variance);
-        add_multiple(&mut inner, 1.0, &open);
+        let open = open(model, point, &sensitivities, &inner, factor * variance);
+        inner
+            .iter_mut()
+            .for_each(|entry| *entry *= 1.0 - open.share);
+        add_multiple(&mut inner, 1.0, &open.covariance);
         let scatter =
             |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
         // Of one record the weight is 1, of several their sum of squares is that of white noise of size 1.

@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::class::{Class, Numbers};
 use super::excitation::{excited, is_one_sine};
-use super::hull::{Named, Triple, at, hull, turning};
+use super::hull::{Named, Triple, at, hull, mean_delay, turning};
 use super::minima::{Minimum, Plan, beside, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Part, Record, Rows, Start};
@@ -96,6 +96,21 @@ impl Family {
             .collect()
     }
 
+    /// The candidates that so many rows may leave: of more rows than these, some that are further behind,
+    /// for what a number adds to the likelihood grows with the rows.
+    fn worth_refining(&self, rows: usize) -> Vec<Candidate> {
+        let best = self.candidates.first().map_or(0.0, |best| best.bic);
+        let more = (rows as f64 / self.rows.max(1) as f64).max(1.0);
+        let reach = (EVIDENCE.reach * more).min(EVIDENCE.hopeless);
+        let mut out = self.minima.clone();
+        for one in &self.candidates {
+            if one.bic <= best + reach && out.iter().all(|known| known.class != one.class) {
+                out.push(one.clone());
+            }
+        }
+        out
+    }
+
     /// Gain, phase and equivalent delay at frequencies, each with its ends.
     ///
     /// # Errors
@@ -104,6 +119,21 @@ impl Family {
         let minima = self.minima_at(level)?;
         let turning = turning(&minima, task)?;
         Ok(omega.iter().map(|omega| at(&turning, *omega)).collect())
+    }
+
+    /// The mean equivalent delay over frequencies, rad/s, with weights that add up to one, and its ends.
+    ///
+    /// # Errors
+    /// As of [`Family::at`].
+    pub fn mean_delay(
+        &self,
+        omega: &[f64],
+        weight: &[f64],
+        level: f64,
+        task: &Task,
+    ) -> Result<Triple, Error> {
+        let minima = self.minima_at(level)?;
+        Ok(mean_delay(&turning(&minima, task)?, omega, weight))
     }
 
     /// The intervals at another level.
@@ -201,7 +231,9 @@ pub fn refine_family(
     task: &Task,
 ) -> Result<Family, Error> {
     let starts = starts_of(records, question)?;
-    let longest = known.minima.iter().map(|one| one.numbers.delay);
+    let count = records.iter().map(|record| record.time.len()).sum();
+    let seeds = known.worth_refining(count);
+    let longest = seeds.iter().map(|one| one.numbers.delay);
     let longest = longest.fold(0.0, f64::max);
     let row = records.iter().map(Record::row).fold(0.0, f64::max);
     let largest = question.largest_delay.unwrap_or(known.largest_delay);
@@ -210,7 +242,7 @@ pub fn refine_family(
     check_rows(&rows, room)?;
     let mut rounds = 0;
     loop {
-        let found = beside(&known.minima, &rows, task)?;
+        let found = beside(&seeds, &rows, task)?;
         let now = weights_of(&found);
         if rounds < REWEIGHTED && differ(&now, &rows.weights) {
             rows.weights = now;

@@ -132,6 +132,25 @@ fn parts_at(all: &[Turning<'_>], omega: f64) -> [Vec<Triple>; 3] {
     ]
 }
 
+/// The mean equivalent delay over frequencies with these weights, and its ends over all candidates whose
+/// numbers the record tells; those of the best count in any case.
+pub(super) fn mean_delay(all: &[Turning<'_>], omega: &[f64], weight: &[f64]) -> Triple {
+    let is_told = |place: usize, one: &Turning<'_>| {
+        place == 0 || one.candidate.told == one.candidate.values.len()
+    };
+    let counts = all
+        .iter()
+        .enumerate()
+        .filter(|(place, one)| is_told(*place, one));
+    union(counts.map(|(_, one)| {
+        one.candidate.interval(|seen| {
+            let each = omega.iter().zip(weight);
+            each.map(|(omega, weight)| weight * one.equivalent_delay(seen, *omega))
+                .sum()
+        })
+    }))
+}
+
 /// The same over all, each with its ends.
 pub(super) fn at(all: &[Turning<'_>], omega: f64) -> [Triple; 3] {
     parts_at(all, omega).map(|parts| union(parts.into_iter()))
