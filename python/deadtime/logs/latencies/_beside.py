@@ -9,8 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from deadtime._base.digits import shown
 from deadtime.logs._log import LogLoop
+from deadtime.logs.latencies._between import refined
 from deadtime.logs.latencies._commands import Sampling
 from deadtime.logs.latencies._modelled import modelled
 from deadtime.logs.latencies._plain import Difference, differences, plain_times
@@ -27,7 +30,13 @@ def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) 
     longest = LONGEST * LENGTHS[loop.kind]
     between = sampling.between
     own = plain_times(*both, loop.segments, longest=longest, between=between)
-    answer = modelled(fit.plant, fit.delay, *both, loop.segments, between)
+    asked, late = loop.setpoint, 0.0
+    if between == "straight":
+        # As the fit takes it; each command holds for a while from its row on.
+        known = np.isfinite(asked.values)
+        time, values = refined(asked.time[known], asked.values[known])
+        asked, late = replace(asked, time=time, values=values), 0.5 * sampling.hold
+    answer = modelled(fit.plant, fit.delay + late, asked, loop.response, loop.segments, between)
     of_fit = plain_times(
         loop.setpoint, answer, loop.segments,
         longest=longest, between=between, moves=own.aligned.moves,

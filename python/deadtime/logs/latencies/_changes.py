@@ -24,7 +24,7 @@ class LatencyChange:
     loop, command : str
         The loop, and from what the time counts.
     before, after : float
-        Delay and lag together in the first log and in the second, s.
+        The time in the first log and in the second, s.
     before_error, after_error : float
         Their standard errors, s.
     p_value : float
@@ -84,7 +84,7 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
     Returns
     -------
     tuple of LatencyChange
-        With a two-sided z test of the difference of delay and lag together.
+        With a two-sided z test of the difference of the times.
 
     Examples
     --------

@@ -38,6 +38,6 @@ def _by_axes(one: LoopLatency, reliable: list[LoopLatency]) -> Iterator[str]:
         (low, high), (least, most) = one.interval, other.interval
         if max(low, least) > APART * min(high, most):
             yield (
-                f"{one.axis} and {other.axis} contradict each other: delay and lag are "
+                f"{one.axis} and {other.axis} contradict each other: their times are "
                 f"{stated(one.time, one.stderr, 's')} and {stated(other.time, other.stderr, 's')}"
             )

@@ -93,7 +93,8 @@ class Latency(ReadOnlyArrays, Pictured):
 
     def summary(self) -> str:
         """All loops in one table, a line each, and what is most worth knowing."""
-        return "\n".join([self.headline(), f"{self.source}: {self.vehicle}", "", *table_of(self)])
+        table = table_of(self.loops, self.advice)
+        return "\n".join([self.headline(), f"{self.source}: {self.vehicle}", "", *table])
 
     def details(self) -> str:
         """Every loop with its plant, its windows, its stages and what they cost."""
@@ -208,13 +209,17 @@ def latency(
     Notes
     -----
     Each loop is divided into windows. Those in which the command moves the most are fitted
-    together, without a plant that is named: from the setpoint one that comes to rest, from what the
-    controller commands one that integrates. The time is that of delay and lags together, the
-    equivalent delay as the frequency goes to zero.
+    together, and then all of it: from the setpoint a plant that comes to rest, from what the
+    controller commands one that integrates. The time is the equivalent delay of that plant, in the
+    mean over the frequencies at which the response moves.
 
-    Where the log holds each command of the controller, commands hold between rows; where it holds
-    only some of them they are straight, and what they may have been between the rows is part of the
-    interval. So is the spread of the time between windows, each estimated by itself.
+    Where the log holds each command of the controller, commands hold between rows. Where it holds
+    only some of them they are straight, or a cubic where they are smooth, and what they may have
+    been between the rows is part of the interval. So is the spread of the time between windows,
+    each estimated by itself.
+
+    From the setpoint, the plain numbers of the field stand beside the time. Where they differ from
+    what the same methods give for the fit, the time is an indication.
 
     Where command and response are stamped by clocks that drift apart, by more than a tenth of the
     interval over the log, the time is an indication; so is one that another loop contradicts.
@@ -228,9 +233,11 @@ def latency(
     >>> vehicle = dtm.FactoredPlant([0.08]).transfer_function() * dtm.delay(0.03)
     >>> angle = np.ravel(vehicle.simulate(time, told).outputs)
     >>> angle = angle + 0.003 * np.random.default_rng(1).standard_normal(600)
-    >>> found = dtm.latency(dtm.Recording(time, told, angle))
-    >>> low, high = found.loops[0].interval
-    >>> low < 0.11 < high
+    >>> found = dtm.latency(dtm.Recording(time, told, angle)).loops[0]
+    >>> w = found.frequencies
+    >>> true = (0.03 + np.arctan(0.08 * w) / w) @ found.weights
+    >>> low, high = found.interval
+    >>> low < true < high
     True
     """
     report = stage_report(progress)

@@ -45,9 +45,9 @@ def fit_of(
     return {
         "heading": _capital(one.name),
         "number": time,
-        "beside": f"{verdict}, delay and lag from the {command}; 95 %: {ends}"
+        "beside": f"{verdict}, from the {command}; 95 %: {ends}"
         if verdict == "reliable"
-        else f"{verdict}, delay and lag from the {command}; {ends}",
+        else f"{verdict}, from the {command}; {ends}",
         "sentences": [sentence(words) for words in said_of(one)],
         "moves": None if moves is None else moves_of_page(moves, fitted),
         "figure": plot_fit(one),

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from deadtime._base.digits import between, stated
 from deadtime._base.verdicts import claimed
 from deadtime.logs.latencies._budget import Stage
 from deadtime.logs.latencies._relation import LoopLatency
-
-if TYPE_CHECKING:
-    from deadtime.logs.latencies._latency import Latency
 
 #: Most rows of the table, and most lines below it.
 ROWS, BELOW = 15, 5
@@ -50,27 +46,27 @@ def shown_in_table(loops: Sequence[LoopLatency]) -> list[LoopLatency]:
     return [loops[k] for k in sorted(best)]
 
 
-def table_of(found: Latency) -> list[str]:
+def table_of(loops: Sequence[LoopLatency], advice: Sequence[str]) -> list[str]:
     """One line a loop, and below it what is most worth knowing."""
-    rows = [HEADS, *(row_of(one) for one in shown_in_table(found.loops))]
+    rows = [HEADS, *(row_of(one) for one in shown_in_table(loops))]
     used = [k for k in range(len(HEADS)) if any(row[k] for row in rows[1:])]
     widths = {k: max(len(row[k]) for row in rows) for k in used}
     lines = ["  ".join(f"{row[k]:<{widths[k]}}" for k in used).rstrip() for row in rows]
-    return [*lines, "", *below(found)]
+    return [*lines, "", *below(loops, advice)]
 
 
-def below(found: Latency) -> list[str]:
+def below(loops: Sequence[LoopLatency], advice: Sequence[str]) -> list[str]:
     """At most five lines: what is most worth knowing, and what to do to know more."""
     lines = []
-    if (left := len(found.loops) - ROWS) > 0:
+    if (left := len(loops) - ROWS) > 0:
         lines.append(f"{left} more loops: --verbose")
     for verdict in ("indication", "none"):
-        alike = [one for one in found.loops if one.verdict == verdict]
+        alike = [one for one in loops if one.verdict == verdict]
         if alike:
             first, more = alike[0], len(alike) - 1
             also = f" ({more} more: --verbose)" if more else ""
             lines.append(f"{verdict}: {first.loop} from {first.command}: {first.reason}{also}")
-    lines += found.advice
+    lines += advice
     return lines[:BELOW]
 
 
