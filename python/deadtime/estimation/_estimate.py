@@ -298,7 +298,7 @@ def estimate_delay(
     found = bound(chosen.estimate(runs, free), runs, of_loop=of_loop)
     if len(runs) > 1 or not (isinstance(chosen, (OutputError, Waveform)) and chosen.rivals):
         return found
-    return beside_rivals(found, runs[0], lambda run, names: chosen.estimate([run], names))
+    return beside_rivals(found, runs[0], chosen)
 
 
 #: Findings that the methods refuse themselves, or that some of them can do without.

@@ -13,7 +13,8 @@ The family has no such air. In wind a plant with further numbers follows it ther
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,7 +29,8 @@ from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
 from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.evidence._words import CLEAR
-from deadtime.estimation.methods._method import Run
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.methods._output_error import OutputError
 from deadtime.loops import FactoredPlant, FirstOrder, Integrator, P, Plant
 from deadtime.recordings import Recording
 
@@ -36,30 +38,25 @@ from deadtime.recordings import Recording
 #: a rival that shows nowhere else is found, and each estimate takes longer.
 MOST_ROWS = 10_000
 
-#: Fits the numbers `free` of a loop to the recording of an estimate, by its method.
-Again = Callable[[Run, Sequence[str]], DelayEstimate]
 
-
-def beside_rivals(fit: DelayEstimate, run: Run, again: Again) -> DelayEstimate:
-    """The estimate, or the same as an indication that names a plant which is clearly better."""
+def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate:
+    """The estimate by a method, or an indication that names a plant which is clearly better."""
     kind, question = kind_of(fit.loop.plant, fit.free), _question(run)
     if kind is None or question is None:
         return fit
-    doubted = fit.verdict == "indication"
-    if not (doubted or may_have_rivals(fit, question)):
+    if not may_have_rivals(fit, question):
         return fit
     found = _answer(question)
     if found is None:
         return fit
     best = found.candidates[0]
     lead = _behind(found, kind) - best.bic
-    if lead > CLEAR:
-        named = _answer(question.of(kind))
-        lead = min(lead, math.inf if named is None else _behind(named, kind) - best.bic)
-    if not lead > CLEAR or not (doubted or _is_outside(fit, found)):
+    if not lead > CLEAR or not (fit.verdict == "indication" or _is_outside(fit, found)):
         return fit
     rival = candidate_of(best, best.bic)
-    lead = min(lead, _lead_in_air(fit, rival, run, again))
+    lead = min(lead, _lead_in_air(fit, rival, run, method))
+    if lead > CLEAR and (named := _answer(question.of(kind))) is not None:
+        lead = min(lead, _behind(named, kind) - best.bic)
     if not lead > CLEAR:
         return fit
     ends = between(*found.hull["delay"], math.nan, "s")
@@ -156,13 +153,15 @@ def _is_outside(fit: DelayEstimate, found: native.FamilyFit) -> bool:
     return False
 
 
-def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, again: Again) -> float:
+def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Method) -> float:
     """Lead of the rival in the criterion of the method of the estimate; none without a fit."""
     has_zero = bool(rival.parameters.get("zero"))
     free = [name for name in rival.plant.parameters if name != "zero" or has_zero]
     loop = run.loop.replace(plant=rival.plant, delay=rival.delay)
+    if isinstance(method, OutputError):
+        method = replace(method, intervals="sum")
     try:
-        other = again(run._replace(loop=loop), ("delay", *free))
+        other = method.estimate([run._replace(loop=loop)], ("delay", *free))
     except (DeadtimeError, ValueError):
         return -math.inf
     return bic(fit) - bic(other)

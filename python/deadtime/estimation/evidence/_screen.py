@@ -2,7 +2,13 @@
 
 What another linear plant adds to a fit is, to first order, a combination of the command behind lags
 and delays. These columns are fitted to the residuals. If all of them together gain no more than
-chance and `CLEAR`, no single plant does. Coloured residuals count as fewer independent rows.
+chance and `CLEAR`, no single plant does. They are fitted twice:
+
+1. under the noise of the fit, with residuals and columns whitened; residuals that are coloured even
+   so count as fewer independent rows;
+2. under white noise, as what the fit takes for air may be what its plant lacks. Against the noise
+   of the fit this has to lead by the price of further numbers, too: weak air looks like slow
+   columns.
 """
 
 from __future__ import annotations
@@ -16,11 +22,17 @@ from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
 from deadtime.estimation.evidence._question import Question
 from deadtime.estimation.evidence._words import CLEAR
+from deadtime.estimation.likelihood._disturbances import Disturbance, whitened
+from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.models._held import HeldResponse
 
 #: Lags of the columns, from so many rows to this share of the window, and how many. More: a plant
 #: between them is seen better, and chance gains more.
 SHORTEST, LONGEST, LAGS = 2.0, 0.3, 4
+
+#: Numbers that a plant of the family has besides delay and gain, with its start. More: less
+#: air is doubted, and a plant that air has replaced is seen later.
+FURTHER = 4
 
 
 def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
@@ -38,18 +50,37 @@ def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
     others += [response.at(time - late, lag).rate for lag in lags for late in (0.0, fit.delay)]
     if time.size <= 2 * len(base + others):
         return True
-    least, _ = _left(base, residuals)
-    less, colour = _left(base + others, residuals)
+    columns = np.array([residuals, *base, *others])
+    profile = fit._profile
+    if isinstance(profile, LikelihoodProfile):
+        white = math.log(_left(columns)[0] / time.size)
+        lead = time.size * (_by_its_noise(profile) - white)
+        if lead > CLEAR + FURTHER * math.log(time.size):
+            return True
+        noise = profile.fit.numbers.noise[0]
+        every = (
+            Disturbance(True, noise.air_time, noise.air),
+            Disturbance(False, noise.sensor_time, noise.sensor),
+        )
+        present = [one for one in every if one.deviation > 0.0]
+        columns = whitened(fit.loop.plant, time, columns, present)
+    least, _ = _left(columns[: len(base) + 1])
+    less, colour = _left(columns)
+    return independent_samples(time.size, colour) * math.log(least / less) > CLEAR + len(others)
+
+
+def _by_its_noise(profile: LikelihoodProfile) -> float:
+    """−2 ln L of a fit, a row, as the logarithm of the variance that white noise would need."""
+    part, count = profile.fit.parts[0], int(np.sum(profile.fit.runs[0].used))
+    return math.log(part.variance * part.freedom / count) + part.log_det / count
+
+
+def _left(columns: Array) -> tuple[float, float]:
+    """Sum of squares that the others leave of the first column, and its lag-1 autocorrelation."""
     floor = float(np.finfo(float).tiny)
-    gained = independent_samples(time.size, colour) * math.log(max(least, floor) / max(less, floor))
-    return gained > CLEAR + len(others)
-
-
-def _left(columns: list[Array], target: Array) -> tuple[float, float]:
-    """Sum of squares that least squares leaves of a target, and its lag-1 autocorrelation."""
-    sizes = [max(float(np.linalg.norm(column)), np.finfo(float).tiny) for column in columns]
-    scaled = np.array([column / size for column, size in zip(columns, sizes, strict=True)]).T
-    found, *_ = np.linalg.lstsq(scaled, target, rcond=None)
-    left = target - scaled @ found
+    sizes = np.maximum(np.linalg.norm(columns[1:], axis=1), floor)
+    scaled = (columns[1:] / sizes[:, None]).T
+    found, *_ = np.linalg.lstsq(scaled, columns[0], rcond=None)
+    left = columns[0] - scaled @ found
     total = float(left @ left)
-    return total, float(left[1:] @ left[:-1]) / total if total > 0.0 else 0.0
+    return max(total, floor), float(left[1:] @ left[:-1]) / total if total > 0.0 else 0.0
