@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from deadtime._base.verdicts import rough
 from deadtime.estimation._criterion import bic
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
 from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.evidence._words import CLEAR
@@ -51,7 +53,9 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
         return fit
     best = found.candidates[0]
     lead = _behind(found, kind) - best.bic
-    if not lead > CLEAR or not (fit.verdict == "indication" or _is_outside(fit, found)):
+    if not lead > CLEAR or not (
+        fit.verdict == "indication" or is_outside(found, partial(_ends, fit))
+    ):
         return fit
     rival = candidate_of(best, best.bic)
     lead = min(lead, _lead_in_air(fit, rival, run, method))
@@ -137,20 +141,12 @@ def _behind(found: native.FamilyFit, kind: str) -> float:
     return min((one.bic for one in found.candidates if one.plant == kind), default=math.inf)
 
 
-def _is_outside(fit: DelayEstimate, found: native.FamilyFit) -> bool:
-    """Whether gain or angle of the named plant lie outside the hull of the family."""
-    omega = found.crossover
-    if not math.isfinite(omega):
-        omega = max(found.excited, default=math.nan)
-    if not omega > 0.0:
-        return False
-    view, hull = fit.at(omega), found.at([omega])
-    for name, own in (("gain", view.gain_ci), ("phase", view.phase_ci)):
-        ends = own[:, 0] if np.all(np.isfinite(own)) else getattr(view, name)[[0, 0]]
-        low, high = hull[name][1][0], hull[name][2][0]
-        if ends[1] < low or ends[0] > high:
-            return True
-    return False
+def _ends(fit: DelayEstimate, omega: float) -> list[tuple[float, float]]:
+    """Ends of gain and angle at a frequency; the values where there are none."""
+    view = fit.at(omega)
+    pairs = (view.gain, view.gain_ci), (view.phase, view.phase_ci)
+    every = (ends[:, 0] if np.all(np.isfinite(ends)) else own[[0, 0]] for own, ends in pairs)
+    return [(float(low), float(high)) for low, high in every]
 
 
 def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Method) -> float:

@@ -1,14 +1,12 @@
 """Whether it is worth to fit other plants: a cheap look at what a fit leaves.
 
 What another linear plant adds to a fit is, to first order, a combination of the command behind lags
-and delays. These columns are fitted to the residuals. If all of them together gain no more than
-chance and `CLEAR`, no single plant does. They are fitted twice:
+and delays. These columns are fitted to the residuals, both whitened by the noise of the fit. If all
+of them together gain no more than chance and `CLEAR`, no single plant does. Residuals that are
+coloured even so count as fewer independent rows.
 
-1. under the noise of the fit, with residuals and columns whitened; residuals that are coloured even
-   so count as fewer independent rows;
-2. under white noise, as what the fit takes for air may be what its plant lacks. Against the noise
-   of the fit this has to lead by the price of further numbers, too: weak air looks like slow
-   columns.
+What a fit takes for air may be what its plant lacks. So the columns are also fitted to the
+residuals as they are, and may not explain most of them. Of air that walks they explain a part.
 """
 
 from __future__ import annotations
@@ -30,9 +28,9 @@ from deadtime.estimation.models._held import HeldResponse
 #: between them is seen better, and chance gains more.
 SHORTEST, LONGEST, LAGS = 2.0, 0.3, 4
 
-#: Numbers that a plant of the family has besides delay and gain, with its start. More: less
-#: air is doubted, and a plant that air has replaced is seen later.
-FURTHER = 4
+#: Share of the residuals from which they follow the command, and are no air. More: a plant that air
+#: has replaced is not found; less: air alone asks for the family.
+FOLLOWS = 0.85
 
 
 def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
@@ -51,28 +49,32 @@ def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
     if time.size <= 2 * len(base + others):
         return True
     columns = np.array([residuals, *base, *others])
+    beyond = CLEAR + len(others)
+    gain, share = _gained(columns, len(base))
+    if gain > beyond and share > FOLLOWS:
+        return True
+    return _gained(_whitened(fit, time, columns), len(base))[0] > beyond
+
+
+def _whitened(fit: DelayEstimate, time: Array, columns: Array) -> Array:
+    """Columns, a row each, whitened by the air and the coloured noise of a fit."""
     profile = fit._profile
-    if isinstance(profile, LikelihoodProfile):
-        white = math.log(_left(columns)[0] / time.size)
-        lead = time.size * (_by_its_noise(profile) - white)
-        if lead > CLEAR + FURTHER * math.log(time.size):
-            return True
-        noise = profile.fit.numbers.noise[0]
-        every = (
-            Disturbance(True, noise.air_time, noise.air),
-            Disturbance(False, noise.sensor_time, noise.sensor),
-        )
-        present = [one for one in every if one.deviation > 0.0]
-        columns = whitened(fit.loop.plant, time, columns, present)
-    least, _ = _left(columns[: len(base) + 1])
+    if not isinstance(profile, LikelihoodProfile):
+        return columns
+    noise = profile.fit.numbers.noise[0]
+    every = (
+        Disturbance(True, noise.air_time, noise.air),
+        Disturbance(False, noise.sensor_time, noise.sensor),
+    )
+    return whitened(fit.loop.plant, time, columns, [one for one in every if one.deviation > 0.0])
+
+
+def _gained(columns: Array, few: int) -> tuple[float, float]:
+    """What all columns gain in 2 ln L beyond a `few`, for the first one; the share they explain."""
+    least, _ = _left(columns[: few + 1])
     less, colour = _left(columns)
-    return independent_samples(time.size, colour) * math.log(least / less) > CLEAR + len(others)
-
-
-def _by_its_noise(profile: LikelihoodProfile) -> float:
-    """−2 ln L of a fit, a row, as the logarithm of the variance that white noise would need."""
-    part, count = profile.fit.parts[0], int(np.sum(profile.fit.runs[0].used))
-    return math.log(part.variance * part.freedom / count) + part.log_det / count
+    gain = independent_samples(columns.shape[1], colour) * math.log(least / less)
+    return gain, 1.0 - less / least
 
 
 def _left(columns: Array) -> tuple[float, float]:
