@@ -20,14 +20,7 @@ from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
-from deadtime.estimation.methods._method import (
-    Loops,
-    Method,
-    Recordings,
-    Run,
-    Windows,
-    paired_runs,
-)
+from deadtime.estimation.methods._method import Loops, Method, Recordings, Run, Windows, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
