@@ -97,7 +97,7 @@ def test_right_plants_keep_their_verdicts_in_any_noise():
 def test_wind_alone_asks_for_no_other_plant(monkeypatch):
     """What air leaves is no response to the command, however smooth it is."""
     asked = []
-    monkeypatch.setattr(_rival, "_answer", asked.append)
+    monkeypatch.setattr(_rival, "_answer", lambda *given: asked.append(given))
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=0.065, limit=1.0)
     time = 0.065 * np.arange(300)
     reference = np.where(((time > 1.04) & (time < 7.0)) | (time > 13.0), 1.0, 0.0)

@@ -26,6 +26,7 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._criterion import bic
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._simulated import moves_between_rows
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
@@ -48,19 +49,22 @@ def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate
         return fit
     if not may_have_rivals(fit, question):
         return fit
-    found = _answer(question)
-    if found is None:
+    # The commands as they are in the estimate. Under white noise alone leads are larger.
+    straight = moves_between_rows(run.recording, run.loop)
+    asked = replace(question, between="straight" if straight else "held")
+    quick = _answer(asked, "white")
+    if quick is None or not _lead(quick, kind) > CLEAR:
+        return fit
+    found = _answer(asked)
+    if found is None or not (lead := _lead(found, kind)) > CLEAR:
+        return fit
+    if fit.verdict == "reliable" and not is_outside(found, partial(_ends, fit)):
         return fit
     best = found.candidates[0]
-    lead = _behind(found, kind) - best.bic
-    if not lead > CLEAR or not (
-        fit.verdict == "indication" or is_outside(found, partial(_ends, fit))
-    ):
-        return fit
     rival = candidate_of(best, best.bic)
     lead = min(lead, _lead_in_air(fit, rival, run, method))
-    if lead > CLEAR and (named := _answer(question.of(kind))) is not None:
-        lead = min(lead, _behind(named, kind) - best.bic)
+    if lead > CLEAR and (named := _answer(asked.of(kind))) is not None:
+        lead = min(lead, _bic_of(named, kind) - best.bic)
     if not lead > CLEAR:
         return fit
     ends = between(*found.hull["delay"], math.nan, "s")
@@ -127,16 +131,21 @@ def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
     return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window
 
 
-def _answer(question: Question) -> native.FamilyFit | None:
+def _answer(question: Question, noise: str | None = None) -> native.FamilyFit | None:
     """The family on these rows; None where they are too few, or determine no plant."""
     try:
-        found = question.answer()
+        found = question.answer(noise=noise)
     except ValueError:
         return None
     return found if found.verdict != "none" and found.candidates else None
 
 
-def _behind(found: native.FamilyFit, kind: str) -> float:
+def _lead(found: native.FamilyFit, kind: str) -> float:
+    """By how much the best plant leads those of a kind in BIC."""
+    return _bic_of(found, kind) - found.candidates[0].bic
+
+
+def _bic_of(found: native.FamilyFit, kind: str) -> float:
     """BIC of the best plant of a kind; infinite where it could not be fitted."""
     return min((one.bic for one in found.candidates if one.plant == kind), default=math.inf)
 

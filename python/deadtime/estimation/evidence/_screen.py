@@ -30,7 +30,7 @@ SHORTEST, LONGEST, LAGS = 2.0, 0.3, 4
 
 #: Share of the residuals from which they follow the command, and are no air. More: a plant that air
 #: has replaced is not found; less: air alone asks for the family.
-FOLLOWS = 0.85
+FOLLOWS = 0.9
 
 
 def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
