@@ -76,9 +76,9 @@ def refit(fit: PlantEstimate, recordings: Sequence[Recording]) -> PlantEstimate:
     RecordingError, ValueError
         When a recording has too few rows.
     """
-    own = {"earlier": 0, "window": None, "shift": 0}
     first, *others = (
-        replace(fit._question, recording=one, others=(), **own) for one in recordings
+        replace(fit._question, recording=one, earlier=0, window=None, shift=0, others=())
+        for one in recordings
     )
     question = replace(first, others=tuple(others))
     return estimate_of(question, question.answer(known=fit._answer()))
