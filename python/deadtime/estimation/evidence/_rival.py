@@ -34,7 +34,7 @@ from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.evidence._words import CLEAR
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.loops import FactoredPlant, FirstOrder, Integrator, P, Plant
+from deadtime.loops import PAIR, FactoredPlant, FirstOrder, Integrator, P, Plant
 from deadtime.recordings import Recording
 
 #: Most rows that plants are compared on; of more, as many in which the command changes most. More:
@@ -160,8 +160,10 @@ def _ends(fit: DelayEstimate, omega: float) -> list[tuple[float, float]]:
 
 def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Method) -> float:
     """Lead of the rival in the criterion of the method of the estimate; none without a fit."""
-    has_zero = bool(rival.parameters.get("zero"))
-    free = [name for name in rival.plant.parameters if name != "zero" or has_zero]
+    # A search for a pair of poles takes seconds: its numbers are held, and counted.
+    absent = {*PAIR, *(() if rival.parameters.get("zero") else ("zero",))}
+    free = [name for name in rival.plant.parameters if name not in absent]
+    held = [name for name in PAIR if name in rival.parameters]
     loop = run.loop.replace(plant=rival.plant, delay=rival.delay)
     if isinstance(method, OutputError):
         method = replace(method, intervals="sum")
@@ -169,7 +171,7 @@ def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Me
         other = method.estimate([run._replace(loop=loop)], ("delay", *free))
     except (DeadtimeError, ValueError):
         return -math.inf
-    return bic(fit) - bic(other)
+    return bic(fit) - bic(other) - len(held) * math.log(other.residuals.size)
 
 
 def _call(question: Question) -> str:

@@ -34,7 +34,12 @@ FOLLOWS = 0.9
 
 
 def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
-    """Whether the command behind lags and delays explains what a fit leaves, beyond chance."""
+    """Whether the command behind lags and delays explains what a fit leaves, beyond chance.
+
+    What least squares leaves of a plant that lacks something has no noise to compare with.
+    """
+    if fit.verdict == "indication" and not isinstance(fit._profile, LikelihoodProfile):
+        return True
     rows = question.recording.time[question.earlier :]
     known = np.isfinite(fit.residuals)
     known &= (fit.recording.time >= rows[0]) & (fit.recording.time <= rows[-1])
