@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import deadtime as dtm
 import numpy as np
 from deadtime.estimation import OnlineEstimator
-from deadtime.estimation.running._estimate import COLOURED, UNEXPLAINED, BankNumbers
+from deadtime.estimation.running._estimate import COLOURED, UNEXPLAINED
 from deadtime.experiments import FlightNoise
 
 from tracking import lagd
@@ -29,7 +30,12 @@ LARGEST = 0.14
 #: Of the walk where the delay is constant but for jumps, s/√s.
 CALM = 0.0003
 
-PLACES = {name: place for place, name in enumerate(BankNumbers._fields)}
+#: Numbers of an answer of the bank that are looked at, and their places.
+NAMES = ("delay", "low", "high", "changed", "colour", "unexplained")
+PLACES = {name: place for place, name in enumerate(NAMES)}
+
+
+numbers = attrgetter(*NAMES)
 
 
 @dataclass(frozen=True)
@@ -56,8 +62,13 @@ def tracked(runs: Runs, **options: object) -> Tracked:
     found = []
     for output, command in zip(runs.output, runs.command, strict=True):
         estimator = OnlineEstimator(loop, noise=noise, at_rest=True, **options)
-        assert estimator._bank is not None
-        found.append(estimator._bank.rows(runs.time, output, command))
+        bank = estimator._bank
+        assert bank is not None
+        rows = []
+        for time, value, sent in zip(runs.time, output, command, strict=True):
+            rows.append(numbers(bank.row(time, value)))
+            bank.command(time, sent)
+        found.append(rows)
     return Tracked(np.array(found))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from family_survey import fit, fit_rows, held, holds
 from flights import flight_path
+from scipy import signal
 
 PROCESS = Path(__file__).resolve().parents[3] / "shared" / "data" / "process"
 
@@ -99,6 +100,25 @@ def test_a_command_of_unknown_kind_has_the_intervals_of_both():
         assert both.hull["delay"] == pytest.approx(ends, rel=1e-3)
     least = min(kinds[kind].candidates[0].deviance for kind in ("held", "straight"))
     assert both.candidates[0].deviance == pytest.approx(least, abs=0.01)
+
+
+def test_a_command_of_a_controller_is_held_where_its_kind_is_as_likely():
+    record = made.height_steps(60018)
+    kinds = {kind: fit(record, kind=kind) for kind in ("held", "straight", "undecided")}
+    held, straight, both = (kinds[kind].candidates[0] for kind in kinds)
+    assert held.deviance - 2.0 < straight.deviance < held.deviance
+    assert (kinds["undecided"].kind, kinds["undecided"].kind_decided) == ("held", False)
+    assert both.values[0] == held.values[0]
+
+
+def test_a_command_that_ramps_is_straight_where_its_kind_is_as_likely():
+    time = np.arange(300.0)
+    command = np.interp(time, [30, 60, 130, 160, 230, 260], [0.0, 5.0, 5.0, -3.0, -3.0, 2.0])
+    acting = np.interp(time - 12.3, time, command)
+    _, output, _ = signal.lsim(([1.8], [40.0, 1.0]), acting, time)
+    output += np.random.default_rng(1).normal(0.0, 0.3, time.size)
+    found = fit_rows(time, command, output, kind="undecided")
+    assert (found.kind, found.kind_decided) == ("straight", False)
 
 
 def test_a_command_that_jumps_is_held():

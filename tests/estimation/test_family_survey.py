@@ -1,4 +1,7 @@
-"""Surveys of the family of plants: `DEADTIME_CASES=500 pytest -m survey -s` prints the figures."""
+"""Surveys of the family of plants: `DEADTIME_CASES=500 pytest -m survey -s` prints the figures.
+
+`DEADTIME_FIRST` is the first seed.
+"""
 
 import family_survey as survey
 import made_records as made
@@ -31,7 +34,7 @@ def test_kinds_are_found_and_intervals_hold(kind):
 def test_windows_of_a_run_hold_each_number(whole):
     """Rows cut out of a run, and the same window of the whole run."""
     hits, widths, errors, cases = [], [], [], survey.CASES
-    for seed in range(cases):
+    for seed in survey.SEEDS:
         cut = made.slow_window(seed)
         record = made.slow_run(seed) if whole else cut
         rows = (record.time, record.command, record.output)
@@ -59,5 +62,5 @@ def test_windows_of_a_run_hold_each_number(whole):
 
 @pytest.mark.parametrize("plant", [None, "lag"])
 def test_lone_sines_are_never_reliable(plant):
-    found = [survey.fit(made.lone_sine(seed), plant=plant) for seed in range(survey.CASES)]
+    found = [survey.fit(made.lone_sine(seed), plant=plant) for seed in survey.SEEDS]
     assert not [one for one in found if one.verdict == "reliable"]

@@ -9,7 +9,6 @@ import pytest
 from deadtime._deadtime import FlightFit, FlightPlant, OnlineBank, PlantNumbers, RowNoise
 from deadtime.estimation.likelihood._disturbances import Disturbance
 from deadtime.estimation.likelihood._rows import FlightRows
-from deadtime.estimation.running._estimate import BankNumbers
 from deadtime.estimation.running._settings import BankSettings
 
 WHITE, AIR, AIR_TIME, SENSOR, SENSOR_TIME = 0.006, 0.08, 0.9, 0.004, 0.2
@@ -94,8 +93,11 @@ def density(times, output, commands, used, covariance, delay, lag=0.15):
 
 def run(bank, times, output, commands, used):
     """The answers of a bank."""
-    given = np.where(used, output, np.nan)
-    return [BankNumbers(*row) for row in bank.rows(times, given, commands)]
+    found = []
+    for time, value, command, seen in zip(times, output, commands, used, strict=True):
+        found.append(bank.row(time, value if seen else None))
+        bank.command(time, command)
+    return found
 
 
 def alone(index, delays=DELAYS):
@@ -167,7 +169,7 @@ def test_a_row_without_an_output_and_a_shift_of_time_change_nothing():
     for time, value, command, seen in zip(times, output, commands, used, strict=True):
         if time > 0.0:
             bank.row(time - 0.4 * ROW)
-        split = BankNumbers(*bank.row(time, value if seen else None))
+        split = bank.row(time, value if seen else None)
         bank.command(time, command)
     assert split.delay == pytest.approx(whole.delay, abs=1e-9)
 

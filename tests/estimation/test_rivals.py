@@ -4,6 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import OutputError
+from deadtime.estimation.evidence import _rival
 from deadtime.estimation.evidence._rival import kind_of
 from deadtime.experiments import FlightNoise
 from flights import flight_path
@@ -91,6 +92,20 @@ def test_right_plants_keep_their_verdicts_in_any_noise():
     drawn = [verdicts(seed) for seed in range(60)]
     assert sum(alone == "reliable" for alone, _ in drawn) >= 45
     assert sum(alone != beside for alone, beside in drawn) <= 1
+
+
+def test_wind_alone_asks_for_no_other_plant(monkeypatch):
+    """What air leaves is no response to the command, however smooth it is."""
+    asked = []
+    monkeypatch.setattr(_rival, "_answer", lambda *given: asked.append(given))
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.31), delay=0.36, sample_time=0.065, limit=1.0)
+    time = 0.065 * np.arange(300)
+    reference = np.where(((time > 1.04) & (time < 7.0)) | (time > 13.0), 1.0, 0.0)
+    flight = dtm.Experiment(time, reference)
+    for seed in range(11, 19):
+        run = flight.run(loop, FlightNoise(0.004, air_walk=0.02), seed)
+        dtm.estimate_delay(run, loop.replace(delay=None), free=("delay", "gain"))
+    assert len(asked) <= 2
 
 
 def test_few_rows_have_no_rivals():

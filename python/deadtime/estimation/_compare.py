@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import get_args
@@ -17,7 +17,7 @@ from deadtime.estimation._findings import bound
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
 from deadtime.estimation.evidence._rival import beside_rivals
-from deadtime.estimation.methods._method import Run, paired_runs
+from deadtime.estimation.methods._method import paired_runs
 from deadtime.estimation.methods._overshoot import Overshoot, OvershootMap
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
@@ -355,9 +355,5 @@ def compare_methods(
         raise NotIdentifiableError(refusals["waveform"])
     best = Comparison(estimates, refusals).best
     name = next(name for name, one in estimates.items() if one is best)
-    method = METHODS[best.method]()
-
-    def again(run: Run, free: Sequence[str]) -> DelayEstimate:
-        return method.estimate([run], free)
-
-    return Comparison(estimates | {name: beside_rivals(best, runs[0], again)}, refusals)
+    best = beside_rivals(best, runs[0], METHODS[best.method]())
+    return Comparison(estimates | {name: best}, refusals)

@@ -20,14 +20,7 @@ from deadtime.estimation.methods._frequency import Frequency
 from deadtime.estimation.methods._gcc import GCC
 from deadtime.estimation.methods._graphical import Graphical
 from deadtime.estimation.methods._grid import Grid
-from deadtime.estimation.methods._method import (
-    Loops,
-    Method,
-    Recordings,
-    Run,
-    Windows,
-    paired_runs,
-)
+from deadtime.estimation.methods._method import Loops, Method, Recordings, Run, Windows, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._overshoot import Overshoot
 from deadtime.estimation.methods._relay import Relay
@@ -298,7 +291,7 @@ def estimate_delay(
     found = bound(chosen.estimate(runs, free), runs, of_loop=of_loop)
     if len(runs) > 1 or not (isinstance(chosen, (OutputError, Waveform)) and chosen.rivals):
         return found
-    return beside_rivals(found, runs[0], lambda run, names: chosen.estimate([run], names))
+    return beside_rivals(found, runs[0], chosen)
 
 
 #: Findings that the methods refuse themselves, or that some of them can do without.

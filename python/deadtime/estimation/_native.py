@@ -6,6 +6,7 @@ from deadtime._deadtime import (
     LONGEST_DELAY as LONGEST_DELAY,
     SEARCHED_ROWS as SEARCHED_ROWS,
     SHORTEST_LAG as SHORTEST_LAG,
+    BankAnswer as BankAnswer,
     ChebyshevMisfit as ChebyshevMisfit,
     FamilyCandidate as FamilyCandidate,
     FamilyFit as FamilyFit,

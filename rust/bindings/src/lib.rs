@@ -84,7 +84,7 @@ mod _deadtime {
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]
-    use super::online::OnlineBank;
+    use super::online::{BankAnswer, OnlineBank};
     #[pymodule_export]
     use super::quasipoly::{Expansion, QuasiPolynomial, Ratio};
     #[pymodule_export]

@@ -1,16 +1,10 @@
 //! Bindings of the estimators that take rows as they come.
 
-use deadtime::estimation::{Answer, Known, Lags, Online, Plant, Settings, online};
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArrayDyn};
-use pyo3::exceptions::PyValueError;
+use deadtime::estimation::{Answer, Lags, Online, Plant, Settings, online};
 use pyo3::prelude::*;
 
-use crate::arrays::{converted, owned};
+use crate::arrays::converted;
 use crate::estimation::GivenDisturbance;
-use crate::runtime::run_here;
-
-/// Numbers of an answer, in the order of `OnlineBank.rows`.
-const COLUMNS: usize = 23;
 
 /// What is known before the first row.
 #[derive(FromPyObject)]
@@ -93,80 +87,61 @@ impl OnlineBank {
         converted(self.bank.command(time, value))
     }
 
-    /// A row: its output, or None where that was lost. The numbers of the answer.
+    /// A row: its output, or None where that was lost.
     #[pyo3(signature = (time, output=None))]
-    fn row(&mut self, time: f64, output: Option<f64>) -> PyResult<Vec<f64>> {
-        Ok(numbers(&converted(self.bank.row(time, output))?).to_vec())
-    }
-
-    /// Many rows, each with the command that is sent after it; NaN where one was lost.
-    fn rows<'py>(
-        &mut self,
-        py: Python<'py>,
-        time: PyReadonlyArrayDyn<'py, f64>,
-        output: PyReadonlyArrayDyn<'py, f64>,
-        command: PyReadonlyArrayDyn<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (time, output, command) = (owned(&time)?, owned(&output)?, owned(&command)?);
-        if time.len() != output.len() || time.len() != command.len() {
-            return Err(PyValueError::new_err(format!(
-                "{} times, {} outputs and {} commands: give equally many",
-                time.len(),
-                output.len(),
-                command.len()
-            )));
-        }
-        let bank = &mut self.bank;
-        let found = run_here(py, |task| {
-            let mut found = Vec::with_capacity(time.len() * COLUMNS);
-            for (row, ((time, output), command)) in
-                time.iter().zip(&output).zip(&command).enumerate()
-            {
-                if row % 256 == 255 {
-                    task.check()?;
-                }
-                let output = Some(*output).filter(|output| !output.is_nan());
-                found.extend(numbers(&bank.row(*time, output)?));
-                if !command.is_nan() {
-                    bank.command(*time, *command)?;
-                }
-            }
-            Ok(found)
-        })?;
-        let rows = found.len() / COLUMNS;
-        let shaped = numpy::ndarray::Array2::from_shape_vec((rows, COLUMNS), found)
-            .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        Ok(shaped.into_pyarray(py))
+    fn row(&mut self, time: f64, output: Option<f64>) -> PyResult<BankAnswer> {
+        Ok(BankAnswer::from(&converted(self.bank.row(time, output))?))
     }
 }
 
-fn numbers(answer: &Answer) -> [f64; COLUMNS] {
-    let of = |known: Known| [known.mean, known.deviation, known.low, known.high];
-    let ([a, b, c, d], [e, f, g, h]) = (of(answer.delay), of(answer.together));
-    let is = |so: bool| f64::from(u8::from(so));
-    [
-        answer.time,
-        is(answer.started),
-        a,
-        b,
-        c,
-        d,
-        e,
-        f,
-        g,
-        h,
-        answer.lag,
-        answer.gain,
-        answer.gain_deviation,
-        answer.rate,
-        answer.gate,
-        is(answer.changed),
-        answer.change_ratio,
-        answer.white,
-        answer.colour,
-        answer.unexplained,
-        answer.lowest,
-        answer.highest,
-        answer.evidence,
-    ]
+/// What is known after a row.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct BankAnswer {
+    time: f64,
+    started: bool,
+    delay: f64,
+    delay_deviation: f64,
+    low: f64,
+    high: f64,
+    together: f64,
+    together_low: f64,
+    together_high: f64,
+    lag: f64,
+    gain: f64,
+    gain_deviation: f64,
+    gate: f64,
+    changed: bool,
+    white: f64,
+    colour: f64,
+    unexplained: f64,
+    lowest: f64,
+    highest: f64,
+    evidence: f64,
+}
+
+impl From<&Answer> for BankAnswer {
+    fn from(answer: &Answer) -> Self {
+        Self {
+            time: answer.time,
+            started: answer.started,
+            delay: answer.delay.mean,
+            delay_deviation: answer.delay.deviation,
+            low: answer.delay.low,
+            high: answer.delay.high,
+            together: answer.together.mean,
+            together_low: answer.together.low,
+            together_high: answer.together.high,
+            lag: answer.lag,
+            gain: answer.gain,
+            gain_deviation: answer.gain_deviation,
+            gate: answer.gate,
+            changed: answer.changed,
+            white: answer.white,
+            colour: answer.colour,
+            unexplained: answer.unexplained,
+            lowest: answer.lowest,
+            highest: answer.highest,
+            evidence: answer.evidence,
+        }
+    }
 }

@@ -11,13 +11,7 @@ from deadtime._base.drawing import Axes, Figure, new_figure
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
 from deadtime.estimation.evidence._numbers import FoundPlant
-from deadtime.estimation.evidence._words import (
-    Advice,
-    advice_on,
-    headline_of,
-    lines_of,
-    summary_of,
-)
+from deadtime.estimation.evidence._words import Advice, advice_on, headline_of, lines_of, summary_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)

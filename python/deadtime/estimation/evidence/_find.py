@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from functools import partial
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from deadtime.estimation.evidence._question import Between, Question, questions_
 from deadtime.estimation.evidence._words import CLEAR, reason_of
 from deadtime.loops import Controller
 from deadtime.recordings import Recording
+
+#: Lower and upper end of an interval.
+Ends: TypeAlias = tuple[float, float]
 
 
 def estimate_by_evidence(
@@ -55,7 +59,7 @@ def estimate_by_evidence(
         return estimate_of(question, found)
     better = candidate_of(best, least)
     named = estimate_of(question, found, better)
-    if named.verdict != "reliable" or not _are_apart(found, whole):
+    if named.verdict != "reliable" or not is_outside(whole, partial(_ends, found)):
         return named
     reason = f"{better.in_words()}, explains the recording clearly better"
     return replace(named, verdict="indication", reason=reason)
@@ -72,22 +76,33 @@ def refit(fit: PlantEstimate, recordings: Sequence[Recording]) -> PlantEstimate:
     RecordingError, ValueError
         When a recording has too few rows.
     """
-    own = {"earlier": 0, "window": None, "shift": 0}
-    first, *others = (replace(fit._question, recording=one, others=(), **own) for one in recordings)
+    first, *others = (
+        replace(fit._question, recording=one, earlier=0, window=None, shift=0, others=())
+        for one in recordings
+    )
     question = replace(first, others=tuple(others))
     return estimate_of(question, question.answer(known=fit._answer()))
 
 
-def _are_apart(named: native.FamilyFit, whole: native.FamilyFit) -> bool:
-    """Whether gain or angle, where the likeliest plant crosses over, have no value in common."""
+def is_outside(whole: native.FamilyFit, own: Callable[[float], Iterable[Ends]]) -> bool:
+    """Whether gain or angle of another fit lie outside the hull of the family.
+
+    They are compared where the likeliest plant crosses over, or at the highest frequency of the
+    command; `own` has their ends there.
+    """
     omega = whole.crossover
     if not math.isfinite(omega):
         omega = max(whole.excited, default=math.nan)
     if not omega > 0.0:
         return False
-    own, other = named.at([omega]), whole.at([omega])
-    ends = ((own[name], other[name]) for name in ("gain", "phase"))
-    return any(a[1][0] > b[2][0] or b[1][0] > a[2][0] for a, b in ends)
+    pairs = zip(own(omega), _ends(whole, omega), strict=True)
+    return any(low > top or high < bottom for (low, high), (bottom, top) in pairs)
+
+
+def _ends(found: native.FamilyFit, omega: float) -> list[Ends]:
+    """Ends of gain and angle at a frequency."""
+    view = found.at([omega])
+    return [(float(view[name][1][0]), float(view[name][2][0])) for name in ("gain", "phase")]
 
 
 def estimate_of(

@@ -97,10 +97,12 @@ class Question(ReadOnlyArrays):
         omega: Sequence[float] = (),
         progress: Callable[[int], object] | None = None,
         known: native.FamilyFit | None = None,
+        noise: str | None = None,
     ) -> native.FamilyFit:
         """Ask the kernel; every interval of the answer has this level.
 
-        With the answer to fewer rows, plants are looked for beside those alone.
+        With the answer to fewer rows, plants are looked for beside those alone; with a noise, under
+        that alone.
         """
         records = [one.record for one in self.each]
         return native.fit_family(
@@ -112,6 +114,7 @@ class Question(ReadOnlyArrays):
             plant=self.plant,
             integrating=self.integrates,
             level=level,
+            noise=noise,
             omega=tuple(omega),
             progress=progress,
             known=known,

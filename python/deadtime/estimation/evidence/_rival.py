@@ -13,7 +13,9 @@ The family has no such air. In wind a plant with further numbers follows it ther
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -24,42 +26,45 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._criterion import bic
 from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation.data._simulated import moves_between_rows
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
 from deadtime.estimation.evidence._screen import may_have_rivals
 from deadtime.estimation.evidence._words import CLEAR
-from deadtime.estimation.methods._method import Run
-from deadtime.loops import FactoredPlant, FirstOrder, Integrator, P, Plant
+from deadtime.estimation.methods._method import Method, Run
+from deadtime.estimation.methods._output_error import OutputError
+from deadtime.loops import PAIR, FactoredPlant, FirstOrder, Integrator, P, Plant
 from deadtime.recordings import Recording
 
 #: Most rows that plants are compared on; of more, as many in which the command changes most. More:
 #: a rival that shows nowhere else is found, and each estimate takes longer.
 MOST_ROWS = 10_000
 
-#: Fits the numbers `free` of a loop to the recording of an estimate, by its method.
-Again = Callable[[Run, Sequence[str]], DelayEstimate]
 
-
-def beside_rivals(fit: DelayEstimate, run: Run, again: Again) -> DelayEstimate:
-    """The estimate, or the same as an indication that names a plant which is clearly better."""
+def beside_rivals(fit: DelayEstimate, run: Run, method: Method) -> DelayEstimate:
+    """The estimate by a method, or an indication that names a plant which is clearly better."""
     kind, question = kind_of(fit.loop.plant, fit.free), _question(run)
     if kind is None or question is None:
         return fit
-    doubted = fit.verdict == "indication"
-    if not (doubted or may_have_rivals(fit, question)):
+    if not may_have_rivals(fit, question):
         return fit
-    found = _answer(question)
-    if found is None:
+    # The commands as they are in the estimate. Under white noise alone leads are larger.
+    straight = moves_between_rows(run.recording, run.loop)
+    asked = replace(question, between="straight" if straight else "held")
+    quick = _answer(asked, "white")
+    if quick is None or not _lead(quick, kind) > CLEAR:
+        return fit
+    found = _answer(asked)
+    if found is None or not (lead := _lead(found, kind)) > CLEAR:
+        return fit
+    if fit.verdict == "reliable" and not is_outside(found, partial(_ends, fit)):
         return fit
     best = found.candidates[0]
-    lead = _behind(found, kind) - best.bic
-    if lead > CLEAR:
-        named = _answer(question.of(kind))
-        lead = min(lead, math.inf if named is None else _behind(named, kind) - best.bic)
-    if not lead > CLEAR or not (doubted or _is_outside(fit, found)):
-        return fit
     rival = candidate_of(best, best.bic)
-    lead = min(lead, _lead_in_air(fit, rival, run, again))
+    lead = min(lead, _lead_in_air(fit, rival, run, method))
+    if lead > CLEAR and (named := _answer(asked.of(kind))) is not None:
+        lead = min(lead, _bic_of(named, kind) - best.bic)
     if not lead > CLEAR:
         return fit
     ends = between(*found.hull["delay"], math.nan, "s")
@@ -126,46 +131,47 @@ def _most_excited(run: Run) -> tuple[Recording, OpenRange]:
     return run.recording.window(float(time[max(0, first - MOST_ROWS)]), window[1]), window
 
 
-def _answer(question: Question) -> native.FamilyFit | None:
+def _answer(question: Question, noise: str | None = None) -> native.FamilyFit | None:
     """The family on these rows; None where they are too few, or determine no plant."""
     try:
-        found = question.answer()
+        found = question.answer(noise=noise)
     except ValueError:
         return None
     return found if found.verdict != "none" and found.candidates else None
 
 
-def _behind(found: native.FamilyFit, kind: str) -> float:
+def _lead(found: native.FamilyFit, kind: str) -> float:
+    """By how much the best plant leads those of a kind in BIC."""
+    return _bic_of(found, kind) - found.candidates[0].bic
+
+
+def _bic_of(found: native.FamilyFit, kind: str) -> float:
     """BIC of the best plant of a kind; infinite where it could not be fitted."""
     return min((one.bic for one in found.candidates if one.plant == kind), default=math.inf)
 
 
-def _is_outside(fit: DelayEstimate, found: native.FamilyFit) -> bool:
-    """Whether gain or angle of the named plant lie outside the hull of the family."""
-    omega = found.crossover
-    if not math.isfinite(omega):
-        omega = max(found.excited, default=math.nan)
-    if not omega > 0.0:
-        return False
-    view, hull = fit.at(omega), found.at([omega])
-    for name, own in (("gain", view.gain_ci), ("phase", view.phase_ci)):
-        ends = own[:, 0] if np.all(np.isfinite(own)) else getattr(view, name)[[0, 0]]
-        low, high = hull[name][1][0], hull[name][2][0]
-        if ends[1] < low or ends[0] > high:
-            return True
-    return False
+def _ends(fit: DelayEstimate, omega: float) -> list[tuple[float, float]]:
+    """Ends of gain and angle at a frequency; the values where there are none."""
+    view = fit.at(omega)
+    pairs = (view.gain, view.gain_ci), (view.phase, view.phase_ci)
+    every = (ends[:, 0] if np.all(np.isfinite(ends)) else own[[0, 0]] for own, ends in pairs)
+    return [(float(low), float(high)) for low, high in every]
 
 
-def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, again: Again) -> float:
+def _lead_in_air(fit: DelayEstimate, rival: PlantCandidate, run: Run, method: Method) -> float:
     """Lead of the rival in the criterion of the method of the estimate; none without a fit."""
-    has_zero = bool(rival.parameters.get("zero"))
-    free = [name for name in rival.plant.parameters if name != "zero" or has_zero]
+    # A search for a pair of poles takes seconds: its numbers are held, and counted.
+    absent = {*PAIR, *(() if rival.parameters.get("zero") else ("zero",))}
+    free = [name for name in rival.plant.parameters if name not in absent]
+    held = [name for name in PAIR if name in rival.parameters]
     loop = run.loop.replace(plant=rival.plant, delay=rival.delay)
+    if isinstance(method, OutputError):
+        method = replace(method, intervals="sum")
     try:
-        other = again(run._replace(loop=loop), ("delay", *free))
+        other = method.estimate([run._replace(loop=loop)], ("delay", *free))
     except (DeadtimeError, ValueError):
         return -math.inf
-    return bic(fit) - bic(other)
+    return bic(fit) - bic(other) - len(held) * math.log(other.residuals.size)
 
 
 def _call(question: Question) -> str:

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from deadtime._base.arrays import Array
+from deadtime.estimation._native import whitened_columns
 from deadtime.experiments import FlightNoise
+from deadtime.loops import Plant
 
 
 class Disturbance(NamedTuple):
@@ -25,3 +31,14 @@ def disturbances_of(noise: FlightNoise, slow: float) -> list[Disturbance]:
         Disturbance(False, noise.sensor_time, noise.sensor / noise.white),
     ]
     return [one for one in every if one.deviation > 0.0]
+
+
+def whitened(
+    plant: Plant, time: Array, columns: Array, disturbances: Sequence[Disturbance]
+) -> Array:
+    """Columns, a row each, whitened by disturbances of a plant beside white noise."""
+    if not disturbances:
+        return columns
+    num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
+    flat = whitened_columns(list(num), list(den), disturbances, time, np.ravel(columns))
+    return np.asarray(flat.reshape(columns.shape))

@@ -58,8 +58,6 @@ class PlantModel:
         Their values, s.
     names : tuple of str
         What is fitted.
-    extra : int
-        Further lags, not of the plant, that are tried.
     zero : float
         Time constant of the zero behind the lags, s.
     own_lag : float
@@ -73,7 +71,6 @@ class PlantModel:
     lag_names: tuple[str, ...]
     lags: tuple[float, ...]
     names: tuple[str, ...]
-    extra: int = 0
     zero: float = 0.0
     own_lag: float = 0.0
     air_behind_lags: bool = False
@@ -103,7 +100,7 @@ class PlantModel:
     @property
     def free_lags(self) -> list[bool]:
         """Which of the lags are fitted."""
-        return [name in self.names for name in self.lag_names] + [True] * self.extra
+        return [name in self.names for name in self.lag_names]
 
     @property
     def order(self) -> list[tuple[str, str]]:
@@ -123,7 +120,7 @@ class PlantModel:
         return FlightPlant(
             self.num,
             self.den,
-            [*self.lags, *[0.0] * self.extra],
+            self.lags,
             delay="delay" in self.names,
             gain="gain" in self.names,
             free_lags=self.free_lags,

@@ -8,10 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from deadtime._base.arrays import Array, Mask
-from deadtime.estimation._native import (
-    SEARCHED_ROWS,
-    excited_part as native_part,
-)
+from deadtime.estimation._native import SEARCHED_ROWS, excited_part as native_part
 
 #: Steps of a rounded output are multiples of the least, within this share of it, and at least this
 #: share of the rows is equal to the row before.

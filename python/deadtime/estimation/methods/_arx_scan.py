@@ -24,11 +24,7 @@ import numpy as np
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import whole_number
 from deadtime.estimation._native import arx_losses, held_losses
-from deadtime.estimation.data._input_output import (
-    FEEDBACK,
-    feedback_p_value,
-    read_input_output,
-)
+from deadtime.estimation.data._input_output import FEEDBACK, feedback_p_value, read_input_output
 from deadtime.estimation.data._simulated import SimulatedRecording
 from deadtime.estimation.data._step_reading import check_decays, read_ringing
 from deadtime.estimation.methods._conclusion import OfOne, Read

@@ -23,16 +23,11 @@ from deadtime.estimation.data._checks import check_moves
 from deadtime.estimation.data._commands import commands_of
 from deadtime.estimation.data._known_filter import KnownFilter, before_filter
 from deadtime.estimation.data._simulated import limited
-from deadtime.estimation.fit._least_squares import (
-    Ends,
-    ModelOfOne,
-)
+from deadtime.estimation.fit._least_squares import Ends, ModelOfOne
 from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
 from deadtime.estimation.likelihood._missing import HeldCommands, with_lost, with_missing
 from deadtime.estimation.likelihood._rows import FlightRows, on_same_step, rounding_of
-from deadtime.estimation.methods._method import (
-    Run,
-)
+from deadtime.estimation.methods._method import Run
 from deadtime.estimation.models._held import RATE_LIMITS, Path, path_of
 from deadtime.loops import Plant, RateLimited
 from deadtime.recordings import RecordingCheck

@@ -35,13 +35,7 @@ from deadtime.estimation.data._checks import (
 )
 from deadtime.estimation.fit._least_squares import place_of
 from deadtime.estimation.fit._residuals import whiteness_of
-from deadtime.estimation.methods._conclusion import (
-    COLOURED,
-    OfOne,
-    Read,
-    is_rounding,
-    spreads_of,
-)
+from deadtime.estimation.methods._conclusion import COLOURED, OfOne, Read, is_rounding, spreads_of
 from deadtime.estimation.methods._method import Run, check_initial_output
 from deadtime.estimation.methods._waveform import simulated_model
 from deadtime.experiments import FlightNoise

@@ -22,11 +22,7 @@ from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.data._known_filter import KnownFilter
 from deadtime.estimation.data._stamps import on_regular_times
-from deadtime.estimation.fit._least_squares import (
-    Minimum,
-    Model,
-    solve_jointly,
-)
+from deadtime.estimation.fit._least_squares import Minimum, Model, solve_jointly
 from deadtime.estimation.likelihood._coloured import coloured_profile
 from deadtime.estimation.likelihood._flight import (
     NoiseFit,
@@ -67,12 +63,7 @@ from deadtime.estimation.methods._flight_conclusion import (
     values_of,
     without_the_plant,
 )
-from deadtime.estimation.methods._method import (
-    Method,
-    Run,
-    check_choice,
-    check_initial_output,
-)
+from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
 from deadtime.estimation.methods._rounded_conclusion import read_as_intervals, rounding_is_all
 from deadtime.loops import ControlLoop
 from deadtime.recordings import RecordingCheck

@@ -25,8 +25,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import whitened_columns
-from deadtime.estimation.likelihood._disturbances import disturbances_of
+from deadtime.estimation.likelihood._disturbances import disturbances_of, whitened
 from deadtime.experiments import Experiment, FlightNoise, RandomProcess, check_reads_samples
 from deadtime.loops import ControlLoop, P
 from deadtime.roots import delay
@@ -55,11 +54,7 @@ def trim_response(loop: ControlLoop, time: Array) -> Array:
 def in_open_loop(loop: ControlLoop, time: Array, columns: Array, noise: FlightNoise) -> Array:
     """Columns, a row each, whitened by the covariance of air and sensor without the loop."""
     present = disturbances_of(noise, LONG * float(time[-1] - time[0]))
-    if not present:
-        return columns
-    num, den = loop.plant._polynomials({**loop.plant.parameters, "gain": 1.0})
-    flat = whitened_columns(list(num), list(den), present, time, np.ravel(columns))
-    return np.asarray(flat.reshape(columns.shape))
+    return whitened(loop.plant, time, columns, present)
 
 
 class ClosedLoop(NamedTuple):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from deadtime._base.digits import between
 from deadtime._base.verdicts import Verdict, claimed, verdict_if
+from deadtime.estimation._native import BankAnswer
 
 #: From how many deviations the product of neighbouring innovations shows that they are not white.
 #: The test is repeated all the time, so that its level is about one in a hundred thousand.
@@ -26,34 +26,6 @@ LOUDER = 3.0
 
 #: Share of the range that an interval must be narrower than, to be an estimate.
 NARROWER = 0.5
-
-
-class BankNumbers(NamedTuple):
-    """The numbers of the kernel's answer, in its order."""
-
-    time: float
-    started: float
-    delay: float
-    delay_deviation: float
-    low: float
-    high: float
-    together: float
-    together_deviation: float
-    together_low: float
-    together_high: float
-    lag: float
-    gain: float
-    gain_deviation: float
-    rate: float
-    gate: float
-    changed: float
-    change_ratio: float
-    white: float
-    colour: float
-    unexplained: float
-    lowest: float
-    highest: float
-    evidence: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +96,7 @@ class OnlineEstimate:
         return f"{told}; {self.message}" if self.message else told
 
 
-def reasons_against(numbers: BankNumbers, white: float, range_: tuple[float, float]) -> list[str]:
+def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, float]) -> list[str]:
     """Why the model does not hold at this row; `white` is the noise that was expected."""
     found = []
     if abs(numbers.colour) > COLOURED:
@@ -143,10 +115,9 @@ def reasons_against(numbers: BankNumbers, white: float, range_: tuple[float, flo
 
 
 def estimate_of(
-    values: Sequence[float], white: float, range_: tuple[float, float], doubts: Sequence[str] = ()
+    numbers: BankAnswer, white: float, range_: tuple[float, float], doubts: Sequence[str] = ()
 ) -> OnlineEstimate:
-    """The estimate of the kernel's numbers."""
-    numbers = BankNumbers(*values)
+    """The estimate of the kernel's answer."""
     known = numbers.high - numbers.low < NARROWER * (range_[1] - range_[0])
     against = [*doubts, *reasons_against(numbers, white, range_)]
     message = "; ".join(f"not reliable: {reason}" for reason in against)
@@ -168,36 +139,8 @@ def estimate_of(
         gain=numbers.gain,
         gain_stderr=numbers.gain_deviation,
         informed=numbers.gate > 0.5,
-        changed=bool(numbers.changed),
+        changed=numbers.changed,
         known=known,
         verdict=verdict_if(not against) if known else "none",
         message=message,
-    )
-
-
-def not_yet(
-    time: float,
-    range_: tuple[float, float],
-    lags: tuple[float, float],
-    gain: tuple[float, float],
-    reason: str,
-) -> OnlineEstimate:
-    """What is known before there is an estimate: the whole range."""
-    low, high = range_
-    total = (low + lags[0], high + lags[1])
-    return OnlineEstimate(
-        time=time,
-        delay=0.5 * (low + high),
-        ci=range_,
-        stderr=(high - low) / math.sqrt(12.0),
-        lag=0.5 * (lags[0] + lags[1]),
-        delay_plus_lag=0.5 * sum(total),
-        delay_plus_lag_ci=total,
-        gain=gain[0],
-        gain_stderr=gain[1],
-        informed=False,
-        changed=False,
-        known=False,
-        verdict="none",
-        message=f"no estimate yet: {reason}",
     )

@@ -13,10 +13,10 @@ from deadtime._base.errors import DeadtimeError, NotIdentifiableError
 from deadtime._base.validation import finite, non_negative, positive
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation._estimate import estimate_delay
-from deadtime.estimation._native import OnlineBank
+from deadtime.estimation._native import BankAnswer, OnlineBank
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.methods._output_error import OutputError
-from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of, not_yet
+from deadtime.estimation.running._estimate import OnlineEstimate, estimate_of
 from deadtime.estimation.running._settings import (
     DELAYS,
     LAGS,
@@ -194,8 +194,8 @@ class OnlineEstimator:
         self._commands: list[tuple[float, float]] = []
         self._next_fit = math.inf
         self._reason = "the noise is being learned"
-        # The settings are checked now, not with the first row.
-        OnlineBank(self._settings)
+        # The settings are checked now, not with the first row. It says what is known before one.
+        self._blank = OnlineBank(self._settings)
         if noise is not None:
             self._begin(_flight_noise(noise))
 
@@ -277,10 +277,10 @@ class OnlineEstimator:
         seen = None if output is None or math.isnan(output) else output
         if self._bank is None:
             return self._learn(finite("time", time), seen, command)
-        numbers = self._bank.row(time, seen)
+        answer = self._bank.row(time, seen)
         if command is not None:
             self._bank.command(time, command)
-        return self._estimate(numbers)
+        return self._estimate(answer)
 
     def command(self, time: float, value: float) -> None:
         """Tell of a command that was sent at a time of its own, s.
@@ -317,9 +317,9 @@ class OnlineEstimator:
         for time, output, command in rows:
             yield self.update(time, output, command)
 
-    def _estimate(self, numbers: Any) -> OnlineEstimate:
+    def _estimate(self, answer: BankAnswer) -> OnlineEstimate:
         assert self._noise is not None
-        found = estimate_of(numbers, self._noise.white, self.delays, self._doubts)
+        found = estimate_of(answer, self._noise.white, self.delays, self._doubts)
         if found.changed:
             self._changes.append(found.time)
         self._changes = [time for time in self._changes if time > found.time - MINUTE]
@@ -353,22 +353,20 @@ class OnlineEstimator:
         self._rows.append((time, None if output is None else finite("output", output)))
         if command is not None:
             self.command(time, command)
-        settings = self._settings
-        totals = [sum(lags) - zero + settings.own_lag for lags, zero, _ in settings.layers]
-        lags = (min(totals), max(totals))
         if time >= self._next_fit and len(self._rows) >= FEWEST:
             self._next_fit = time + LEARN
             try:
                 fit = self._fit()
             except DeadtimeError as error:
                 self._reason = str(error)
-                if not settings.at_rest:
+                if not self._settings.at_rest:
                     self._forget(time - LAST)
             else:
                 if fit.verdict == "reliable" or time - self._rows[0][0] >= LAST:
                     return self._replay(fit)
                 self._reason = fit.message
-        return not_yet(time, self.delays, lags, settings.gain, self._reason)
+        found = estimate_of(self._blank.row(time), self._settings.white, self.delays)
+        return replace(found, message=f"no estimate yet: {self._reason}")
 
     def _forget(self, time: float) -> None:
         """Forget what was before `time`, but for the command that held then."""
@@ -399,18 +397,17 @@ class OnlineEstimator:
         assert self._bank is not None
         commands = iter([*self._commands, (math.inf, 0.0)])
         coming = next(commands)
-        numbers: list[float] = []
         for time, output in self._rows:
             while coming[0] < time:
                 self._bank.command(*coming)
                 coming = next(commands)
-            numbers = self._bank.row(time, output)
+            answer = self._bank.row(time, output)
         while math.isfinite(coming[0]):
             self._bank.command(*coming)
             coming = next(commands)
         self._rows.clear()
         self._commands.clear()
-        return self._estimate(numbers)
+        return self._estimate(answer)
 
 
 def _freedom_of(fit: DelayEstimate) -> float:

@@ -186,7 +186,9 @@ pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Resul
             records, question, &starts, *straight, known, task,
         )?);
     }
-    let out = joined(found, task)?;
+    // A controller and values that rest speak for a held command.
+    let held = question.in_loop || records.iter().all(Record::rests);
+    let out = joined(found, !held, task)?;
     moved(records, question, &starts, &out, task).map(|moved| moved.unwrap_or(out))
 }
 
@@ -255,15 +257,23 @@ pub fn refine_family(
     }
 }
 
-/// The more likely kind of command; where neither is, its intervals are those of both.
-fn joined(mut found: Vec<Family>, task: &Task) -> Result<Family, Error> {
+/// The more likely kind of command, or the `usual` one where it is as likely; where none is decided, its
+/// intervals are those of both.
+fn joined(mut found: Vec<Family>, usual: bool, task: &Task) -> Result<Family, Error> {
     let least = |family: &Family| {
         family
             .candidates
             .first()
             .map_or(f64::INFINITY, |one| one.deviance)
     };
-    found.sort_by(|a, b| least(a).total_cmp(&least(b)));
+    let floor = found
+        .iter()
+        .fold(f64::INFINITY, |floor, one| floor.min(least(one)));
+    let is_usual = |one: &Family| one.straight == usual && least(one) < floor + EVIDENCE.tie;
+    found.sort_by(|a, b| {
+        let ranks = is_usual(b).cmp(&is_usual(a));
+        ranks.then(least(a).total_cmp(&least(b)))
+    });
     let mut kinds = found.into_iter();
     let mut out = kinds
         .next()

@@ -7,6 +7,9 @@ use crate::Error;
 /// takes ramps of a row or two for jumps.
 const JUMPS: f64 = 0.1;
 
+/// The same share up to which its values rest between changes: more takes ramps for held values.
+const RESTS: f64 = 0.5;
+
 /// One record.
 #[derive(Debug, Clone)]
 pub struct Record {
@@ -86,17 +89,21 @@ impl Record {
 
     /// Does the command jump from one held value to the next? A straight one would need rows to get there.
     pub(super) fn jumps(&self) -> bool {
-        let changes = |at: usize| {
-            let next = self.command.get(at + 1);
-            next.is_some_and(|next| *next != self.command[at])
-        };
-        let all = (0..self.command.len()).filter(|at| changes(*at));
-        let (mut count, mut together) = (0, 0);
-        for at in all {
-            count += 1;
-            together += usize::from(changes(at + 1));
-        }
-        count > 0 && together as f64 <= JUMPS * count as f64
+        self.followed().is_some_and(|share| share <= JUMPS)
+    }
+
+    /// Do values of the command rest between its changes?
+    pub(super) fn rests(&self) -> bool {
+        self.followed().is_some_and(|share| share <= RESTS)
+    }
+
+    /// Share of the changes of the command that another follows in the next row; None without a change.
+    fn followed(&self) -> Option<f64> {
+        let pairs = self.command.windows(2);
+        let changes: Vec<bool> = pairs.map(|pair| pair[1] != pair[0]).collect();
+        let count = changes.iter().filter(|is| **is).count();
+        let both = changes.windows(2).filter(|pair| pair[0] && pair[1]);
+        (count > 0).then(|| both.count() as f64 / count as f64)
     }
 
     /// Does the record begin with rows in which neither the command nor the output moves?

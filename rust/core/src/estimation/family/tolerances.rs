@@ -114,6 +114,9 @@ pub(super) struct Evidence {
     pub(super) reach: f64,
     /// −2 ln L above the best within which a class has to agree with it: more finds more contradictions.
     pub(super) likely: f64,
+    /// −2 ln L within which a held and a straight command are as likely, and the usual one is taken: more
+    /// listens less to the record.
+    pub(super) tie: f64,
     /// BIC from the best beyond which a class is not followed closely: more costs time.
     pub(super) hopeless: f64,
     /// Standard errors a combination of numbers must stand from nothing to count.
@@ -137,6 +140,7 @@ pub(super) struct Evidence {
 pub(super) const EVIDENCE: Evidence = Evidence {
     reach: 10.0,
     likely: 6.0,
+    tie: 2.0,
     hopeless: 60.0,
     told: 3.0,
     adds: 2.0,

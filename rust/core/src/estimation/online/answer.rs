@@ -20,14 +20,10 @@ pub struct Answer {
     pub gain: f64,
     /// Posterior mean and deviation of the gain.
     pub gain_deviation: f64,
-    /// Fisher information about the delay a second, of the last seconds, 1/s³.
-    pub rate: f64,
     /// The share of the walk that there is at this information.
     pub gate: f64,
     /// Whether a change of the delay was found at this row.
     pub changed: bool,
-    /// The sum that is compared with the alarm.
-    pub change_ratio: f64,
     /// The deviation of the white noise.
     pub white: f64,
     /// Correlation of neighbouring innovations, in its deviations.
@@ -77,10 +73,8 @@ impl Answer {
             lag: 0.5 * (least + most),
             gain: settings.gain.0,
             gain_deviation: settings.gain.1,
-            rate: 0.0,
             gate: 0.0,
             changed: false,
-            change_ratio: 0.0,
             white: settings.white,
             colour: 0.0,
             unexplained: 0.0,
