@@ -54,6 +54,9 @@ TOLD = 3
 OF_THE_GAIN = ("classes contradict", "crossover not told", "too few told")
 NOT_WHITE, MANY = "residuals not white", 5
 
+#: Probability below which what a fit leaves is not white.
+WHITE = 1e-3
+
 #: Bands of frequency over which the time is averaged: more see more of its change and take longer.
 BANDS = 24
 
@@ -264,7 +267,7 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
             between = _reach(spread) / math.sqrt(spread.count)
             low = value - math.hypot(value - low, between)
             high = value + math.hypot(high - value, between)
-        if fit._code == NOT_WHITE:
+        if _is_coloured(fit):
             low, high = min(low, spread.interval[0]), max(high, spread.interval[1])
     unsure = 0.0 if found.sampling is None else found.sampling.unsure
     interval = (max(0.0, low - unsure), high + unsure)
@@ -282,10 +285,15 @@ def _why_doubtful(found: LoopLatency) -> str:
     """
     fit = found.estimate
     assert fit is not None
-    if fit.verdict == "reliable" or fit._code in OF_THE_GAIN:
-        return ""
     many = found.spread is not None and found.spread.count >= MANY
-    return "" if fit._code == NOT_WHITE and many else fit.reason
+    if _is_coloured(fit) and not many:
+        return "what the plant leaves is no known noise, and few windows show how far it reaches"
+    return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason
+
+
+def _is_coloured(fit: PlantEstimate) -> bool:
+    """Whether the fit leaves a noise that is none of those that are known."""
+    return fit._answer().candidates[0].whiteness < WHITE
 
 
 def _reach(spread: Spread) -> float:

@@ -463,10 +463,16 @@ fn longest_delay(found: &[Minimum<'_>]) -> f64 {
     delays.fold(0.0, f64::max)
 }
 
-/// The minima that may be the true one.
+/// The minima that may be the true one, those that are clearly more likely among them: of many rows BIC
+/// asks more of a number than its errors do.
 fn within_reach<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
-    let least = found.first().map_or(f64::INFINITY, |best| best.bic);
-    let reach = |one: &&'b Minimum<'a>| one.bic <= least + EVIDENCE.reach;
+    let best = found.first();
+    let (least, likely) = best.map_or((f64::INFINITY, f64::INFINITY), |one| {
+        (one.bic, one.deviance)
+    });
+    let reach = |one: &&'b Minimum<'a>| {
+        one.bic <= least + EVIDENCE.reach || one.deviance < likely - EVIDENCE.likely
+    };
     found.iter().filter(reach).collect()
 }
 

@@ -133,22 +133,24 @@ fn parts_at(all: &[Turning<'_>], omega: f64) -> [Vec<Triple>; 3] {
 }
 
 /// The mean equivalent delay over frequencies with these weights, and its ends over all candidates whose
-/// numbers the record tells; those of the best count in any case.
+/// numbers the record tells; those of the best count in any case. Phases begin at that of ω → 0.
 pub(super) fn mean_delay(all: &[Turning<'_>], omega: &[f64], weight: &[f64]) -> Triple {
-    let is_told = |place: usize, one: &Turning<'_>| {
-        place == 0 || one.candidate.told == one.candidate.values.len()
+    let sign = all.first().map_or(1.0, |best| best.candidate.gain);
+    let counts = |place: usize, one: &Turning<'_>| {
+        let is_told = one.candidate.told == one.candidate.values.len();
+        place == 0 || is_told && one.candidate.gain * sign > 0.0
     };
-    let counts = all
-        .iter()
-        .enumerate()
-        .filter(|(place, one)| is_told(*place, one));
-    union(counts.map(|(_, one)| {
-        one.candidate.interval(|seen| {
-            let each = omega.iter().zip(weight);
-            each.map(|(omega, weight)| weight * one.equivalent_delay(seen, *omega))
-                .sum()
-        })
-    }))
+    let mean = |seen: &Seen, turns: f64| -> f64 {
+        let each = omega.iter().zip(weight);
+        each.map(|(omega, weight)| -weight * (seen.phase(*omega) + turns) / omega)
+            .sum()
+    };
+    let parts = all.iter().enumerate();
+    union(
+        parts
+            .filter(|(place, one)| counts(*place, one))
+            .map(|(_, one)| one.candidate.interval(|seen| mean(seen, one.turns))),
+    )
 }
 
 /// The same over all, each with its ends.
