@@ -64,7 +64,7 @@ BANDS = 24
 NEGLIGIBLE = 1e-3
 
 #: Probability of the scatter of windows below which they differ.
-DIFFER = 0.01
+DIFFER = 0.05
 
 #: A time says something if its standard error is below itself, or below so many rows.
 OF_A_ROW = 2.0
@@ -263,10 +263,6 @@ def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
         if spread.p_value < DIFFER:
             value, (low, high) = spread.mean, spread.interval
-        else:
-            between = _reach(spread) / math.sqrt(spread.count)
-            low = value - math.hypot(value - low, between)
-            high = value + math.hypot(high - value, between)
         if _is_coloured(fit):
             low, high = min(low, spread.interval[0]), max(high, spread.interval[1])
     unsure = 0.0 if found.sampling is None else found.sampling.unsure
@@ -294,13 +290,6 @@ def _why_doubtful(found: LoopLatency) -> str:
 def _is_coloured(fit: PlantEstimate) -> bool:
     """Whether the fit leaves a noise that is none of those that are known."""
     return fit._answer().candidates[0].whiteness < WHITE
-
-
-def _reach(spread: Spread) -> float:
-    """How far the true time of one window may lie from the mean, s, at 95 %."""
-    from scipy.special import stdtrit
-
-    return spread.between * float(stdtrit(spread.count - 1, 0.975))
 
 
 class Frequencies(NamedTuple):

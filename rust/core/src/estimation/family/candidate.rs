@@ -1,6 +1,6 @@
 //! A minimum with the errors of its numbers and how many of them the input tells.
 
-use super::between::open;
+use super::between::{Open, open};
 use super::class::{Class, Numbers};
 use super::dispersion::dispersion;
 use super::loop_view::Seen;
@@ -11,7 +11,7 @@ use super::tolerances::EVIDENCE;
 use crate::estimation::statistics::{chi_squared_beyond, student_reach};
 use crate::linear_algebra::cholesky::inverse_of_positive;
 use crate::linear_algebra::eigenvalues::eigenvalues;
-use crate::linear_algebra::vectors::{add_multiple, dot};
+use crate::linear_algebra::vectors::dot;
 
 /// The spread of a number about which the record says nothing, in its scale: errors end there.
 const UNKNOWN: f64 = 10.0;
@@ -88,12 +88,14 @@ impl Candidate {
             .map(|at| seen.scale(at, rows.row))
             .collect();
         let information = products(&sensitivities, &scales, variance);
-        let mut inner = covariance(&information, &scales, factor);
-        let open = open(model, point, &sensitivities, &inner, factor * variance);
-        inner
-            .iter_mut()
-            .for_each(|entry| *entry *= 1.0 - open.share);
-        add_multiple(&mut inner, 1.0, &open.covariance);
+        let known = covariance(&information, &scales, 1.0);
+        let open = open(model, point, &sensitivities, &known, variance);
+        let rest = factor / explained(&open, &information, &scales);
+        let (inner, factor) = if open.share > 0.0 {
+            (with_open(&open, known, rest.max(1.0)), rest.max(1.0))
+        } else {
+            (covariance(&information, &scales, factor), factor)
+        };
         let scatter =
             |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
         // Of one record the weight is 1, of several their sum of squares is that of white noise of size 1.
@@ -225,6 +227,26 @@ impl Candidate {
         let value = of(&seen);
         (value, value - reach, value + reach)
     }
+}
+
+/// The covariance with what the rows of the command leave open, times a dispersion.
+fn with_open(open: &Open, mut noise: Vec<f64>, factor: f64) -> Vec<f64> {
+    for (entry, more) in noise.iter_mut().zip(&open.covariance) {
+        *entry = factor * (*entry * (1.0 - open.share) + more);
+    }
+    noise
+}
+
+/// The dispersion that open areas explain: they are a part of the scatter that blocks of rows show.
+fn explained(open: &Open, information: &[f64], scales: &[f64]) -> f64 {
+    let n = scales.len();
+    let mut trace = 0.0;
+    for i in 0..n {
+        for j in 0..n {
+            trace += information[i * n + j] * open.covariance[j * n + i] / (scales[i] * scales[j]);
+        }
+    }
+    (1.0 - open.share + trace / n.max(1) as f64).max(1.0)
 }
 
 /// Are the residuals smaller than what is taken for the rounding of the output?

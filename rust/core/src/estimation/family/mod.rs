@@ -8,7 +8,8 @@
 //! The state at the first row is unknown, and so is the command before it. `rows` says which rows
 //! count, `response` is exact, `model` the likelihood of one class under one `noise`, `search` its
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
-//! numbers the input tells, `hull` intervals over all classes within reach, `verdict` what is claimed.
+//! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
+//! leave open, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
 mod between;
 mod candidate;
@@ -22,6 +23,7 @@ mod minima;
 mod model;
 mod noise;
 mod projection;
+mod refine;
 mod response;
 mod rows;
 mod search;
