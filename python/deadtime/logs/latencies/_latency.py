@@ -122,7 +122,7 @@ class Latency(ReadOnlyArrays, Pictured):
         )
 
     def plot(self) -> Figure:
-        """Draw delay and lag of each loop with their intervals. Needs matplotlib."""
+        """Draw the time of each loop with its interval. Needs matplotlib."""
         from deadtime.logs.latencies._plots import plot_latency
 
         return plot_latency(self.source, self.estimated)
