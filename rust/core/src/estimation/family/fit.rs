@@ -4,7 +4,7 @@ use super::candidate::Candidate;
 use super::class::{Class, Numbers};
 use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, Triple, at, hull, mean_delay, turning};
-use super::minima::{Minimum, Plan, beside, minima, without_plant};
+use super::minima::{Known, Minimum, Plan, beside, minima, without_plant};
 use super::noise::Noise;
 use super::rows::{Part, Record, Rows, Start};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
@@ -98,14 +98,19 @@ impl Family {
 
     /// The candidates that so many rows may leave: of more rows than these, some that are further behind,
     /// for what a number adds to the likelihood grows with the rows.
-    fn worth_refining(&self, rows: usize) -> Vec<Candidate> {
+    fn worth_refining(&self, rows: usize) -> Vec<Known> {
         let best = self.candidates.first().map_or(0.0, |best| best.bic);
         let more = (rows as f64 / self.rows.max(1) as f64).max(1.0);
         let reach = (EVIDENCE.reach * more).min(EVIDENCE.hopeless);
-        let mut out = self.minima.clone();
+        let known = |one: &Candidate| Known {
+            class: one.class,
+            numbers: one.numbers,
+            noise: one.noise,
+        };
+        let mut out: Vec<Known> = self.minima.iter().map(known).collect();
         for one in &self.candidates {
-            if one.bic <= best + reach && out.iter().all(|known| known.class != one.class) {
-                out.push(one.clone());
+            if one.bic <= best + reach && out.iter().all(|other| other.class != one.class) {
+                out.push(known(one));
             }
         }
         out

@@ -1,6 +1,5 @@
 //! The minima of every class under every noise that may be the true one.
 
-use super::candidate::Candidate;
 use super::class::{Class, Numbers};
 use super::model::{Model, Point};
 use super::noise::Noise;
@@ -46,6 +45,13 @@ impl<'a> Minimum<'a> {
             None
         }
     }
+}
+
+/// A plant that other rows left, and its noise.
+pub(super) struct Known {
+    pub(super) class: Class,
+    pub(super) numbers: Numbers,
+    pub(super) noise: Noise,
 }
 
 /// What is fitted.
@@ -297,10 +303,10 @@ fn under<'a>(
     Ok(all)
 }
 
-/// The minima beside these candidates on other rows, each under its own noise or a richer one, the best
+/// The minima beside these plants on other rows, each under its own noise or a richer one, the best
 /// first. A class that contains another begins at that one too, and so is no less likely.
 pub(super) fn beside<'a>(
-    known: &[Candidate],
+    known: &[Known],
     rows: &'a Rows,
     task: &Task,
 ) -> Result<Vec<Minimum<'a>>, Error> {
@@ -334,7 +340,7 @@ pub(super) fn beside<'a>(
 /// The minimum of a candidate under a noise: from its own numbers, from the minimum under a simpler
 /// noise, and from the best class that it contains.
 fn beside_one<'a>(
-    one: &Candidate,
+    one: &Known,
     kind: Noise,
     simpler: Option<&Minimum<'a>>,
     others: &[Minimum<'a>],
