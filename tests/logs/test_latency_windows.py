@@ -13,6 +13,7 @@ from deadtime.logs.latencies._windows import (
     MOST,
     Window,
     best_of,
+    movement_of,
     parts_of,
     prepared,
     that_follow,
@@ -99,7 +100,7 @@ def test_means_of_rows_have_the_time_of_the_rows(between):
     output = np.concatenate([np.full(late, at[0]), at[:-late]])[2::4]
     output = output + 1e-3 * random.standard_normal(output.size)
     row = dtm.Recording(fine[2::4], np.zeros(output.size), output, sent=(sent, told))
-    few = prepared(row, Sampling(between), 8)
+    few = prepared(row, "rate", Sampling(between), 8)
     assert len(few) == len(row) // 8
     assert few.sample_time == pytest.approx(8.0 * row.sample_time)
     fit = dtm.estimate_delay(few, between="straight", plant="delay", largest_delay=0.2)
@@ -193,7 +194,8 @@ def answer_of(parts, sampling=None):
     """The time of parts that are windows, and whole segments, of their own."""
     some = [parts_of(one) for one in parts]
     own = [
-        Window(one.time[0], one.time[-1], one, 1.0, place) for place, (one, _) in enumerate(some)
+        Window(one.time[0], one.time[-1], one, movement_of(one), place)
+        for place, (one, _) in enumerate(some)
     ]
 
     def part(start, stop):
@@ -237,6 +239,15 @@ def test_windows_that_differ_by_more_than_their_errors_make_the_interval_wider(a
     assert apart.time == pytest.approx(np.mean([one.time for one in apart.times]), abs=1e-3)
     assert low < min(one.time for one in apart.times)
     assert high > max(one.time for one in apart.times)
+
+
+def test_windows_that_hardly_move_say_nothing_about_the_spread():
+    parts = flown([0.03] * 3)
+    faint = [replace(one, output=0.02 * one.output, command=0.02 * one.command)
+             for one in flown([0.08])]  # fmt: skip
+    faint = [replace(one, time=one.time + 50.0, sent=None) for one in faint]
+    found = answer_of(parts + faint)
+    assert [one.at < 40.0 for one in found.times] == [True] * 3
 
 
 def test_a_response_against_its_command_is_no_answer():

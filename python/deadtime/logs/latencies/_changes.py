@@ -141,6 +141,6 @@ def _seen_by_both(one: LoopLatency, other: LoopLatency) -> Frequencies:
 def _at(seen: Frequencies, one: LoopLatency) -> tuple[float, float]:
     """The time of a loop at other frequencies, and its standard error, s."""
     assert one.estimate is not None
-    value, low, high = seen.mean_of(one.estimate)
-    own, *_ = Frequencies(one.frequencies, one.weights).mean_of(one.estimate)
+    value, (low, high) = one.estimate.mean_delay(*seen)
+    own, _ = one.estimate.mean_delay(one.frequencies, one.weights)
     return one.time + value - own, max(one.stderr, (high - low) / TWO_SIDED)
