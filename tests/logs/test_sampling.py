@@ -161,6 +161,7 @@ def test_clocks_that_drift_apart_are_named_with_their_rate():
     ) in one.reason
 
 
+@pytest.mark.survey
 def test_a_time_that_grows_with_the_drift_of_clocks_is_named():
     # Over a long log it grows, whatever the stamps look like.
     one, _ = answered("long height", "clocks drift by 100 ppm, scattered stamps", 1000)
@@ -215,7 +216,7 @@ def test_stamps_that_are_not_regular_tell_no_rate():
 
 
 def test_a_recording_with_commands_of_another_clock_is_doubted():
-    flight, _ = made("long height", "every row", 1000, part=0.3)
+    flight, _ = made("long height", "every row", 1000, part=0.2)
     time, sent = flight.time, (flight.time, flight.sent)
     same, other = (
         dtm.latency(dtm.Recording(apart * time, flight.setpoint, flight.read, sent=sent)).loops[0]

@@ -237,7 +237,7 @@ def latency(
     >>> w = found.frequencies
     >>> true = (0.03 + np.arctan(0.08 * w) / w) @ found.weights
     >>> low, high = found.interval
-    >>> low < true < high
+    >>> bool(low < true < high)
     True
     """
     report = stage_report(progress)
