@@ -344,7 +344,7 @@ def thrust() -> None:
 
 
 def latency() -> None:
-    """What a log of a take-off tells: each loop of two axes, and one of the fits.
+    """What a log of a take-off shows: the time of each loop of two axes, and one of the fits.
 
     The log is that of a simulated PX4, `px4_sitl_takeoff.ulg`, beside the project.
     """
@@ -355,7 +355,9 @@ def latency() -> None:
     found = dtm.latency(log, axes=("roll", "pitch"))
     found.plot().savefig(IMAGES / "latency-loops.png", dpi=90)
     fit = found.loop("roll").estimate
-    fit.plot()[0].figure.savefig(IMAGES / "latency-roll.png", dpi=90)
+    above, _ = fit.plot()
+    above.set(title="Roll in a take-off, and the fit", ylabel="roll / rad")
+    above.figure.savefig(IMAGES / "latency-roll.png", dpi=90)
 
 
 def rows_of_logs() -> None:

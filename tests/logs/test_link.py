@@ -100,7 +100,7 @@ def test_the_report_has_the_link(opened, tmp_path):
     log = opened(made(target=True)[0])
     assert "vertical speed" in log.loops
     found = dtm.latency(log, loops=("vertical speed",))
-    text = found.summary()
+    text = found.details()
     assert log.link.summary() in text
     assert "is stamped where it was sent, on the ground" in text
     assert found.to_dict()["link"]["lost"] == log.link.lost

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from blackbox_logs import END, SIGNED, UNSIGNED, Log, rate_log, rate_rows
 from crazyflie_logs import definitions, record, sealed
-from deadtime.logs.latencies._latency import _told
+from deadtime.logs.latencies._latency import latency_of
 from flights import flight_path
 from sampled_loops import RATE, fly
 
@@ -180,10 +180,10 @@ def test_the_time_from_the_motors_of_a_crazyflie_to_its_rate(tmp_path, axis):
         **motors(40_000.0, **sent),
     }
     log = opened(tmp_path, crazyflie_log(columns))
-    one = _told(log, log.loop(f"{axis} rate"), "actuator")
-    low, high = one.sum_of()[2]
-    assert one.estimate.verdict == "reliable", one.estimate.message
-    assert low < flight.delay_plus_lag < high
+    one = latency_of(log, log.loop(f"{axis} rate"), "actuator")
+    low, high = one.interval
+    assert one.verdict == "reliable", one.reason
+    assert low < flight.delay_at(one.frequencies) @ one.weights < high
 
 
 def test_a_real_log_of_betaflight_has_its_rate_loops():

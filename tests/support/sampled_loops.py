@@ -105,6 +105,10 @@ class Flight:
         """Delay and lag together, s."""
         return self.delay + self.lag
 
+    def delay_at(self, omega: Array) -> Array:
+        """Equivalent delay of the vehicle without its integrator, s."""
+        return np.asarray(self.delay + np.arctan(self.lag * omega) / omega)
+
     def response(self, times: Array) -> Array:
         """Response without noise of the sensor, at any times within the flight."""
         step = self.kind.period

@@ -52,16 +52,18 @@ def refined(time: Array, values: Array) -> tuple[Array, Array]:
 
 def moving_mean(time: Array, values: Array, between: Between, width: float) -> tuple[Array, Array]:
     """The mean of a command over a width, s, around new times, straight between them."""
-    ends = np.append(time, time[-1] + width)
-    if between == "held":
-        areas = np.append(0.0, np.cumsum(values * np.diff(ends)))
-    else:
-        middles = 0.5 * (values[:-1] + values[1:])
-        areas = np.concatenate([[0.0], np.cumsum(middles * np.diff(time)), [0.0]])
-        areas[-1] = areas[-2] + values[-1] * width
-    # Before its first row the command is that of it.
-    ends, areas = np.append(time[0] - width, ends), np.append(-values[0] * width, areas)
+    steps = np.diff(time)
+    slopes = np.zeros(time.size)
+    if between == "straight":
+        slopes[:-1] = np.diff(values) / steps
+    areas = np.append(0.0, np.cumsum((values[:-1] + 0.5 * slopes[:-1] * steps) * steps))
+
+    def area(at: Array) -> Array:
+        row = np.maximum(np.searchsorted(time, at, side="right") - 1, 0)
+        since = at - time[row]
+        # Before its first row the command is that of it.
+        return np.asarray(areas[row] + (values[row] + 0.5 * slopes[row] * since.clip(0.0)) * since)
+
     count = max(2, int(POINTS * (time[-1] - time[0]) / width) + 1)
     at = np.linspace(time[0], time[-1], count)
-    over = np.interp(at + 0.5 * width, ends, areas) - np.interp(at - 0.5 * width, ends, areas)
-    return at, over / width
+    return at, (area(at + 0.5 * width) - area(at - 0.5 * width)) / width

@@ -1,4 +1,8 @@
-"""What changed between two logs of a vehicle."""
+"""What changed between two logs of a vehicle.
+
+The time of a loop is an equivalent delay at the frequencies at which it moved. Two logs are
+compared at those of both, each with half of the weight.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from deadtime._base.plain import plain_fields
 from deadtime._base.verdicts import Verdict, verdict_if
 from deadtime.logs.latencies._latency import Latency
-from deadtime.logs.latencies._relation import TWO_SIDED
+from deadtime.logs.latencies._relation import TWO_SIDED, Frequencies, LoopLatency
 
 #: Probability below which a difference counts as real.
 REAL = 0.05
@@ -24,7 +30,7 @@ class LatencyChange:
     loop, command : str
         The loop, and from what the time counts.
     before, after : float
-        The time in the first log and in the second, s.
+        The time in the first log and in the second, at the frequencies of both, s.
     before_error, after_error : float
         Their standard errors, s.
     p_value : float
@@ -110,8 +116,10 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
         for other in after.estimated:
             if (one.loop, one.command) != (other.loop, other.command):
                 continue
-            first, first_error = one.time, one.stderr
-            second, second_error = other.time, other.stderr
+            seen = _seen_by_both(one, other)
+            (first, first_error), (second, second_error) = (
+                _at(seen, each) for each in (one, other)
+            )
             spread = math.hypot(first_error, second_error)
             z = abs(second - first) / spread if spread > 0.0 else math.inf
             reliable = one.verdict == other.verdict == "reliable"
@@ -122,3 +130,17 @@ def compare_latencies(before: Latency, after: Latency) -> tuple[LatencyChange, .
                 )
             )  # fmt: skip
     return tuple(found)
+
+
+def _seen_by_both(one: LoopLatency, other: LoopLatency) -> Frequencies:
+    """Where the responses of both move, each with half of the weight."""
+    omega = np.concatenate([one.frequencies, other.frequencies])
+    return Frequencies(omega, 0.5 * np.concatenate([one.weights, other.weights]))
+
+
+def _at(seen: Frequencies, one: LoopLatency) -> tuple[float, float]:
+    """The time of a loop at other frequencies, and its standard error, s."""
+    assert one.estimate is not None
+    value, (low, high) = one.estimate.mean_delay(*seen)
+    own, _ = one.estimate.mean_delay(one.frequencies, one.weights)
+    return one.time + value - own, max(one.stderr, (high - low) / TWO_SIDED)

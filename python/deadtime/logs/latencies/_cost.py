@@ -63,12 +63,13 @@ class GainCost:
 
 
 def cost_of(fit: PlantEstimate, recording: Recording) -> GainCost | None:
-    """The gains for the plant of an estimate; None where no gain makes it unstable.
+    """The gains for the plant of an estimate; None where no gain is known to make it unstable.
 
     The interval of the well damped gain is, as a share, that of the largest.
     """
     largest = fit.largest_gain
-    if "largest_gain" not in fit.intervals or not math.isfinite(largest):
+    known = fit.verdict != "none" and "largest_gain" in fit.intervals
+    if not (known and math.isfinite(largest)):
         return None
     low, high = fit.ci(0.95, "largest_gain")
     share = _well_damped(fit, largest)

@@ -1,4 +1,4 @@
-"""Pictures of latencies: delay and lag of each loop, its moves aligned, and each fit."""
+"""Pictures of latencies: the time of each loop, its moves aligned, and each fit."""
 
 from __future__ import annotations
 
@@ -26,18 +26,15 @@ ROOM = 0.3
 
 
 def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
-    """Delay and lag of each loop as bars, with the 95 % interval of their sum."""
+    """The time of each loop as a bar, with its 95 % interval."""
     if not told:
         raise ValueError(f"{source}: no loop tells how long it takes, so nothing is drawn")
     figure, ax = new_figure(7.5, AROUND + ROW * len(told))
     unit, factor = time_unit(float(np.median([one.time for one in told])))
     for place, one in enumerate(told):
-        assert one.estimate is not None
         reliable = one.verdict == "reliable"
-        look = {"alpha": 1.0 if reliable else 0.35, "height": 0.6}
-        delay = one.estimate.delay / factor
-        ax.barh(place, delay, color=COLOURS[0], **look)
-        ax.barh(place, one.time / factor - delay, left=delay, color=COLOURS[1], **look)
+        alpha = 1.0 if reliable else 0.35
+        ax.barh(place, one.time / factor, color=COLOURS[0], alpha=alpha, height=0.6)
         if reliable:
             ends = [end / factor for end in one.interval]
             ax.plot(ends, [place, place], color="0.15", lw=1.4, marker="|")
@@ -49,10 +46,9 @@ def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     widest = max(one.time for one in told) / factor
     ax.set_xlim(0.0, 1.6 * widest)
     ax.set_xlabel(f"from the command to the response [{unit}]")
-    handles = [ax.barh(0, 0, color=colour) for colour in COLOURS[:2]]
-    handles += ax.plot([], [], color="0.15", lw=1.4, marker="|")
-    names = ["delay", "lag", "95 % of both"]
-    figure.legend(handles, names, loc="outside upper center", ncols=3, frameon=False)
+    handles = [ax.barh(0, 0, color=COLOURS[0]), *ax.plot([], [], color="0.15", lw=1.4, marker="|")]
+    names = ["time", "95 %"]
+    figure.legend(handles, names, loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 

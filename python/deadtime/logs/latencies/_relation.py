@@ -32,6 +32,7 @@ from deadtime.logs.latencies._spread import Spread, spread_of
 from deadtime.logs.latencies._windows import (
     LENGTHS,
     LONGEST,
+    STILL,
     Window,
     best_of,
     that_follow,
@@ -329,7 +330,9 @@ def _alone(
 
     A window moves at frequencies of its own: there its delay is compared with that of the whole.
     """
-    moving = sorted(windows, key=lambda one: one.movement, reverse=True)[:ALONE]
+    least = STILL * max(one.movement for one in windows)
+    moving = [one for one in windows if one.movement > least]
+    moving = sorted(moving, key=lambda one: one.movement, reverse=True)[:ALONE]
     found = []
     for one in sorted(moving, key=lambda one: one.start):
         try:

@@ -95,9 +95,9 @@ def said_of(one: LoopLatency) -> list[str]:
 
 
 def _error(one: LoopLatency) -> float:
-    """A quarter of the interval of the dead time."""
+    """A quarter of the interval of the dead time; NaN where it is not known."""
     assert one.estimate is not None
-    low, high = one.estimate.ci(0.95, "delay")
+    low, high = one.estimate.intervals.get("delay", (math.nan, math.nan))
     return 0.25 * (high - low)
 
 
