@@ -307,10 +307,10 @@ def _with_interval(
 
 def _interval(value: float, parts: Array) -> tuple[float, float]:
     """The interval of the jackknife; NaN where a part has no number or there are too few."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     if parts.size < FEWEST or not np.isfinite(parts).all():
         return math.nan, math.nan
     error = math.sqrt((parts.size - 1) * float(np.var(parts)))
-    reach = float(t.ppf(0.5 * (1.0 + COVERAGE), parts.size - 1)) * error
+    reach = float(stdtrit(parts.size - 1, 0.5 * (1.0 + COVERAGE))) * error
     return value - reach, value + reach
