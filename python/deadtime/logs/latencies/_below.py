@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: Most lines, how many of them are kept for what to log and to fly, and most on loops without a
 #: time.
-LINES, ADVICE, NONES = 5, 2, 2
+LINES, ADVICE, NONES = 5, 1, 2
 
 #: Probability of the scatter of windows below which their spread is said.
 DIFFER = 0.01
@@ -31,24 +31,27 @@ _NUMBERS = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?(?: (?:s|ms|µs|ppm)\b)?")
 _LEFT_OUT = re.compile(r"([\d.]+) s are left out: (.*)")
 
 #: Where a sentence may end before its end.
-_ENDS = ("; ", ": ", ", which ", ", or ")
+_ENDS = re.compile("; |: |, which |, or ")
 
 
-def below(found: Latency) -> list[str]:
-    """At most five lines: what is most worth knowing, and what to log and to fly to know more."""
-    lines = [_left_out(found.loops), _spread(found.loops)]
-    lines += [*_groups(found.loops, "indication")[:1], *_groups(found.loops, "none")[:NONES]]
+def below(found: Latency, others: str = "--verbose") -> list[str]:
+    """At most five lines: what is most worth knowing, and what to log and to fly to know more.
+
+    `others` is where there is more on loops that have no line.
+    """
+    lines = [_left_out(found.loops, others), _spread(found.loops)]
+    lines += [*_groups(found.loops, "indication")[:1], *_without(found.loops, others)]
     lines = [line for line in lines if line][: LINES - min(ADVICE, len(found.advice))]
     more = [shortened("next: ", one.text) for one in found.advice]
     return [*lines, *more[: LINES - len(lines)]]
 
 
 def shortened(before: str, text: str, after: str = "") -> str:
-    """Words with a text between, up to the last of its parts that fits on a screen, if one does."""
+    """Words with a text between, of which as many parts are kept as fit on a screen."""
     room = SCREEN - len(before) - len(after)
     if len(text) > room:
-        last = max(text.rfind(end, 0, room) for end in _ENDS)
-        text = text[:last] if last > 0 else text
+        ends = [end.start() for end in _ENDS.finditer(text)]
+        text = text[: max([end for end in ends if end <= room], default=min(ends, default=None))]
     return f"{before}{text}{after}"
 
 
@@ -70,15 +73,18 @@ def first_reason(one: LoopLatency) -> str:
 
 
 def names_of(loops: Sequence[LoopLatency], most: int = NAMED) -> str:
-    """Names of loops, such as ``"roll, pitch"``; ``"roll from actuator"`` where it is not both."""
+    """Names of loops: ``"roll, pitch"``, or ``"roll; from actuator pitch"`` of what is not both."""
     commands: dict[str, list[str]] = {}
     for one in loops:
         commands.setdefault(one.loop, []).append(one.command)
-    names = [
-        name if some != ["actuator"] else f"{name} from actuator" for name, some in commands.items()
-    ]
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    alone = [name for name, some in commands.items() if some == ["actuator"]]
+    first = [name for name in commands if name not in alone]
+    left = max(most - len(first), 0)
+    parts = [", ".join(first[:most])] if first else []
+    if alone[:left]:
+        parts.append(f"from actuator {', '.join(alone[:left])}")
+    more = f" and {len(commands) - most} more" if len(commands) > most else ""
+    return "; ".join(parts) + more
 
 
 def _groups(loops: Sequence[LoopLatency], verdict: Verdict) -> list[str]:
@@ -93,10 +99,21 @@ def _groups(loops: Sequence[LoopLatency], verdict: Verdict) -> list[str]:
     return lines
 
 
-def _left_out(loops: Sequence[LoopLatency]) -> str:
+def _without(loops: Sequence[LoopLatency], others: str) -> list[str]:
+    """The lines on loops without a time, those first that were tried."""
+    none = [one for one in loops if one.verdict == "none"]
+    tried = [one for one in none if one.sampling is not None]
+    rest = [one for one in none if one.sampling is None]
+    lines = [*_groups(tried, "none"), *_groups(rest, "none")]
+    if len(lines) > NONES:
+        lines = [*lines[: NONES - 1], f"{lines[NONES - 1]}; for others: {others}"]
+    return lines
+
+
+def _left_out(loops: Sequence[LoopLatency], others: str) -> str:
     """How many times had no room in the table."""
     count = sum(one.verdict != "none" for one in loops) - ROWS
-    return f"{count} more time{'' if count == 1 else 's'}: --verbose" if count > 0 else ""
+    return f"{count} more time{'' if count == 1 else 's'}: {others}" if count > 0 else ""
 
 
 def _spread(loops: Sequence[LoopLatency]) -> str:

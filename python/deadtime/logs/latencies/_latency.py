@@ -29,10 +29,13 @@ from deadtime.logs.latencies._filters import FilterDelay, filters_of
 from deadtime.logs.latencies._live import around_the_vehicle
 from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._relation import LoopLatency, relation_of
-from deadtime.logs.latencies._table import LatencyTable
+from deadtime.logs.latencies._table import HEADS, LatencyTable, cells_of
 from deadtime.logs.latencies._windows import parts_of, prepared, together_of, windows_of
 from deadtime.logs.latencies._words import in_full
 from deadtime.recordings import Recording
+
+#: Standard error as a share of a time above which it is no headline while there is a better one.
+WIDE = 0.5
 
 #: A function that is called with the time of each loop, or whether to print them.
 Found: TypeAlias = bool | Callable[[LoopLatency], object]
@@ -153,15 +156,19 @@ class Latency(ReadOnlyArrays, Pictured):
         Needs matplotlib.
         """
         from deadtime._base.page import page, write_page
-        from deadtime.logs.latencies._page import budget_of, fit_of, row_of, sentence
+        from deadtime.logs.latencies._page import budget_of, fit_of, refused_of, sentence
 
         found = self.estimated
+        rows = [cells_of(one) for one in found]
+        used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
         text = page(
             "logs/latencies/page.html",
             title=f"Latencies in {self.source}",
             described=self.vehicle,
             verdict=self.headline(),
-            rows=[row_of(one) for one in found],
+            heads=[HEADS[k] for k in used],
+            rows=[[row[k] for k in used] for row in rows],
+            below=[sentence(line) for line in below(self, "below")],
             all=self._picture(),
             budget=budget_of(self.stages),
             filters=[
@@ -170,7 +177,7 @@ class Latency(ReadOnlyArrays, Pictured):
             ],
             link="" if self.link is None else sentence(self.link.summary()),
             fits=[fit_of(one, *_moves_of(one)) for one in found],
-            refused=[one for one in self.loops if one.verdict == "none"],
+            refused=refused_of(self.loops),
             remarks=self.remarks,
             around=around_the_vehicle(found),
         )
@@ -184,11 +191,12 @@ def _moves_of(one: LoopLatency) -> tuple[Moves | None, Moves | None]:
     return (None if one.plain is None else one.plain.aligned), one.answered
 
 
-def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
-    """Reliable times first, inner loops before outer ones, then the vehicle alone."""
+def _order(one: LoopLatency) -> tuple[bool, bool, int, bool, float]:
+    """Reliable times first, well known ones, inner loops before outer ones, the vehicle alone."""
     kinds = ("rate", "attitude", "velocity", "position", "")
     kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
-    return (one.verdict != "reliable", kind, one.command == "setpoint", one.stderr)
+    wide = not one.stderr < WIDE * one.time
+    return (one.verdict != "reliable", wide, kind, one.command == "setpoint", one.stderr)
 
 
 def latency(

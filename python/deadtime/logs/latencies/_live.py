@@ -35,7 +35,10 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
     reliable = [
         one
         for one in estimated
-        if one.cost and one.verdict == "reliable" and one.estimate and one.estimate.calibrated
+        if one.cost
+        and one.verdict == "reliable"
+        and one.estimate
+        and one.estimate.verdict != "none"
     ]
     if not reliable:
         return None

@@ -59,7 +59,7 @@ def plain_rows(one: LoopLatency) -> list[tuple[str, str, str]]:
 def _error(one: LoopLatency) -> float:
     """A quarter of the interval of the dead time; NaN where it has none."""
     assert one.estimate is not None
-    if not one.estimate.calibrated:
+    if one.estimate.verdict == "none":
         return math.nan
     low, high = one.estimate.ci(0.95, "delay")
     return 0.25 * (high - low)
