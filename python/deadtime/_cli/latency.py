@@ -112,7 +112,7 @@ def command(
     if out is not None:
         written = found[0].report(out)
         if not as_json:
-            print_text(f"report: {written}")
+            print_text(f"report: {written}", wrapped=False)
     if not any(one.estimated for one in found):
         raise typer.Exit(NONE)
 

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between as ends_of, stated
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import rough
 
 #: Fewest windows of a mean, and of a slope on the size of the movement.
 FEWEST, FEWEST_OF_SLOPE = 2, 4
@@ -72,7 +73,7 @@ class Spread:
         text = (
             f"{self.count} windows: {stated(self.mean, self.stderr, 's')} "
             f"(95 %: {ends_of(*self.interval, self.stderr, 's')}), "
-            f"{stated(self.between, 0.0, 's')} between windows"
+            f"{rough(self.between, 's')} between windows"
         )
         if (halved := self.halved()) is not None:
             way = "longer" if halved[0] > 0.0 else "shorter"
