@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from deadtime.logs import Advice, Latency, LatencyTable, LoopLatency, Spread
+from deadtime.logs import Advice, LatencyTable, LoopLatency, Spread
 from deadtime.logs.latencies._below import below
 
 NAN = float("nan")
@@ -19,7 +19,7 @@ def spread(slope=0.0, interval=(-1.0, 1.0), between=0.0, p_value=0.5):
 
 
 def lines_of(*loops, advice=()):
-    return below(Latency("flight.bin", "a vehicle", loops, advice=advice))
+    return below(loops, advice)
 
 
 def wanted(loops):

@@ -77,8 +77,8 @@ def test_the_page_reads_the_number_first_and_fits_a_phone(made, tmp_path):
     fit = fit_of(one, moves, fitted)
     text = page(
         "logs/latencies/page.html", title="Latencies", described="a vehicle", verdict="",
-        heads=[], rows=[], below=[], all=None, budget=[], filters=[], link="", fits=[fit], refused=[], remarks=[],
-        around=None,
+        heads=[], rows=[], below=[], all=None, budget=[], filters=[], link="", fits=[fit],
+        refused=[], remarks=[], around=None,
     )  # fmt: skip
     number = text.index('<p class="number">')
     assert text.index("<h2>Roll rate") < number < text.index("moves-0-caption")

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from deadtime._base.digits import stated
 from deadtime._base.verdicts import Verdict
+from deadtime.logs.latencies._advice import Advice
 from deadtime.logs.latencies._relation import LoopLatency
 from deadtime.logs.latencies._table import ROWS, SCREEN, about
-
-if TYPE_CHECKING:
-    from deadtime.logs.latencies._latency import Latency
 
 #: Most lines, how many of them are kept for what to log and to fly, and most on loops without a
 #: time.
@@ -34,15 +31,17 @@ _LEFT_OUT = re.compile(r"([\d.]+) s are left out: (.*)")
 _ENDS = re.compile("; |: |, which |, or ")
 
 
-def below(found: Latency, others: str = "--verbose") -> list[str]:
+def below(
+    loops: Sequence[LoopLatency], advice: Sequence[Advice], others: str = "--verbose"
+) -> list[str]:
     """At most five lines: what is most worth knowing, and what to log and to fly to know more.
 
     `others` is where there is more on loops that have no line.
     """
-    lines = [_left_out(found.loops, others), _spread(found.loops)]
-    lines += [*_groups(found.loops, "indication")[:1], *_without(found.loops, others)]
-    lines = [line for line in lines if line][: LINES - min(ADVICE, len(found.advice))]
-    more = [shortened("next: ", one.text) for one in found.advice]
+    lines = [_left_out(loops, others), _spread(loops)]
+    lines += [*_groups(loops, "indication")[:1], *_without(loops, others)]
+    lines = [line for line in lines if line][: LINES - min(ADVICE, len(advice))]
+    more = [shortened("next: ", one.text) for one in advice]
     return [*lines, *more[: LINES - len(lines)]]
 
 

@@ -111,7 +111,7 @@ class Latency(ReadOnlyArrays, Pictured):
 
     def below(self) -> list[str]:
         """What is most worth knowing, in at most five lines."""
-        return below(self)
+        return below(self.loops, self.advice)
 
     def details(self) -> str:
         """Every loop with its plant, its windows, its stages and what they cost."""
@@ -168,7 +168,7 @@ class Latency(ReadOnlyArrays, Pictured):
             verdict=self.headline(),
             heads=[HEADS[k] for k in used],
             rows=[[row[k] for k in used] for row in rows],
-            below=[sentence(line) for line in below(self, "below")],
+            below=[sentence(line) for line in below(self.loops, self.advice, "below")],
             all=self._picture(),
             budget=budget_of(self.stages),
             filters=[
