@@ -45,6 +45,15 @@ def below(
     return [*lines, *more[: LINES - len(lines)]]
 
 
+def refused_of(loops: Sequence[LoopLatency]) -> list[tuple[str, str]]:
+    """The names of the loops without a time that share a reason, and the whole reason."""
+    groups: dict[str, list[LoopLatency]] = {}
+    for one in loops:
+        if one.verdict == "none":
+            groups.setdefault(one.reason, []).append(one)
+    return [(names_of(some, len(some)), reason) for reason, some in groups.items()]
+
+
 def shortened(before: str, text: str, after: str = "") -> str:
     """Words with a text between, of which as many parts are kept as fit on a screen."""
     room = SCREEN - len(before) - len(after)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -19,7 +19,7 @@ from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
 from deadtime.logs.latencies._advice import Advice, advice
-from deadtime.logs.latencies._below import below
+from deadtime.logs.latencies._below import below, refused_of
 from deadtime.logs.latencies._beside import beside_plain_numbers
 from deadtime.logs.latencies._budget import Stage, stages_of
 from deadtime.logs.latencies._clocks import why_two_clocks
@@ -116,8 +116,10 @@ class Latency(ReadOnlyArrays, Pictured):
     def details(self) -> str:
         """Every loop with its plant, its windows, its stages and what they cost."""
         lines = [self.heading()]
-        for one in self.loops:
+        for one in self.estimated:
             lines += ["", *in_full(one, self.stages.get(one.loop, ()))]
+        if refused := refused_of(self.loops):
+            lines += ["", *(f"none: {names}: {reason}" for names, reason in refused)]
         if self.link is not None:
             lines += ["", self.link.summary()]
         ends = [*(one.line() for one in self.filters), *self.remarks]
@@ -156,7 +158,7 @@ class Latency(ReadOnlyArrays, Pictured):
         Needs matplotlib.
         """
         from deadtime._base.page import page, write_page
-        from deadtime.logs.latencies._page import budget_of, fit_of, refused_of, sentence
+        from deadtime.logs.latencies._page import budget_of, fit_of, sentence
 
         found = self.estimated
         rows = [cells_of(one) for one in found]
@@ -386,7 +388,10 @@ def _each_of(log: Log, wanted: list[tuple[LogLoop, Command]]) -> Iterator[LoopLa
     pool = ThreadPoolExecutor(min(len(wanted), os.cpu_count() or 1) or 1)
     done = False
     try:
-        begun = [pool.submit(latency_of, log, *one) for one in wanted]
+        # The first has the kernel for itself, for an early answer.
+        begun = [pool.submit(latency_of, log, *asked) for asked in wanted[:1]]
+        wait(begun)
+        begun += [pool.submit(latency_of, log, *asked) for asked in wanted[1:]]
         alike = [place for place, (loop, _) in enumerate(wanted) if loop.axis in ALIKE]
         judged: dict[int, LoopLatency] = {}
         for place, one in enumerate(begun):

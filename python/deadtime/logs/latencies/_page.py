@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from deadtime._base.verdicts import NOT_CLAIMED
-from deadtime.logs.latencies._below import names_of
 from deadtime.logs.latencies._budget import Stage
 from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._plots import plot_fit, plot_moves
@@ -60,15 +59,6 @@ def moves_of_page(moves: Moves, fitted: Moves | None = None) -> dict[str, object
     caption = sentence(f"{moves.headline()}{of_fit}")
     drawn = "Thin: the response to each move, as a share of the change; band: quartiles."
     return {"figure": figure, "caption": f"{caption} {drawn}"}
-
-
-def refused_of(loops: Sequence[LoopLatency]) -> list[tuple[str, str]]:
-    """The loops without a time that share a reason, and the reason."""
-    groups: dict[str, list[LoopLatency]] = {}
-    for one in loops:
-        if one.verdict == "none":
-            groups.setdefault(one.reason, []).append(one)
-    return [(names_of(some, len(some)), reason) for reason, some in groups.items()]
 
 
 def sentence(words: str) -> str:

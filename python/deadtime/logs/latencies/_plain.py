@@ -27,6 +27,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.digits import between as ends_of, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import rough
 from deadtime.logs._series import Series
 from deadtime.logs.latencies._commands import Between
 from deadtime.logs.latencies._correlation import (
@@ -85,11 +86,14 @@ class PlainTime(ReadOnlyArrays):
             return f"{self.name}: none, {self.reason}"
         low, high = self.interval
         error = 0.25 * (high - low)
-        known = f"{self.name}: {shown(self.value, error if error > 0.0 else 0.0, 's')}"
+        known = shown(self.value, error, "s") if error < math.inf else rough(self.value, "s")
+        known = f"{self.name}: {known}"
         if self.name == "cross-correlation":
             known += f", coefficient {self.quality:.2f}"
         if math.isnan(low):
             return f"{known}, {self.reason}"
+        if high == math.inf:
+            return f"{known} (95 %: {rough(low, 's')} or more)"
         return f"{known} (95 %: {ends_of(low, high, error, 's')})"
 
     def to_dict(self) -> dict[str, Any]:

@@ -6,16 +6,15 @@ import math
 from collections.abc import Sequence
 
 from deadtime._base.digits import shown, stated
-from deadtime._base.verdicts import claimed
+from deadtime._base.verdicts import claimed, rough
 from deadtime.logs.latencies._budget import Stage
+from deadtime.logs.latencies._plain import Difference
 from deadtime.logs.latencies._relation import LoopLatency
 from deadtime.logs.latencies._table import seen_in
 
 
 def in_full(one: LoopLatency, stages: Sequence[Stage] = ()) -> list[str]:
-    """All that is known of the time of a loop, a line each."""
-    if one.estimate is None:
-        return [one.headline()]
+    """All that is known of a loop that has a time, a line each."""
     lines = [one.headline(), *(f"  {words}" for words in said_of(one))]
     for name, measured, fitted in plain_rows(one):
         beside = f"; from the fit {fitted}" if fitted else ""
@@ -45,15 +44,20 @@ def plain_rows(one: LoopLatency) -> list[tuple[str, str, str]]:
     """The plain numbers: the method, what it gives for the log, and what for the fit."""
     if one.plain is None:
         return []
-    fitted = {
-        each.name: shown(each.modelled, 0.25 * (each.interval[1] - each.interval[0]), "s")
-        for each in one.differences
-    }
+    fitted = {each.name: _modelled(each) for each in one.differences}
     rows = []
     for plain in one.plain.all:
         name, _, measured = plain.line().partition(": ")
         rows.append((name, measured, fitted.get(plain.name, "")))
     return rows
+
+
+def _modelled(one: Difference) -> str:
+    """What a method gives for the fit, to the digits that its interval leaves."""
+    error = 0.25 * (one.interval[1] - one.interval[0])
+    if not math.isfinite(error):
+        return rough(one.modelled, "s")
+    return shown(one.modelled, error, "s")
 
 
 def _error(one: LoopLatency) -> float:
