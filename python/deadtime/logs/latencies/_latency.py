@@ -263,7 +263,7 @@ def latency(
     >>> angle = angle + 0.003 * np.random.default_rng(1).standard_normal(600)
     >>> found = dtm.latency(dtm.Recording(time, told, angle)).loops[0]
     >>> w = found.frequencies
-    >>> true = (0.03 + np.arctan(0.08 * w) / w) @ found.weights
+    >>> true = float((0.03 + np.arctan(0.08 * w) / w) @ found.weights)
     >>> low, high = found.interval
     >>> low < true < high
     True
