@@ -1,8 +1,10 @@
 """``deadtime inspect``: what a log holds, as text and as JSON."""
 
+import re
+
 import pytest
 from command_line import found, one_clear_line, run
-from made_logs import DataFlash, copter
+from made_logs import DataFlash, copter, flown_copter
 
 
 @pytest.fixture
@@ -67,3 +69,30 @@ def test_a_log_without_a_loop_is_no_answer(more, tmp_path):
     path = tmp_path / "flight.bin"
     path.write_bytes(log.data)
     assert run("inspect", path, *more).returncode == 3
+
+
+def test_one_screen_tells_filters_their_sum_and_what_the_rows_tell(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    path = tmp_path / "flight.bin"
+    path.write_bytes(flown_copter(seconds=6.0).data)
+    printed = run("inspect", path).stdout
+    assert "with these rows" in printed
+    assert "± " in next(line for line in printed.splitlines() if " roll rate " in line)
+    assert "gyro low-pass: 11.25 ms (INS_GYRO_FILTER 20)" in printed
+    assert "gyro path together: 11.25 ms (1 filter)" in printed
+    assert len(printed.splitlines()) <= 24
+
+
+def test_many_parameters_are_counted(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    log = flown_copter(seconds=3.0)
+    for axis in ("RLL", "PIT", "YAW"):
+        for gain in "PID":
+            log.add("PARM", 0, f"ATC_RAT_{axis}_{gain}", 0.135)
+    path = tmp_path / "flight.bin"
+    path.write_bytes(log.data)
+    printed = " ".join(run("inspect", path).stdout.split())
+    counted = re.search(r"parameters: (.*) and (\d+) more: --json", printed)
+    assert counted is not None
+    assert len(counted[1]) <= 160
+    assert int(counted[2]) + counted[1].count(",") + 1 == 11

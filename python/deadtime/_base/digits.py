@@ -37,7 +37,8 @@ def rounded(value: float, error: float) -> str:
     if not (math.isfinite(error) and error > 0.0):
         return f"{value:.{PLAIN}g}"
     digits = places(error)
-    return f"{round(value, digits):.{max(digits, 0)}f}"
+    # Zero has no sign, whichever way it was rounded from.
+    return f"{round(value, digits) + 0.0:.{max(digits, 0)}f}"
 
 
 def stated(value: float, error: float, unit: str = "") -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -24,6 +25,16 @@ from deadtime.logs import (
     open_log,
     promises_of,
 )
+
+#: Heads of the table of loops; the last is to what these rows tell the time from setpoint to
+#: response.
+HEADS = ("loop", "setpoint", "response", "rows/s", "followed", "with these rows")
+
+#: The parts of a quaternion in the name of a signal, which make it long.
+_QUATERNION = re.compile(r"\[0\]….*")
+
+#: Letters that two lines of a screen hold, less what is said of the rest.
+TWO_LINES = 160
 
 
 @filled
@@ -85,41 +96,42 @@ def _print_log(log: Log) -> None:
     if log.firmware:
         print_text(f"firmware: {log.firmware}")
     if log.modes:
-        spans = ", ".join(f"{name} from {at:.2f} s" for at, name in log.modes)
-        print_text(f"modes: {spans}")
+        _print_some("modes", [f"{name} from {at:.2f} s" for at, name in log.modes])
     if log.loops:
-        heads = ("loop", "setpoint", "response", "unit", "Hz", "followed, s", "actuator", "time")
-        left = ("loop", "setpoint", "response", "unit", "actuator", "time")
         promises = promises_of(log)
         rows = [_row(loop, promises.get(loop.name)) for loop in log.loops.values()]
-        print_table(results_table(heads, rows, left=left))
-        print_text("time: how well these rows can tell it, from setpoint to response")
+        print_table(results_table(HEADS, rows, left=("loop", "setpoint", "response")))
         print_points(_reasons(log))
     else:
         print_text("no loop: setpoint and response of none are in the log", "yellow")
     if log.key_parameters:
-        shown = ", ".join(f"{name} {value:g}" for name, value in log.key_parameters.items())
-        print_text(f"parameters: {shown}")
+        _print_some("parameters", [f"{name} {one:g}" for name, one in log.key_parameters.items()])
     for line in filter_lines(log):
         print_text(line)
-    if more := advice(log):
-        print_text("to know more:")
-        print_points([one.line() for one in more])
+    for one in advice(log):
+        print_text(f"next: {one.text}")
     if log.link is not None:
         print_text(log.link.summary())
     for remark in log.remarks:
         print_text(remark, "yellow")
 
 
+def _print_some(what: str, words: list[str]) -> None:
+    """As many words as two lines of a screen hold; the rest is counted."""
+    kept = words
+    while len(kept) > 1 and len(", ".join(kept)) + len(what) > TWO_LINES:
+        kept = kept[:-1]
+    more = f" and {len(words) - len(kept)} more: --json" if len(kept) < len(words) else ""
+    print_text(f"{what}: {', '.join(kept)}{more}")
+
+
 def _row(loop: LogLoop, promise: Promise | None) -> tuple[str, ...]:
+    rates = dict.fromkeys(f"{one.rate:.3g}" for one in (loop.setpoint, loop.response))
     return (
         loop.name,
-        loop.setpoint.source,
-        loop.response.source,
-        loop.response.unit,
-        f"{loop.setpoint.rate:.4g}, {loop.response.rate:.4g}",
-        f"{loop.followed:.2f}" if loop.segments else "never",
-        "" if loop.actuator is None else loop.actuator.source,
+        *(_QUATERNION.sub("", one.source) for one in (loop.setpoint, loop.response)),
+        ", ".join(rates),
+        f"{loop.followed:.1f} s" if loop.segments else "never",
         "" if promise is None else promise.short(),
     )
 

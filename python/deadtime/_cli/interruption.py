@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,6 +36,17 @@ def ended_by_ctrl_c() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def without_waiting_for_threads() -> Iterator[None]:
+    """End the process at once on Ctrl-C: Python would wait for what its threads still compute."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        sys.stdout.flush()
+        print(SAID, file=sys.stderr, flush=True)
+        os._exit(INTERRUPTED)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -12,20 +13,38 @@ from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.exit_codes import NONE
-from deadtime._cli.show import print_json, print_table, print_text, results, results_table
-from deadtime.logs import Latency, Log, compare_latencies, latency, loops_asked_for, open_log
+from deadtime._cli.interruption import without_waiting_for_threads
+from deadtime._cli.show import console, print_json, print_table, print_text, results, results_table
+from deadtime.logs import (
+    Latency,
+    LatencyTable,
+    Log,
+    LoopLatency,
+    compare_latencies,
+    heading_of,
+    is_bag,
+    latency,
+    loops_asked_for,
+    open_bag,
+    open_log,
+)
+from deadtime.recordings import Recording, is_table, read_recording
 
 #: Shortest log, s: the fastest rate loop takes 30 ms to respond, and has to be seen doing it twice.
 SHORTEST = 0.1
 
-LEFT = ("loop", "from", "why")
+#: Topics of a bag that an error lists.
+LISTED = 12
+
+LEFT = ("loop", "from", "outcome")
 
 
 def command(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="A log file, or two to compare: ULog, DataFlash (.bin or .log), tlog, Blackbox.",
+            help="A log file, or two to compare: ULog, DataFlash (.bin or .log), tlog, Blackbox; "
+            "or a table (CSV), or a bag (MCAP, ROS).",
             show_default=False,
         ),
     ],
@@ -36,59 +55,150 @@ def command(
     loop: Annotated[
         list[str] | None,
         typer.Option(
-            help="Only this loop, for example 'roll rate'; may be repeated.", show_default=False
+            help="This loop in full, for example 'roll rate'; may be repeated.",
+            show_default=False,
         ),
     ] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="All loops in full, below the table.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(help="Write a page with all fits, for one log.", show_default=False),
     ] = None,
+    command: Annotated[
+        str | None,
+        typer.Option(
+            help="Column of a table, or TOPIC:FIELD of a bag, that is followed.",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            help="Column of a table, or TOPIC:FIELD of a bag, that responds.", show_default=False
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            help="Column of a table that is followed, in place of --command.", show_default=False
+        ),
+    ] = None,
+    time: opt.Time = None,
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Tell how long each loop of a vehicle takes to respond, by stage, and what that costs."""
+    """Tell how long each loop of a vehicle takes to respond, by stage, and what that costs.
+
+    Exit codes: 0 a time, reliable or an indication; 3 none; 1 an error.
+    """
     if len(logs) > 2:
         raise ValueError(f"{len(logs)} logs were given: give one, or two to compare")
     if out is not None:
         check_pages()
         if len(logs) > 1:
             raise ValueError("--out writes the page of one log: give one, or leave it out")
-    found = [_told(open_log(one, flight=flight), axis, loop, as_json) for one in logs]
-    # Before anything is printed: whoever reads the output may close it.
-    written = None if out is None else found[0].report(out)
-    if as_json and len(found) == 1:
-        print_json("latency", found[0].to_dict())
-    elif as_json:
-        changes = [one.to_dict() for one in compare_latencies(*found)]
-        print_json("latency-change", {"logs": [one.to_dict() for one in found], "changes": changes})
-    else:
-        for one in found:
-            _print(one)
-        if len(found) == 2:
-            _print_changes(*found)
-    if written is not None and not as_json:
-        print_text(f"report: {written}")
+    columns = {"time": time, "reference": reference, "output": output, "command": command}
+    found = []
+    with without_waiting_for_threads():
+        for path in logs:
+            one = _opened(path, columns, flight)
+            found.append(_estimated(one, axis, loop, as_json, verbose))
+    if as_json:
+        _print_json(found)
+    elif len(found) == 2:
+        _print_changes(*found)
+    if out is not None:
+        written = found[0].report(out)
+        if not as_json:
+            print_text(f"report: {written}", wrapped=False)
     if not any(one.estimated for one in found):
         raise typer.Exit(NONE)
 
 
-def _told(log: Log, axes: list[str] | None, loops: list[str] | None, quiet: bool) -> Latency:
-    if log.duration < SHORTEST:
-        raise NotIdentifiableError(
-            f"{log.source} is {stated(log.duration, 0.0, 's')} long, in which no loop of a vehicle "
-            "responds: give a longer log"
+def _opened(path: Path, columns: Mapping[str, str | None], flight: int | None) -> Log | Recording:
+    """A log, or the recording of named columns of a table or fields of a bag."""
+    named = [f"--{name}" for name, column in columns.items() if column is not None]
+    # What is no file, such as a pipe, can be read only once.
+    kept = path.is_file() or path.is_dir()
+    if kept and is_bag(path):
+        return _of_bag(path, columns)
+    if kept and is_table(path):
+        # A reference alone is followed; otherwise a command of a usual name is looked for.
+        followed = columns["command"] or (None if columns["reference"] else "auto")
+        return read_recording(
+            path,
+            time=columns["time"],
+            reference=columns["reference"],
+            output=columns["output"],
+            command=followed,
         )
-    count = loops_asked_for(log, axes, loops)
-    with results(f"{log.source}, {count} times", count, quiet=quiet) as tell:
-        return latency(log, axes=axes, loops=loops, progress=tell)
+    found = open_log(path, flight=flight)
+    if named:
+        raise ValueError(
+            f"{path} is a {found.format} log, whose loops are known: leave {', '.join(named)} out"
+        )
+    if found.duration < SHORTEST:
+        raise NotIdentifiableError(
+            f"{found.source} is {stated(found.duration, 0.0, 's')} long, in which no loop of a "
+            "vehicle responds: give a longer log"
+        )
+    return found
 
 
-def _print(found: Latency) -> None:
-    headline, first, *rest = found.summary().splitlines()
-    print_text(headline, "bold")
-    print_text(first, "bold")
-    for line in rest:
-        print_text(line)
+def _of_bag(path: Path, columns: Mapping[str, str | None]) -> Recording:
+    bag = open_bag(path)
+    told, came = columns["command"], columns["output"]
+    if told is None or came is None:
+        names = [f"{one}:{field}" for one, topic in bag.topics.items() for field in topic.fields]
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        raise ValueError(
+            f"{path} is a bag: name what is followed and what responds by --command and --output, "
+            f"each TOPIC:FIELD; it has {', '.join(names[:LISTED]) or 'none'}{more}"
+        )
+    if columns["time"] is not None:
+        raise ValueError(f"{path} is a bag, whose messages have their times: leave --time out")
+    return bag.recording(told, came, columns["reference"])
+
+
+def _estimated(
+    log: Log | Recording,
+    axes: list[str] | None,
+    loops: list[str] | None,
+    quiet: bool,
+    verbose: bool,
+) -> Latency:
+    """The times of a log, each printed as soon as it is found."""
+    wanted = loops_asked_for(log, axes, loops)
+    table = LatencyTable(wanted, console.width if console.is_terminal else None)
+    in_full = loops is not None
+    if not (quiet or in_full):
+        print_text(f"{heading_of(log)}\n", wrapped=False)
+        print_text(table.head(), "bold", wrapped=False)
+    with results(f"{len(wanted)} times", len(wanted), quiet=quiet) as tell:
+
+        def show(one: LoopLatency) -> None:
+            tell(None if in_full else table.row(one))
+
+        found = latency(log, axes=axes, loops=loops, progress=show)
+    if quiet:
+        return found
+    if not in_full:
+        print_text("")
+        for line in found.below():
+            print_text(line)
+    if in_full or verbose:
+        print_text(found.details())
+    return found
+
+
+def _print_json(found: list[Latency]) -> None:
+    if len(found) == 1:
+        print_json("latency", found[0].to_dict())
+        return
+    changes = [one.to_dict() for one in compare_latencies(*found)]
+    print_json("latency-change", {"logs": [one.to_dict() for one in found], "changes": changes})
 
 
 def _print_changes(one: Latency, other: Latency) -> None:
@@ -108,4 +218,4 @@ def _print_changes(one: Latency, other: Latency) -> None:
         for change in changes
     ]
     heads = ("loop", "from", one.source, other.source, "change, 95 %", "outcome")
-    print_table(results_table(heads, rows, left=(*LEFT, "outcome")))
+    print_table(results_table(heads, rows, left=LEFT))

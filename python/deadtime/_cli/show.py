@@ -95,14 +95,16 @@ ERRORS = Console(stderr=True)
 
 
 @contextmanager
-def _bar(what: str, total: int, quiet: bool) -> Iterator[Callable[..., object]]:
-    """Change a progress bar on standard error, which is removed at its end, if there is one."""
-    if quiet or not ERRORS.is_terminal:
+def _bar(
+    what: str, total: int, quiet: bool, on: Console = ERRORS
+) -> Iterator[Callable[..., object]]:
+    """Change a progress bar, which is removed at its end, if there is one."""
+    if quiet or not on.is_terminal:
         yield lambda **change: None
         return
     words = TextColumn("{task.description}")
     columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=ERRORS, transient=True) as progress:
+    with Progress(*columns, console=on, transient=True) as progress:
         yield partial(progress.update, progress.add_task(printable(what), total=total))
 
 
@@ -114,13 +116,17 @@ def counted(what: str, total: int, quiet: bool) -> Iterator[bool | Callable[[int
 
 
 @contextmanager
-def results(what: str, count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Lines on standard error as results come, above a progress bar over so many."""
-    with _bar(what, count, quiet) as change:
+def results(what: str, count: int, quiet: bool) -> Iterator[Callable[[str | None], None]]:
+    """Print lines on standard output as results come, above a progress bar over so many.
 
-        def tell(line: str) -> None:
-            if not quiet and ERRORS.is_terminal:
-                print_text(line, wrapped=False, on=ERRORS)
+    Each line is there at once, in a pipe too. Beside a pipe there is no bar: who reads it may
+    write on the same terminal.
+    """
+    with _bar(what, count, quiet, console) as change:
+
+        def tell(line: str | None) -> None:
+            if line is not None and not quiet:
+                print_text(line, wrapped=False)
             change(advance=1)
 
         yield tell

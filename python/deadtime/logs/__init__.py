@@ -29,7 +29,11 @@ from deadtime.logs.latencies import (
     promises_of,
     spread_of,
 )
-from deadtime.logs.latencies._latency import loops_asked_for as loops_asked_for
+from deadtime.logs.latencies._latency import (
+    heading_of as heading_of,
+    loops_asked_for as loops_asked_for,
+)
+from deadtime.logs.latencies._table import LatencyTable as LatencyTable
 
 __all__ = [
     "Advice",

@@ -10,6 +10,7 @@ from deadtime.recordings._findings import Columns as Columns, Finding
 from deadtime.recordings._first_bytes import (
     HEAD as HEAD,
     format_of as format_of,
+    is_table as is_table,
     opened as opened,
     whole as whole,
 )

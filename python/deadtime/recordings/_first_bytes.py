@@ -135,6 +135,20 @@ def opened(path: str | os.PathLike[str]) -> FileIO:
     return stream
 
 
+def is_table(path: str | os.PathLike[str]) -> bool:
+    """Whether the first bytes of a file are those of a table.
+
+    Raises
+    ------
+    RecordingError
+        When it cannot be read.
+    """
+    with opened(path) as stream:
+        head = stream.read(HEAD)
+    kind = next((kind for kind in KINDS if kind.begins(head)), None)
+    return bool(head) and kind is not None and kind.opener == "read_recording"
+
+
 def _too_large(path: object) -> RecordingError:
     return RecordingError(
         f"{path} has more than {LARGEST_FILE} bytes, or no end: give a part of it"

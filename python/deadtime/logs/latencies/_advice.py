@@ -106,8 +106,8 @@ def _flown(facts: Facts) -> str:
     count = int(min(max(math.ceil(more), FEWEST), MOST))
     held = shown(HELD * promise.time, promise.time, "s")
     return (
-        f"{loop.name}: fly {count} quick changes of its setpoint, of different sizes, each held "
-        f"for {held} or more; these rows tell its time to {promise.short()}"
+        f"{loop.name}: fly {count} quick changes of different sizes, each held for {held} or more; "
+        f"now {promise.short()}"
     )
 
 

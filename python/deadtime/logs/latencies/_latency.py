@@ -3,34 +3,42 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from deadtime._base.digits import stated
 from deadtime._base.drawing import Figure
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain_fields
-from deadtime._base.progress import Stages, stage_report
 from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
-from deadtime.logs.latencies._advice import advice
+from deadtime.logs.latencies._advice import Advice, advice
+from deadtime.logs.latencies._below import below, refused_of
 from deadtime.logs.latencies._beside import beside_plain_numbers
 from deadtime.logs.latencies._budget import Stage, stages_of
 from deadtime.logs.latencies._clocks import why_two_clocks
 from deadtime.logs.latencies._commands import Command, averaged, sampling_of
-from deadtime.logs.latencies._contradictions import doubted_by_others
+from deadtime.logs.latencies._contradictions import ALIKE, doubted_by_others
 from deadtime.logs.latencies._filters import FilterDelay, filters_of
 from deadtime.logs.latencies._live import around_the_vehicle
 from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._relation import LoopLatency, relation_of
+from deadtime.logs.latencies._table import HEADS, LatencyTable, cells_of
 from deadtime.logs.latencies._windows import parts_of, prepared, together_of, windows_of
-from deadtime.logs.latencies._words import in_full, table_of
+from deadtime.logs.latencies._words import in_full
 from deadtime.recordings import Recording
+
+#: Standard error as a share of a time above which it is no headline while there is a better one.
+WIDE = 0.5
+
+#: A function that is called with the time of each loop, or whether to print them.
+Found: TypeAlias = bool | Callable[[LoopLatency], object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +60,7 @@ class Latency(ReadOnlyArrays, Pictured):
         What was damaged or left out of the log.
     link : Link or None
         The way of the messages to the ground station, in a tlog.
-    advice : tuple of str
+    advice : tuple of Advice
         What to log and to fly to know more.
     """
 
@@ -63,7 +71,7 @@ class Latency(ReadOnlyArrays, Pictured):
     filters: tuple[FilterDelay, ...] = ()
     remarks: tuple[str, ...] = ()
     link: Link | None = None
-    advice: tuple[str, ...] = ()
+    advice: tuple[Advice, ...] = ()
 
     def loop(self, name: str, command: Command = "setpoint") -> LoopLatency:
         """The time of one loop.
@@ -93,17 +101,30 @@ class Latency(ReadOnlyArrays, Pictured):
 
     def summary(self) -> str:
         """All loops in one table, a line each, and what is most worth knowing."""
-        table = table_of(self.loops, self.advice)
-        return "\n".join([self.headline(), f"{self.source}: {self.vehicle}", "", *table])
+        table = LatencyTable([(one.loop, one.command) for one in self.loops])
+        lines = [self.heading(), "", table.head(), *table.rows(self.loops), "", *self.below()]
+        return "\n".join(lines).rstrip()
+
+    def heading(self) -> str:
+        """File and vehicle."""
+        return f"{self.source}: {self.vehicle}"
+
+    def below(self) -> list[str]:
+        """What is most worth knowing, in at most five lines."""
+        return below(self.loops, self.advice)
 
     def details(self) -> str:
         """Every loop with its plant, its windows, its stages and what they cost."""
-        lines = [self.headline(), f"{self.source}: {self.vehicle}"]
-        for one in self.loops:
+        lines = [self.heading()]
+        for one in self.estimated:
             lines += ["", *in_full(one, self.stages.get(one.loop, ()))]
+        if refused := refused_of(self.loops):
+            lines += ["", *(f"none: {names}: {reason}" for names, reason in refused)]
         if self.link is not None:
             lines += ["", self.link.summary()]
-        return "\n".join([*lines, "", *self.remarks])
+        ends = [*(one.line() for one in self.filters), *self.remarks]
+        ends += [f"to know more: {one.line()}" for one in self.advice]
+        return "\n".join([*lines, "", *ends]).rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """All results as plain values for JSON."""
@@ -118,6 +139,7 @@ class Latency(ReadOnlyArrays, Pictured):
                 "filters": [one._asdict() for one in self.filters],
                 "remarks": self.remarks,
                 "link": None if self.link is None else self.link.to_dict(),
+                "advice": [one._asdict() for one in self.advice],
             }
         )
 
@@ -136,15 +158,19 @@ class Latency(ReadOnlyArrays, Pictured):
         Needs matplotlib.
         """
         from deadtime._base.page import page, write_page
-        from deadtime.logs.latencies._page import budget_of, fit_of, row_of, sentence
+        from deadtime.logs.latencies._page import budget_of, fit_of, sentence
 
         found = self.estimated
+        rows = [cells_of(one) for one in found]
+        used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
         text = page(
             "logs/latencies/page.html",
             title=f"Latencies in {self.source}",
             described=self.vehicle,
             verdict=self.headline(),
-            rows=[row_of(one) for one in found],
+            heads=[HEADS[k] for k in used],
+            rows=[[row[k] for k in used] for row in rows],
+            below=[sentence(line) for line in below(self.loops, self.advice, "below")],
             all=self._picture(),
             budget=budget_of(self.stages),
             filters=[
@@ -153,7 +179,7 @@ class Latency(ReadOnlyArrays, Pictured):
             ],
             link="" if self.link is None else sentence(self.link.summary()),
             fits=[fit_of(one, *_moves_of(one)) for one in found],
-            refused=[one for one in self.loops if one.verdict == "none"],
+            refused=refused_of(self.loops),
             remarks=self.remarks,
             around=around_the_vehicle(found),
         )
@@ -167,11 +193,12 @@ def _moves_of(one: LoopLatency) -> tuple[Moves | None, Moves | None]:
     return (None if one.plain is None else one.plain.aligned), one.answered
 
 
-def _order(one: LoopLatency) -> tuple[bool, int, bool, float]:
-    """Reliable times first, inner loops before outer ones, then the vehicle alone."""
+def _order(one: LoopLatency) -> tuple[bool, bool, int, bool, float]:
+    """Reliable times first, well known ones, inner loops before outer ones, the vehicle alone."""
     kinds = ("rate", "attitude", "velocity", "position", "")
     kind = kinds.index(one.kind) if one.kind in kinds else len(kinds)
-    return (one.verdict != "reliable", kind, one.command == "setpoint", one.stderr)
+    wide = not one.stderr < WIDE * one.time
+    return (one.verdict != "reliable", wide, kind, one.command == "setpoint", one.stderr)
 
 
 def latency(
@@ -179,7 +206,7 @@ def latency(
     *,
     axes: Iterable[str] | None = None,
     loops: Iterable[str] | None = None,
-    progress: Stages = False,
+    progress: Found = False,
 ) -> Latency:
     """Estimate for every loop of a log how long it takes to respond.
 
@@ -193,7 +220,8 @@ def latency(
     loops : iterable of str, optional
         Only loops of these names, such as ``("roll rate",)``.
     progress : bool or callable, optional
-        Print the time of each loop as soon as it is found, or call a function with that line.
+        Print the row of each loop as soon as it is found, or call a function with each
+        `LoopLatency`; in the order of the loops.
 
     Returns
     -------
@@ -235,31 +263,49 @@ def latency(
     >>> angle = angle + 0.003 * np.random.default_rng(1).standard_normal(600)
     >>> found = dtm.latency(dtm.Recording(time, told, angle)).loops[0]
     >>> w = found.frequencies
-    >>> true = (0.03 + np.arctan(0.08 * w) / w) @ found.weights
+    >>> true = float((0.03 + np.arctan(0.08 * w) / w) @ found.weights)
     >>> low, high = found.interval
     >>> bool(low < true < high)
     True
     """
-    report = stage_report(progress)
     if isinstance(log, Recording):
-        return _of_recording(log)
+        report = _reported(progress, loops_asked_for(log, axes, loops))
+        found = _of_recording(log)
+        report(found.loops[0])
+        return found
     if not isinstance(log, Log):
         log = open_log(log)
     chosen = _chosen(log, axes, loops)
     wanted = [(loop, one) for loop in chosen for one in _commands(loop)]
-    found = doubted_by_others(_all_of(log, wanted, report))
+    report = _reported(progress, [(loop.name, one) for loop, one in wanted])
+    times = []
+    for one in _each_of(log, wanted):
+        times.append(one)
+        report(one)
     filters = filters_of(log)
-    stages = {loop.name: stages_of(log, loop.name, found, filters) for loop in chosen}
-    vehicle = " ".join(one for one in (log.autopilot, log.vehicle, log.firmware) if one)
+    stages = {loop.name: stages_of(log, loop.name, times, filters) for loop in chosen}
     return Latency(
         source=log.source,
-        vehicle=vehicle or log.format,
-        loops=tuple(found),
+        vehicle=_vehicle_of(log),
+        loops=tuple(times),
         stages=FrozenDict({name: some for name, some in stages.items() if some}),
         filters=filters,
         remarks=(*log.remarks, *_sent_from_the_ground(log, chosen)),
         link=log.link,
-        advice=tuple(one.line() for one in advice(log, [loop.name for loop in chosen])),
+        advice=advice(log, [loop.name for loop in chosen]),
+    )
+
+
+def heading_of(log: Log | Recording) -> str:
+    """File and vehicle, as the times of a log begin."""
+    return f"{_name_of(log) if isinstance(log, Recording) else log.source}: {_vehicle_of(log)}"
+
+
+def _vehicle_of(log: Log | Recording) -> str:
+    if isinstance(log, Recording):
+        return "a recording"
+    return " ".join(part for part in (log.autopilot, log.vehicle, log.firmware) if part) or (
+        log.format
     )
 
 
@@ -301,32 +347,62 @@ def _chosen(log: Log, axes: Iterable[str] | None, names: Iterable[str] | None) -
 
 
 def loops_asked_for(
-    log: Log, axes: Iterable[str] | None = None, loops: Iterable[str] | None = None
-) -> int:
-    """How many times `latency` will estimate."""
-    return sum(len(list(_commands(loop))) for loop in _chosen(log, axes, loops))
+    log: Log | Recording, axes: Iterable[str] | None = None, loops: Iterable[str] | None = None
+) -> list[tuple[str, Command]]:
+    """The loops whose times `latency` estimates, and from what, in its order."""
+    if isinstance(log, Recording):
+        if axes is not None or loops is not None:
+            raise ValueError(f"{log.source or 'the recording'} has one loop: name no axis or loop")
+        return [(_name_of(log), "setpoint" if log.command is None else "actuator")]
+    return [(loop.name, one) for loop in _chosen(log, axes, loops) for one in _commands(loop)]
 
 
-def _all_of(
-    log: Log, wanted: list[tuple[LogLoop, Command]], report: Callable[[str], object]
-) -> list[LoopLatency]:
-    """Each in a thread: the kernel computes beside the interpreter.
+def _reported(
+    progress: Found, wanted: Sequence[tuple[str, Command]]
+) -> Callable[[LoopLatency], object]:
+    """The function to call with each time; True prints the rows of the table on stderr."""
+    if not isinstance(progress, bool):
+        if not callable(progress):
+            raise TypeError(
+                f"progress={progress!r}: give True to print each time, or a function of it"
+            )
+        return progress
+    if not progress:
+        return lambda one: None
+    table = LatencyTable(wanted)
+    print(table.head(), file=sys.stderr, flush=True)
 
-    One of few rows comes first, for an early answer, then those of many: no core waits long for the
-    last.
+    def show(one: LoopLatency) -> None:
+        if (row := table.row(one)) is not None:
+            print(row, file=sys.stderr, flush=True)
+
+    return show
+
+
+def _each_of(log: Log, wanted: list[tuple[LogLoop, Command]]) -> Iterator[LoopLatency]:
+    """The times in their order, each as soon as those before it are found.
+
+    Each in a thread: the kernel computes beside the interpreter. Loops that may contradict each
+    other are awaited together.
     """
     pool = ThreadPoolExecutor(min(len(wanted), os.cpu_count() or 1) or 1)
-    order = sorted(range(len(wanted)), key=lambda k: wanted[k][0].response.rate)
-    order = [*order[:1], *order[:0:-1]]
+    done = False
     try:
-        begun = {pool.submit(latency_of, log, *wanted[k]): k for k in order}
-        found = {}
-        for one in as_completed(begun):
-            found[begun[one]] = one.result()
-            report(one.result().headline())
-        return [found[k] for k in range(len(wanted))]
+        # The first has the kernel for itself, for an early answer.
+        begun = [pool.submit(latency_of, log, *asked) for asked in wanted[:1]]
+        wait(begun)
+        begun += [pool.submit(latency_of, log, *asked) for asked in wanted[1:]]
+        alike = [place for place, (loop, _) in enumerate(wanted) if loop.axis in ALIKE]
+        judged: dict[int, LoopLatency] = {}
+        for place, one in enumerate(begun):
+            if place in alike and not judged:
+                both = doubted_by_others([begun[k].result() for k in alike])
+                judged = dict(zip(alike, both, strict=True))
+            yield judged[place] if place in judged else one.result()
+        done = True
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        # After Ctrl-C nobody waits for what the kernel still computes.
+        pool.shutdown(wait=done, cancel_futures=True)
 
 
 def _commands(loop: LogLoop) -> Iterator[Command]:
@@ -367,19 +443,21 @@ def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
 
 def _of_recording(recording: Recording) -> Latency:
     """A single recording: from its command, or from its reference where it has none."""
-    follows = recording.command is None
-    command: Command = "setpoint" if follows else "actuator"
+    ((name, command),) = loops_asked_for(recording)
     told = recording
-    if follows:
+    if command == "setpoint":
         told = Recording(
             recording.time, recording.reference, recording.output,
             command=recording.reference, units=recording.units, source=recording.source,
         )  # fmt: skip
-    name = recording.source or "recording"
     whole, parts = parts_of(told)
     one = relation_of(LoopLatency(name, "", "", command, "none", ""), parts, whole.window)
     if recording.sent is not None and one.verdict != "none":
         clocks = (("the commands", recording.sent.time), ("the rows", recording.time))
         if why := why_two_clocks(one, *clocks):
             one = one.doubted(why)
-    return Latency(name, "a recording", (one,))
+    return Latency(name, _vehicle_of(recording), (one,))
+
+
+def _name_of(recording: Recording) -> str:
+    return recording.source or "recording"

@@ -32,7 +32,14 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
     Of several vehicles, such as that of the rate and that of the angle, the one whose gain is
     known, and then the one of the least error.
     """
-    reliable = [one for one in estimated if one.cost and one.verdict == "reliable"]
+    reliable = [
+        one
+        for one in estimated
+        if one.cost
+        and one.verdict == "reliable"
+        and one.estimate
+        and one.estimate.verdict != "none"
+    ]
     if not reliable:
         return None
     one = min(reliable, key=lambda one: (_flown(one) is None, one.stderr))

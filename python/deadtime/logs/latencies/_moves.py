@@ -234,7 +234,7 @@ def aligned(
 
 def median_of(times: Array) -> tuple[float, tuple[float, float], float]:
     """Median, its interval by order statistics, and the coverage of that; NaN below six times."""
-    from scipy.stats import binom
+    from scipy.special import bdtr
 
     n = times.size
     if n == 0:
@@ -242,12 +242,11 @@ def median_of(times: Array) -> tuple[float, tuple[float, float], float]:
     ordered = np.sort(times)
     # The mean of the two in the middle, either of which may be infinite.
     median = 0.5 * float(ordered[(n - 1) // 2] + ordered[n // 2])
-    k = int(binom.ppf(0.5 * (1.0 - COVERAGE), n, 0.5))
-    while k > 0 and 2.0 * binom.cdf(k - 1, n, 0.5) > 1.0 - COVERAGE:
-        k -= 1
+    below = bdtr(np.arange(n), n, 0.5)
+    k = int(np.count_nonzero(below <= 0.5 * (1.0 - COVERAGE)))
     if k == 0:
         return median, (math.nan, math.nan), math.nan
-    coverage = 1.0 - 2.0 * float(binom.cdf(k - 1, n, 0.5))
+    coverage = 1.0 - 2.0 * float(below[k - 1])
     return median, (float(ordered[k - 1]), float(ordered[n - k])), coverage
 
 

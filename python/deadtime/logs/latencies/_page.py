@@ -4,21 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from deadtime._base.digits import between
-from deadtime._base.verdicts import NOT_CLAIMED, claimed
+from deadtime._base.verdicts import NOT_CLAIMED
 from deadtime.logs.latencies._budget import Stage
 from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._plots import plot_fit, plot_moves
 from deadtime.logs.latencies._relation import LoopLatency
-from deadtime.logs.latencies._words import said_of
-
-
-def row_of(one: LoopLatency) -> tuple[str, ...]:
-    """A loop in the table of times."""
-    reliable = one.verdict == "reliable"
-    ends = between(*one.interval, one.stderr, "s") if reliable else NOT_CLAIMED
-    time = claimed(one.verdict, one.time, one.stderr, "s")
-    return (one.loop, one.command, time, ends, one.verdict)
+from deadtime.logs.latencies._table import cells_of
+from deadtime.logs.latencies._words import plain_rows, said_of
 
 
 def budget_of(stages: Mapping[str, Sequence[Stage]]) -> list[tuple[str, ...]]:
@@ -41,14 +33,14 @@ def fit_of(
     start, stop = one.windows[0]
     number = len(one.windows)
     more = f", the best of {number} that were fitted together" if number > 1 else ""
-    _, command, verdict, time, ends = row_of(one)
+    _, command, time, ends, verdict, seen, *_ = cells_of(one)
+    held = f"95 %: {ends}" if ends else NOT_CLAIMED
     return {
         "heading": _capital(one.name),
         "number": time,
-        "beside": f"{verdict}, from the {command}; 95 %: {ends}"
-        if verdict == "reliable"
-        else f"{verdict}, from the {command}; {ends}",
+        "beside": f"{verdict}; {held}; from the {command}, seen in {seen}",
         "sentences": [sentence(words) for words in said_of(one)],
+        "plain": plain_rows(one),
         "moves": None if moves is None else moves_of_page(moves, fitted),
         "figure": plot_fit(one),
         "caption": f"The window from {start:.1f} to {stop:.1f} s{more}.",

@@ -27,6 +27,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.digits import between as ends_of, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import rough
 from deadtime.logs._series import Series
 from deadtime.logs.latencies._commands import Between
 from deadtime.logs.latencies._correlation import (
@@ -85,11 +86,14 @@ class PlainTime(ReadOnlyArrays):
             return f"{self.name}: none, {self.reason}"
         low, high = self.interval
         error = 0.25 * (high - low)
-        known = f"{self.name}: {shown(self.value, error if error > 0.0 else 0.0, 's')}"
+        known = shown(self.value, error, "s") if error < math.inf else rough(self.value, "s")
+        known = f"{self.name}: {known}"
         if self.name == "cross-correlation":
             known += f", coefficient {self.quality:.2f}"
         if math.isnan(low):
             return f"{known}, {self.reason}"
+        if high == math.inf:
+            return f"{known} (95 %: {rough(low, 's')} or more)"
         return f"{known} (95 %: {ends_of(low, high, error, 's')})"
 
     def to_dict(self) -> dict[str, Any]:
@@ -307,10 +311,10 @@ def _with_interval(
 
 def _interval(value: float, parts: Array) -> tuple[float, float]:
     """The interval of the jackknife; NaN where a part has no number or there are too few."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     if parts.size < FEWEST or not np.isfinite(parts).all():
         return math.nan, math.nan
     error = math.sqrt((parts.size - 1) * float(np.var(parts)))
-    reach = float(t.ppf(0.5 * (1.0 + COVERAGE), parts.size - 1)) * error
+    reach = float(stdtrit(parts.size - 1, 0.5 * (1.0 + COVERAGE))) * error
     return value - reach, value + reach

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -76,22 +77,19 @@ def plot_moves(
     ax.plot(time[::EVERY], rows.T, color="0.5", lw=0.5, alpha=0.4)
     ax.fill_between(time, moves.lower, moves.upper, color=COLOURS[0], alpha=0.2, lw=0.0)
     ax.plot(time, moves.setpoint, color="0.0", lw=1.2, ls="--", label="setpoint")
-    ax.plot(time, moves.response, color=COLOURS[0], lw=2.0, label="response, median and quartiles")
+    label = f"response {moves.shown(moves.median)}: median, quartiles"
+    ax.plot(time, moves.response, color=COLOURS[0], lw=2.0, label=label)
+    marks = [(moves.median, moves.response, COLOURS[0])]
     if fit_response is not None:
-        ax.plot(time, fit_response, color=COLOURS[1], lw=1.4, label="fit")
-    marks = [(moves.median, moves.response, COLOURS[0], "response"),
-             (fit_time, fit_response, COLOURS[1], "fit")]  # fmt: skip
-    for place, (at, path, colour, name) in enumerate(marks):
-        if at is None or not np.isfinite(at):
-            continue
-        half = 0.5 if path is None else float(np.interp(at, moves.time, np.nan_to_num(path)))
-        ax.plot([at / factor] * 2, [0.0, half], color=colour, lw=1.2, ls=":")
-        ax.plot(at / factor, half, color=colour, marker="o", ms=6)
-        label = f"{name} {moves.shown(at)}"
-        ax.annotate(
-            label, (at / factor, half), (10, -4 - 14 * place),
-            textcoords="offset points", color="0.0", fontweight="bold",
-        )  # fmt: skip
+        at = math.nan if fit_time is None else fit_time
+        label = f"fit {moves.shown(at)}" if math.isfinite(at) else "fit"
+        ax.plot(time, fit_response, color=COLOURS[1], lw=1.4, label=label)
+        marks.append((at, fit_response, COLOURS[1]))
+    for at, path, colour in marks:
+        if math.isfinite(at):
+            half = float(np.interp(at, moves.time, np.nan_to_num(path)))
+            ax.plot([at / factor] * 2, [0.0, half], color=colour, lw=1.2, ls=":")
+            ax.plot(at / factor, half, color=colour, marker="o", ms=6)
     known = np.isfinite(moves.response)
     if known.any():
         ax.set_xlim(time[known][0], time[known][-1])

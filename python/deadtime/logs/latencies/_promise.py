@@ -27,7 +27,7 @@ from deadtime._base.plain import plain_fields
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._series import Series
 from deadtime.logs.latencies._commands import period_of
-from deadtime.logs.latencies._correlation import Grid, grid_of, peak_of
+from deadtime.logs.latencies._correlation import Grid, correlated, grid_of, peak_of
 from deadtime.logs.latencies._windows import LENGTHS, LONGEST
 
 #: Lags that are tried, in rough times from setpoint to response.
@@ -234,20 +234,17 @@ def _crossed(
     asked: list[Array], came: list[Array], step: float, longest: float
 ) -> tuple[Array, Array]:
     """Sums of asked(t - lag) came(t) over all pieces, by lag from one step ahead, s."""
-    from scipy.signal import correlate
-
     count = round(longest / step)
     total = np.zeros(count + 2)
     for x, y in zip(asked, came, strict=True):
-        full = correlate(y, x, "full", "fft")
-        part = full[x.size - 2 : x.size + count]
-        total[: part.size] += part
+        total += correlated(np.pad(y, (1, count)), x)
     return np.asarray((np.arange(total.size) - 1) * step), total
 
 
 def _lagged(values: Array, rows: float) -> Array:
     """A signal behind one lag of so many rows, at rest before its first value."""
-    from scipy.signal import lfilter
+    from scipy.linalg import solve_banded
 
     decay = math.exp(-1.0 / max(rows, 1e-3))
-    return np.asarray(lfilter([1.0 - decay], [1.0, -decay], values, zi=[decay * values[0]])[0])
+    bands = np.stack([np.ones(values.size), np.full(values.size, -decay)])
+    return np.asarray(solve_banded((1, 0), bands, np.append(values[0], (1.0 - decay) * values[1:])))

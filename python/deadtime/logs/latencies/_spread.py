@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between as ends_of, stated
 from deadtime._base.plain import plain_fields
+from deadtime._base.verdicts import rough
 
 #: Fewest windows of a mean, and of a slope on the size of the movement.
 FEWEST, FEWEST_OF_SLOPE = 2, 4
@@ -72,18 +73,24 @@ class Spread:
         text = (
             f"{self.count} windows: {stated(self.mean, self.stderr, 's')} "
             f"(95 %: {ends_of(*self.interval, self.stderr, 's')}), "
-            f"{stated(self.between, 0.0, 's')} between windows"
+            f"{rough(self.between, 's')} between windows"
         )
-        low, high = self.slope_interval
-        if low > 0.0 or high < 0.0:
-            # Per factor of two, which is easier to think of than e.
-            way = "longer" if self.slope < 0.0 else "shorter"
-            half = math.log(2.0)
-            error = 0.25 * half * (high - low)
-            text += (
-                f"; {stated(half * abs(self.slope), error, 's')} {way} where it moves half as much"
-            )
+        if (halved := self.halved()) is not None:
+            way = "longer" if halved[0] > 0.0 else "shorter"
+            text += f"; {stated(abs(halved[0]), halved[1], 's')} {way} where it moves half as much"
         return text
+
+    def halved(self) -> tuple[float, float] | None:
+        """By how much longer it takes where it moves half as much, and the error of that, s.
+
+        None where that may be zero, or is not known.
+        """
+        low, high = self.slope_interval
+        if not (low > 0.0 or high < 0.0):
+            return None
+        # Per factor of two, which is easier to think of than e.
+        half = math.log(2.0)
+        return -half * self.slope, 0.25 * half * (high - low)
 
     def to_dict(self) -> dict[str, Any]:
         """The spread as plain values for JSON."""
@@ -131,7 +138,7 @@ def spread_of(
     >>> round(found.mean, 4), round(found.between, 4), round(found.heterogeneity, 2)
     (0.115, 0.0119, 0.85)
     """
-    from scipy.stats import chi2, t
+    from scipy.special import chdtrc, stdtrit
 
     time, error = (np.asarray(one, dtype=float) for one in (times, errors))
     size = np.full(time.shape, np.nan) if sizes is None else np.asarray(sizes, dtype=float)
@@ -150,13 +157,13 @@ def spread_of(
                       math.nan, nothing)  # fmt: skip
     line = _line(time, error, np.ones((count, 1)))
     mean, stderr = float(line.numbers[0]), math.sqrt(float(line.covariance[0, 0]))
-    reach = float(t.ppf(0.5 * (1.0 + level), line.degrees))
+    reach = float(stdtrit(line.degrees, 0.5 * (1.0 + level)))
     tau = math.sqrt(line.between)
     share = max(0.0, 1.0 - line.degrees / line.left) if line.left > 0.0 else 0.0
     slope, ends = _slope(time, error, size, level)
     return Spread(
         count, mean, stderr, (mean - reach * stderr, mean + reach * stderr), tau,
-        share, float(chi2.sf(line.left, line.degrees)), slope, ends,
+        share, float(chdtrc(line.degrees, line.left)), slope, ends,
     )  # fmt: skip
 
 
@@ -164,7 +171,7 @@ def _slope(
     time: Array, error: Array, size: Array, level: float
 ) -> tuple[float, tuple[float, float]]:
     """Slope of the time on the logarithm of the size, and its interval."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     known = np.isfinite(size) & (size > 0.0)
     if np.count_nonzero(known) < FEWEST_OF_SLOPE or np.ptp(np.log(size[known])) < math.log(RANGE):
@@ -173,7 +180,7 @@ def _slope(
     columns = np.stack([np.ones(logs.size), logs - logs.mean()], axis=1)
     line = _line(time[known], error[known], columns)
     slope = float(line.numbers[1])
-    reach = float(t.ppf(0.5 * (1.0 + level), line.degrees))
+    reach = float(stdtrit(line.degrees, 0.5 * (1.0 + level)))
     reach *= math.sqrt(float(line.covariance[1, 1]))
     return slope, (slope - reach, slope + reach)
 
