@@ -32,9 +32,9 @@ from deadtime.logs.latencies._spread import Spread, spread_of
 from deadtime.logs.latencies._windows import (
     LENGTHS,
     LONGEST,
-    STILL,
     Window,
     best_of,
+    grouped,
     that_follow,
     whole_of,
 )
@@ -224,7 +224,7 @@ def relation_of(
     except (DeadtimeError, ValueError) as error:
         return replace(nothing, reason=str(error).partition("; ")[0])
     found = replace(nothing, verdict="reliable", windows=tuple(chosen), estimate=fit)
-    found = _with_interval(found, windows)
+    found = _with_interval(found, windows, part)
     if why := _no_answer(found):
         return replace(found, verdict="none", reason=why, estimate=None)
     if why := _why_doubtful(found):
@@ -251,14 +251,16 @@ def _fitted(
     )
 
 
-def _with_interval(found: LoopLatency, windows: Sequence[Window]) -> LoopLatency:
+def _with_interval(
+    found: LoopLatency, windows: Sequence[Window], part: Callable[[float, float], Recording]
+) -> LoopLatency:
     """The time with its interval: that of the fit, the spread, and what the log leaves unknown."""
     fit = found.estimate
     assert fit is not None
     crossover = fit.best.integrates and math.isfinite(fit.crossover)
     where = _moving_frequencies(fit, crossover)
     value, (low, high) = fit.mean_delay(*where)
-    times = _alone(fit, windows, value, crossover)
+    times = _alone(fit, windows, part, value, crossover)
     spread = None
     if len(times) > 1:
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
@@ -324,19 +326,23 @@ def _moving_frequencies(fit: PlantEstimate, crossover: bool) -> Frequencies:
 
 
 def _alone(
-    fit: PlantEstimate, windows: Sequence[Window], time: float, crossover: bool
+    fit: PlantEstimate,
+    windows: Sequence[Window],
+    part: Callable[[float, float], Recording],
+    time: float,
+    crossover: bool,
 ) -> tuple[WindowTime, ...]:
-    """The time of each window by itself, where it tells one.
+    """The time of each window by itself, or of some neighbours together, where it tells one.
 
     A window moves at frequencies of its own: there its delay is compared with that of the whole.
     """
-    least = STILL * max(one.movement for one in windows)
-    moving = [one for one in windows if one.movement > least]
-    moving = sorted(moving, key=lambda one: one.movement, reverse=True)[:ALONE]
+    moving = sorted(grouped(windows, ALONE), key=_movement, reverse=True)[:ALONE]
     found = []
-    for one in sorted(moving, key=lambda one: one.start):
+    for some in sorted(moving, key=lambda some: some[0].start):
+        start, stop = some[0].start, some[-1].stop
         try:
-            alone = refit(fit, [one.recording])
+            rows = some[0].recording if len(some) == 1 else part(start, stop)
+            alone = refit(fit, [rows])
         except (DeadtimeError, ValueError):
             continue
         if not alone.candidates or alone.best.parameters["gain"] <= 0.0:
@@ -347,10 +353,14 @@ def _alone(
         value, (low, high) = alone.mean_delay(*where)
         value += time - fit.mean_delay(*where)[0]
         error = (high - low) / TWO_SIDED
-        if _says_something(value, error, one.recording):
-            middle = 0.5 * (one.start + one.stop)
-            found.append(WindowTime(middle, value, error, one.movement))
+        if _says_something(value, error, rows):
+            found.append(WindowTime(0.5 * (start + stop), value, error, _movement(some)))
     return tuple(found)
+
+
+def _movement(windows: Sequence[Window]) -> float:
+    """That of windows together."""
+    return math.sqrt(sum(one.movement**2 for one in windows) / len(windows))
 
 
 def _says_something(value: float, error: float, part: Recording) -> bool:

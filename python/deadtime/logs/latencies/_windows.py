@@ -25,6 +25,9 @@ FEWEST, MOST, TOGETHER = 24, 1200, 3
 #: Most rows, and most segments, to which the plants of these are fitted then.
 ALL, SEGMENTS = 15000, 8
 
+#: Most rows of neighbouring windows whose time is estimated together: more see more of each.
+GROUPED = 1600
+
 #: A window is like the others if its response follows to this share of what it does in most, and is
 #: as late to this factor and so many rows; and how many others there have to be for that.
 FOLLOWS, FACTOR, ROWS_OFF, OTHERS = 0.4, 2.5, 2.0, 4
@@ -216,6 +219,24 @@ def best_of(windows: Sequence[Window]) -> Windows:
         most = max(left, key=lambda k: windows[k].movement)
         chosen = [(windows[most].start, windows[most].stop)]
     return sorted(chosen)
+
+
+def grouped(windows: Sequence[Window], most: int) -> list[list[Window]]:
+    """About so many groups of neighbouring windows that move, in order, as far as rows allow."""
+    least = STILL * max((one.movement for one in windows), default=0.0)
+    moving = [k for k, one in enumerate(windows) if one.movement > least]
+    size = -(-len(moving) // most)
+    groups: list[list[Window]] = []
+    last = -2
+    for k in moving:
+        one = windows[k]
+        beside = k == last + 1 and bool(groups) and groups[-1][-1].segment == one.segment
+        if beside and len(groups[-1]) < size and _rows([*groups[-1], one]) <= GROUPED:
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+        last = k
+    return groups
 
 
 def whole_of(windows: Sequence[Window]) -> Windows:
