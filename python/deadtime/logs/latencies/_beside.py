@@ -24,12 +24,14 @@ from deadtime.logs.latencies._windows import LENGTHS, LONGEST
 def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) -> LoopLatency:
     """The time of a loop from its setpoint with the plain numbers, doubted where they differ."""
     fit = found.estimate
-    if fit is None or fit.plant is None:
+    if fit is None and not found.windows:
         return found
     both = loop.setpoint, loop.response
     longest = LONGEST * LENGTHS[loop.kind]
     between = sampling.between
     own = plain_times(*both, loop.segments, longest=longest, between=between)
+    if fit is None or fit.plant is None:
+        return replace(found, plain=own)
     asked, late = loop.setpoint, 0.0
     if between == "straight":
         # As the fit takes it; each command holds for a while from its row on.

@@ -22,7 +22,7 @@ from deadtime._base.digits import between as ends_of, stated
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
-from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed
+from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation import PlantEstimate, estimate_delay, refit
 from deadtime.logs.latencies._commands import Command, Sampling
 from deadtime.logs.latencies._cost import GainCost, cost_of
@@ -226,7 +226,7 @@ def relation_of(
     found = replace(nothing, verdict="reliable", windows=tuple(chosen), estimate=fit)
     found = _with_interval(found, windows, part)
     if why := _no_answer(found):
-        return replace(found, verdict="none", reason=why, estimate=None)
+        return replace(nothing, reason=why, windows=found.windows, times=found.times)
     if why := _why_doubtful(found):
         found = found.doubted(why)
     cost = cost_of(fit, fit.recording) if found.command == "actuator" else None
@@ -373,7 +373,10 @@ def _no_answer(found: LoopLatency) -> str:
     assert fit is not None
     if fit.best.parameters["gain"] <= 0.0:
         return f"the response moves against its command (gain {fit.best.parameters['gain']:.3g})"
-    if not (found.time > 0.0 and _says_something(found.time, found.stderr, fit.recording)):
+    if found.interval[1] <= 0.0 or found.time <= 0.0:
+        ahead = rough(-found.time, "s")
+        return f"the response comes {ahead} before its command: it follows something else"
+    if not _says_something(found.time, found.stderr, fit.recording):
         value = stated(found.time, found.stderr, "s")
         return f"the time comes out as {value}: that says nothing"
     return ""

@@ -20,7 +20,7 @@ from deadtime.recordings import Recording
 
 #: Fewest rows of a window, most rows that are fitted together, and most runs of windows that they
 #: come from: more are surer and take longer.
-FEWEST, MOST, TOGETHER = 24, 1200, 3
+FEWEST, MOST, TOGETHER = 24, 600, 2
 
 #: Most rows, and most segments, to which the plants of these are fitted then.
 ALL, SEGMENTS = 15000, 8
