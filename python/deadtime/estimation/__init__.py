@@ -18,7 +18,6 @@ from deadtime.estimation._choose import (
     PlantChoice,
     choose_plant,
     likeliest as likeliest,
-    with_pair as with_pair,
 )
 from deadtime.estimation._compare import (
     COLUMNS as COLUMNS,
@@ -27,7 +26,6 @@ from deadtime.estimation._compare import (
     compare_methods,
     truth_row as truth_row,
 )
-from deadtime.estimation._criterion import bic as bic
 from deadtime.estimation._estimate import (
     JOINT as JOINT,
     METHODS as METHODS,
@@ -47,7 +45,6 @@ from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
 from deadtime.estimation.evidence._question import PLANTS as PLANTS
 from deadtime.estimation.evidence._words import Advice
-from deadtime.estimation.fit._profile import unit_of as unit_of
 from deadtime.estimation.fit._residuals import Whiteness
 from deadtime.estimation.likelihood._judgement import unseen_in_words as unseen_in_words
 from deadtime.estimation.methods._arx_scan import ARXScan
@@ -69,7 +66,6 @@ from deadtime.estimation.methods._overshoot import (
 )
 from deadtime.estimation.methods._relay import Relay
 from deadtime.estimation.methods._waveform import NoisePath as NoisePath, Waveform
-from deadtime.estimation.models._held import HeldResponse as HeldResponse, path_of as path_of
 from deadtime.estimation.planning._identifiability import Identifiability, identifiability
 from deadtime.estimation.planning._monte_carlo import MonteCarlo
 from deadtime.estimation.planning._planned_bound import PlannedBound
