@@ -233,9 +233,9 @@ impl FamilyFit {
     ) -> PyResult<(f64, f64, f64)> {
         check_frequencies(&omega)?;
         let level = level.unwrap_or(self.level);
-        Ok(run_here(py, |task| {
+        run_here(py, |task| {
             self.core.mean_delay(&omega, &weight, level, task)
-        })?)
+        })
     }
 
     /// Gain, phase and equivalent delay at frequencies; each a list of values, lower and upper ends.

@@ -65,11 +65,13 @@ def estimate_by_evidence(
     return replace(named, verdict="indication", reason=reason)
 
 
-def refit(fit: PlantEstimate, recordings: Sequence[Recording]) -> PlantEstimate:
+def refit(
+    fit: PlantEstimate, recordings: Sequence[Recording], *, likeliest: bool = False
+) -> PlantEstimate:
     """The plants that an estimate leaves, fitted to these recordings in place of its own.
 
     They are looked for beside the numbers of the estimate alone, so that many rows take little
-    time.
+    time; with `likeliest` only its likeliest kind of plant is.
 
     Raises
     ------
@@ -80,7 +82,8 @@ def refit(fit: PlantEstimate, recordings: Sequence[Recording]) -> PlantEstimate:
         replace(fit._question, recording=one, earlier=0, window=None, shift=0, others=())
         for one in recordings
     )
-    question = replace(first, others=tuple(others))
+    plant = fit.best.name if likeliest else first.plant
+    question = replace(first, others=tuple(others), plant=plant)
     return estimate_of(question, question.answer(known=fit._answer()))
 
 

@@ -342,7 +342,7 @@ def _alone(
         start, stop = some[0].start, some[-1].stop
         try:
             rows = some[0].recording if len(some) == 1 else part(start, stop)
-            alone = refit(fit, [rows])
+            alone = refit(fit, [rows], likeliest=True)
         except (DeadtimeError, ValueError):
             continue
         if not alone.candidates or alone.best.parameters["gain"] <= 0.0:

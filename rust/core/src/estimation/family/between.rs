@@ -74,7 +74,7 @@ pub(super) fn open(
         covariance: vec![0.0; n * n],
         share: 0.0,
     };
-    if !model.rows.straight || !model.responds || !(scale > 0.0) {
+    if !model.rows.straight || !model.responds || scale.is_nan() || scale <= 0.0 {
         return out;
     }
     let (numbers, gain) = (model.numbers(&point.x), model.gain(point));

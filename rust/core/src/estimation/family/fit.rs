@@ -235,7 +235,8 @@ pub fn refine_family(
 ) -> Result<Family, Error> {
     let starts = starts_of(records, question)?;
     let count = records.iter().map(|record| record.time.len()).sum();
-    let seeds = known.worth_refining(count);
+    let mut seeds = known.worth_refining(count);
+    seeds.retain(|one| question.class.is_none_or(|class| class == one.class));
     let longest = seeds.iter().map(|one| one.numbers.delay);
     let longest = longest.fold(0.0, f64::max);
     let row = records.iter().map(Record::row).fold(0.0, f64::max);
