@@ -510,6 +510,9 @@ fn answer(
         out
     };
     let mut minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
+    // What is further behind in BIC, though more likely, counts where the record tells all of it.
+    let reach = minima.first().map_or(0.0, |best| best.bic) + EVIDENCE.reach;
+    minima.retain(|one| one.bic <= reach || one.told == one.values.len());
     leave_out_what_adds_nothing(&mut minima);
     let mut candidates: Vec<Candidate> = Vec::new();
     for one in found {
