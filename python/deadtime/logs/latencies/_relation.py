@@ -265,7 +265,10 @@ def _with_interval(
     if len(times) > 1:
         spread = spread_of(*np.array([(t.time, t.stderr, t.movement) for t in times]).T)
         if spread.p_value < DIFFER:
+            # The spread does not show what kinds of plant differ by: no less than that is claimed.
+            below, above = value - low, high - value
             value, (low, high) = spread.mean, spread.interval
+            low, high = min(low, value - below), max(high, value + above)
         if _is_coloured(fit):
             low, high = min(low, spread.interval[0]), max(high, spread.interval[1])
     unsure = 0.0 if found.sampling is None else found.sampling.unsure
