@@ -10,6 +10,7 @@ from unittest import mock
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation import OutputError
 from deadtime.estimation.likelihood import _judgement
 from marks import NIGHTLY
 
@@ -35,8 +36,10 @@ def change_of(condition: Condition, number: int) -> tuple[float, float] | None:
 
     run = record(condition, number)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(run.vehicle.Kp), sample_time=SAMPLE, limit=1.0)
+    recording = table.recording_of(condition, run)
+    alone = OutputError(rivals=False)  # which would be judged too
     with mock.patch.object(_judgement, "judge", remembered):
-        dtm.estimate_delay(table.recording_of(condition, run), loop, free=("delay", "gain"))
+        dtm.estimate_delay(recording, loop, method=alone, free=("delay", "gain"))
     found = [one for last in judged[-1:] for one in last.findings if one.cause == "change"]
     return (found[0].p_value, found[0].sizes[0]) if found else None
 
