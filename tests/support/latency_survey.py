@@ -35,8 +35,8 @@ from scipy import stats
 #: over that of the bound; and the share that is reliable where the bound is below `TELLS`.
 WRONG, WRONG_OF_A_CASE, RUNS, WIDE, RELIABLE = 0.06, 7, 40, 1.5, 0.7
 
-#: Cases of each format whose logs are short to read and to fit, a third of them with jumps as of all:
-#: those of the test.
+#: Cases of each format whose logs are short to read and to fit, a third of them with jumps as of
+#: all: those of the test.
 CASES_OF_THE_TEST = (0, 3, 9, 10, 15, 18, 22, 28)
 
 #: A log tells its time if half the interval of the bound is below this share of it.
