@@ -199,7 +199,8 @@ def answer_of(parts, sampling=None):
     ]
 
     def part(start, stop):
-        return next(one.recording for one in own if (one.start, one.stop) == (start, stop))
+        one = next(one for one in own if one.start <= start and stop <= one.stop)
+        return one.recording.window(start, stop)
 
     nothing = LoopLatency("roll", "roll", "attitude", "setpoint", "none", "", sampling=sampling)
     return relation_of(nothing, own, part)
@@ -207,7 +208,7 @@ def answer_of(parts, sampling=None):
 
 @pytest.fixture(scope="module")
 def alike():
-    return answer_of(flown([0.03] * 3))
+    return answer_of(flown([0.03] * 4))
 
 
 def test_the_time_is_the_mean_over_the_frequencies_at_which_the_response_moves(alike):
@@ -227,10 +228,10 @@ def test_the_time_is_the_mean_over_the_frequencies_at_which_the_response_moves(a
 
 
 def test_windows_that_differ_by_more_than_their_errors_make_the_interval_wider(alike):
-    apart = answer_of(flown([0.03, 0.03, 0.05]))
-    assert alike.spread.count == apart.spread.count == 3
+    apart = answer_of(flown([0.03, 0.03, 0.05, 0.05]))
+    assert alike.spread.count == apart.spread.count == 4
     assert alike.spread.p_value > 0.01 > apart.spread.p_value
-    first, second, third = (one.time for one in apart.times)
+    first, second, third, _ = (one.time for one in apart.times)
     assert second == pytest.approx(first, abs=2e-3)
     assert third == pytest.approx(first + 0.02, abs=2e-3)
     low, high = apart.interval
@@ -242,12 +243,19 @@ def test_windows_that_differ_by_more_than_their_errors_make_the_interval_wider(a
 
 
 def test_windows_that_hardly_move_say_nothing_about_the_spread():
-    parts = flown([0.03] * 3)
+    parts = flown([0.03] * 4)
     faint = [replace(one, output=0.02 * one.output, command=0.02 * one.command)
              for one in flown([0.08])]  # fmt: skip
     faint = [replace(one, time=one.time + 50.0, sent=None) for one in faint]
     found = answer_of(parts + faint)
-    assert [one.at < 40.0 for one in found.times] == [True] * 3
+    assert [one.at < 40.0 for one in found.times] == [True] * 4
+
+
+def test_few_windows_are_an_indication(alike):
+    assert alike.verdict == "reliable"
+    few = answer_of(flown([0.03], seconds=1.6))
+    assert few.verdict == "indication"
+    assert "are needed to know how far it differs over the log" in few.reason
 
 
 def test_a_response_against_its_command_is_no_answer():
@@ -259,7 +267,7 @@ def test_a_response_against_its_command_is_no_answer():
 
 
 def test_what_a_log_leaves_unknown_is_in_the_interval(alike):
-    unsure = answer_of(flown([0.03] * 3), Sampling("held", 0.0, 0.02))
+    unsure = answer_of(flown([0.03] * 4), Sampling("held", 0.0, 0.02))
     for one, other, way in zip(alike.interval, unsure.interval, (-1.0, 1.0), strict=True):
         assert other == pytest.approx(one + way * 0.02, abs=1e-5)
 

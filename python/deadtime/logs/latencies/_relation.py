@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._plain import Difference, PlainTimes
 from deadtime.logs.latencies._spread import Spread, spread_of
 from deadtime.logs.latencies._windows import (
+    FEWEST,
     LENGTHS,
     LONGEST,
     Window,
@@ -53,7 +55,7 @@ TOLD = 3
 #: Doubts of an estimate that concern the gain of a loop and not its time, the one about residuals,
 #: and the windows that have to agree in its place.
 OF_THE_GAIN = ("classes contradict", "crossover not told", "too few told")
-NOT_WHITE, MANY = "residuals not white", 5
+NOT_WHITE, MANY = "residuals not white", 4
 
 #: Probability below which what a fit leaves is not white.
 WHITE = 1e-3
@@ -287,9 +289,11 @@ def _why_doubtful(found: LoopLatency) -> str:
     """
     fit = found.estimate
     assert fit is not None
-    many = found.spread is not None and found.spread.count >= MANY
-    if _is_coloured(fit) and not many:
-        return "what the plant leaves is no known noise, and few windows show how far it reaches"
+    if len(found.times) < MANY:
+        return (
+            f"{len(found.times)} windows show it by themselves: {MANY} are needed to know how far "
+            "it differs over the log"
+        )
     return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason
 
 
@@ -339,12 +343,10 @@ def _alone(
 
     A window moves at frequencies of its own: there its delay is compared with that of the whole.
     """
-    moving = sorted(grouped(windows, ALONE), key=_movement, reverse=True)[:ALONE]
     found = []
-    for some in sorted(moving, key=lambda some: some[0].start):
-        start, stop = some[0].start, some[-1].stop
+    for start, stop, movement in _places(windows):
         try:
-            rows = some[0].recording if len(some) == 1 else part(start, stop)
+            rows = part(start, stop)
             alone = refit(fit, [rows], likeliest=True)
         except (DeadtimeError, ValueError):
             continue
@@ -357,8 +359,23 @@ def _alone(
         value += time - fit.mean_delay(*where)[0]
         error = (high - low) / TWO_SIDED
         if _says_something(value, error, rows):
-            found.append(WindowTime(0.5 * (start + stop), value, error, _movement(some)))
+            found.append(WindowTime(0.5 * (start + stop), value, error, movement))
     return tuple(found)
+
+
+def _places(windows: Sequence[Window]) -> list[tuple[float, float, float]]:
+    """Where the time is estimated by itself, in order: start, stop, s, and movement.
+
+    In groups of windows where they are many, and in parts of them where they are few.
+    """
+    moving = sorted(grouped(windows, ALONE), key=_movement, reverse=True)[:ALONE]
+    found = []
+    for some in sorted(moving, key=lambda some: some[0].start):
+        rows = sum(len(one.recording) for one in some)
+        count = max(1, min(-(-MANY // len(moving)), rows // (2 * FEWEST)))
+        edges = np.linspace(some[0].start, some[-1].stop, count + 1).tolist()
+        found += [(start, stop, _movement(some)) for start, stop in pairwise(edges)]
+    return found
 
 
 def _movement(windows: Sequence[Window]) -> float:
