@@ -52,10 +52,13 @@ ALONE = 10
 #: Fewest numbers of a plant that a log has to determine: a sine determines two.
 TOLD = 3
 
-#: Doubts of an estimate that concern the gain of a loop and not its time, the one about residuals,
-#: and the windows that have to agree in its place.
+#: Doubts of an estimate that concern the gain of a loop and not its time, and that of residuals.
 OF_THE_GAIN = ("classes contradict", "crossover not told", "too few told")
-NOT_WHITE, MANY = "residuals not white", 4
+NOT_WHITE = "residuals not white"
+
+#: Fewest windows that show a time by themselves, and those that have to where the noise of the fit
+#: is not known: more claim less of short flights.
+FEW, MANY = 4, 8
 
 #: Probability below which what a fit leaves is not white.
 WHITE = 1e-3
@@ -289,10 +292,11 @@ def _why_doubtful(found: LoopLatency) -> str:
     """
     fit = found.estimate
     assert fit is not None
-    if len(found.times) < MANY:
+    needed = MANY if _is_coloured(fit) else FEW
+    if len(found.times) < needed:
         return (
-            f"{len(found.times)} windows show it by themselves: {MANY} are needed to know how far "
-            "it differs over the log"
+            f"{len(found.times)} windows show it by themselves: {needed} are needed to know how "
+            "far it differs over the log"
         )
     return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason
 
@@ -372,7 +376,7 @@ def _places(windows: Sequence[Window]) -> list[tuple[float, float, float]]:
     found = []
     for some in sorted(moving, key=lambda some: some[0].start):
         rows = sum(len(one.recording) for one in some)
-        count = max(1, min(-(-MANY // len(moving)), rows // (2 * FEWEST)))
+        count = max(1, min(-(-FEW // len(moving)), rows // (2 * FEWEST)))
         edges = np.linspace(some[0].start, some[-1].stop, count + 1).tolist()
         found += [(start, stop, _movement(some)) for start, stop in pairwise(edges)]
     return found
