@@ -12,7 +12,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from command_line import found, one_clear_line, run
-from deadtime.logs import is_bag, open_bag, recording_of_fields
+from deadtime.logs import is_bag, open_bag
 from mutations import mutated
 from small_bags import LARGEST, SMALL_BAGS, read_bag
 
@@ -59,7 +59,7 @@ def test_topics_fields_and_rates_of_each_format(folder, name, form, speed):
     assert (command.has_header, state.has_header) == (False, True)
     assert {"linear.x"} <= set(command.fields)
     assert {speed, "header.stamp.sec"} <= set(state.fields)
-    recording = recording_of_fields(folder / name, COMMAND, f"/state:{speed}")
+    recording = open_bag(folder / name).recording(COMMAND, f"/state:{speed}")
     sent, values, rows, measured = bags.truth()
     assert recording.time == pytest.approx(rows + bags.AGE, abs=1e-6)
     np.testing.assert_allclose(recording.output, measured)
@@ -74,13 +74,13 @@ def test_places_in_arrays_are_fields_and_scans_are_not(folder):
     fields = open_bag(folder / "zstd.mcap").topics["/state"].fields
     assert {"place[0]", "place[1]", "place[2]"} <= set(fields)
     assert not [name for name in fields if name.startswith(("scan", "name"))]
-    recording = recording_of_fields(folder / "zstd.mcap", COMMAND, SPEED, "/state:place[1]")
+    recording = open_bag(folder / "zstd.mcap").recording(COMMAND, SPEED, "/state:place[1]")
     assert np.array_equal(recording.reference, np.full(len(recording), 2.0))
 
 
 def test_the_delay_of_the_robot_is_found_with_the_way_of_its_messages(folder):
     # Received states are older than they look: to the delay of 150 ms comes their age of 30 ms.
-    recording = recording_of_fields(folder / "zstd.mcap", COMMAND, SPEED)
+    recording = open_bag(folder / "zstd.mcap").recording(COMMAND, SPEED)
     sent, values = recording.sent
     step = 0.001
     grid = np.arange(sent[0], recording.time[-1], step)
@@ -110,7 +110,7 @@ def test_the_delay_of_the_robot_is_found_with_the_way_of_its_messages(folder):
 def test_times_of_all_topics_are_of_one_kind(tmp_path, header, asked, used, why):
     path = tmp_path / "a.mcap"
     path.write_bytes(bags.mcap_json(header, seconds=5.0))
-    recording = recording_of_fields(path, COMMAND, SPEED, stamps=asked)
+    recording = open_bag(path).recording(COMMAND, SPEED, stamps=asked)
     assert why in recording.source
     sent, _, rows, _ = bags.truth(seconds=5.0)
     first = rows[0] if used == "header" else rows[0] + bags.AGE
@@ -129,7 +129,7 @@ def test_times_of_all_topics_are_of_one_kind(tmp_path, header, asked, used, why)
 )
 def test_a_wrong_name_is_answered_by_those_that_exist(folder, command, output, message):
     with pytest.raises(dtm.RecordingError, match=message):
-        recording_of_fields(folder / "zstd.mcap", command, output)
+        open_bag(folder / "zstd.mcap").recording(command, output)
 
 
 @pytest.mark.parametrize("name", ["zstd.mcap", "old.bag", "new"])
@@ -160,7 +160,7 @@ def test_without_its_library_a_bag_names_the_line_that_installs_it(folder, name,
 
 def test_headers_that_are_missing_are_named(folder):
     with pytest.raises(dtm.RecordingError, match="/cmd_vel has no time in its headers"):
-        recording_of_fields(folder / "zstd.mcap", COMMAND, SPEED, stamps="header")
+        open_bag(folder / "zstd.mcap").recording(COMMAND, SPEED, stamps="header")
 
 
 def test_what_is_no_bag_is_refused(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from deadtime.logs import Series
-from deadtime.logs.latencies import differences, disagrees, modelled, plain_times
+from deadtime.logs.latencies import differences, modelled, plain_times
 from deadtime.logs.latencies._correlation import correlation_of, grid_of
 from deadtime.loops import FactoredPlant
 from scipy.ndimage import gaussian_filter1d
@@ -137,17 +137,6 @@ def test_a_setpoint_that_holds_is_read_as_one():
     found = plain_times(told, came, [(0.0, 59.0)], longest=1.0, between="held")
     for one in found.all:
         assert one.value == pytest.approx(0.25, abs=0.012)
-
-
-def test_disagreement_needs_intervals_that_are_apart():
-    told, came, segments = flown(6)
-    one = plain(told, came, segments).correlation
-    half = one.value - one.interval[0]
-    assert not disagrees((one.value - 0.01, one.value + 0.01), one)
-    assert not disagrees((one.value, one.value + 1.5 * half), one)
-    assert disagrees((one.value + 3.0 * half, one.value + 3.5 * half), one)
-    assert disagrees((one.value - 3.5 * half, one.value - 3.0 * half), one)
-    assert not disagrees((np.nan, np.nan), one)
 
 
 def test_a_short_record_has_no_interval():

@@ -5,7 +5,7 @@ from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
 from deadtime.logs._series import Series
-from deadtime.logs.bags import Bag, BagTopic, is_bag, open_bag, recording_of_fields
+from deadtime.logs.bags import Bag, BagTopic, is_bag, open_bag
 from deadtime.logs.latencies import (
     Advice,
     FilterDelay,
@@ -67,6 +67,5 @@ __all__ = [
     "open_log",
     "plain_times",
     "promises_of",
-    "recording_of_fields",
     "spread_of",
 ]

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from deadtime._base.arrays import Array, Mask
 from deadtime.logs._names import Windows
 
-ALWAYS: Windows = [(-np.inf, np.inf)]
-
 
 def windows_of(time: Array, holds: Mask) -> Windows:
     """Where a logged state holds: from its row until the next row that denies it.

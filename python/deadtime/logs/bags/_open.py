@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from deadtime._base.errors import RecordingError
-from deadtime.logs.bags._bag import Bag, Stamps
-from deadtime.recordings import HEAD, Recording, format_of, opened
+from deadtime.logs.bags._bag import Bag
+from deadtime.recordings import HEAD, format_of, opened
 
 #: The file in the folder of a bag of ROS 2.
 DESCRIPTION = "metadata.yaml"
@@ -91,32 +91,3 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
     if form is None:
         raise RecordingError(f"{path} is no bag: MCAP files and bags of ROS 1 and ROS 2 are read")
     return read_mcap(path) if form == "MCAP" else read_ros(path, form)
-
-
-def recording_of_fields(
-    path: str | os.PathLike[str],
-    command: str,
-    output: str,
-    reference: str | None = None,
-    *,
-    stamps: Stamps | None = None,
-) -> Recording:
-    """How one field of a bag follows another; the same as ``open_bag(path).recording(...)``.
-
-    Parameters
-    ----------
-    path : path-like
-        A bag, as `open_bag` takes it.
-    command, output : str
-        Topic and field, as ``"/cmd_vel:linear.x"`` and ``"/odom:twist.twist.linear.x"``.
-    reference : str, optional
-        The set value of a loop around them.
-    stamps : {"header", "received"}, optional
-        The times that are used for all; see `Bag.recording`.
-
-    Raises
-    ------
-    RecordingError
-        When a topic or a field does not exist, with those that do.
-    """
-    return open_bag(path).recording(command, output, reference, stamps=stamps)

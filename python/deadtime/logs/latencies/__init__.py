@@ -13,7 +13,6 @@ from deadtime.logs.latencies._plain import (
     PlainTime,
     PlainTimes,
     differences,
-    disagrees,
     plain_times,
 )
 from deadtime.logs.latencies._promise import Promise, promised, promises_of
@@ -40,7 +39,6 @@ __all__ = [
     "aligned",
     "compare_latencies",
     "differences",
-    "disagrees",
     "filter_lines",
     "filters_of",
     "latency",

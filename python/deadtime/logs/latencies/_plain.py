@@ -240,28 +240,6 @@ def differences(measured: PlainTimes, modelled: PlainTimes) -> tuple[Difference,
     return tuple(found)
 
 
-def disagrees(interval: tuple[float, float], plain: PlainTime) -> bool:
-    """Whether an interval and a plain number differ by more than both intervals allow.
-
-    Parameters
-    ----------
-    interval : (float, float)
-        95 % interval of an estimate of the same thing as the plain number, s.
-    plain : PlainTime
-
-    Returns
-    -------
-    bool
-        Whether their middles are further apart than the root of the sum of squares of their half
-        widths; false where one of them is not known.
-    """
-    low, high = interval
-    middle = 0.5 * (low + high)
-    below, above = plain.value - plain.interval[0], plain.interval[1] - plain.value
-    facing = below if middle < plain.value else above
-    return abs(middle - plain.value) > math.hypot(0.5 * (high - low), facing)
-
-
 def _by_correlation(grid: Grid, longest: float) -> PlainTime:
     """The peak of the masked cross-correlation."""
     name, meaning = "cross-correlation", "equivalent delay where the setpoint has its power"
