@@ -785,6 +785,9 @@ class FamilyFit:
     kind_decided: Final[bool]
     rows: Final[int]
     first_rows: Final[list[int]]
+    causes: Final[list[tuple[str, float, float, float, int, float]]]
+    rival_causes: Final[list[str]]
+    sensor_faults: Final[list[tuple[str, int, int, float, float]]]
     at_rest: Final[bool]
     told: Final[int]
     asked: Final[int]
@@ -816,6 +819,7 @@ def fit_family(
     integrating: bool | None = None,
     noise: str | None = None,
     level: float = 0.95,
+    causes: bool = False,
     omega: Sequence[float] | None = None,
     progress: _Progress = None,
     known: FamilyFit | None = None,

@@ -1,6 +1,7 @@
 //! The whole family fitted to one record: rows, minima, intervals, verdict.
 
 use super::candidate::Candidate;
+use super::causes::{Cause, CauseKind, with_causes};
 use super::class::{Class, Numbers};
 use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, Triple, at, hull, mean_delay, turning};
@@ -8,6 +9,7 @@ use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
 use super::refine::beside;
 use super::rows::{Part, Record, Rows, Start};
+use super::sensors::{SensorFault, without_faults};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
 use super::verdict::{Findings, Verdict, shifted, verdict};
 use crate::{Error, Task};
@@ -55,6 +57,8 @@ pub struct Question {
     pub noise: Option<Noise>,
     /// Level of the intervals.
     pub level: f64,
+    /// Is what the plant lacks looked for?
+    pub causes: bool,
 }
 
 /// The answer.
@@ -80,6 +84,12 @@ pub struct Family {
     pub shift: i64,
     /// Frequencies at which the command has power, rad/s.
     pub excited: Vec<f64>,
+    /// What the plant lacks, as far as the record shows it clearly.
+    pub causes: Vec<Cause>,
+    /// Causes that explain the record about as well as the last of these.
+    pub rivals: Vec<CauseKind>,
+    /// Rows that are no readings of the sensor.
+    pub sensor: Vec<SensorFault>,
     /// The largest delay that may be, that was tried in the end, and one over the noise of each record.
     largest_delay: f64,
     room: f64,
@@ -146,6 +156,18 @@ impl Family {
         Ok(hull(&turning(&minima, task)?, self.largest_delay))
     }
 
+    /// Let the intervals hold those of another answer's plants, up to a BIC.
+    pub(super) fn add_within(&mut self, other: &Self, floor: f64) {
+        let some = other.minima.iter().filter(|one| one.bic <= floor);
+        self.minima.extend(some.cloned());
+    }
+
+    /// The intervals anew.
+    pub(super) fn rehull(&mut self, task: &Task) -> Result<(), Error> {
+        self.hull = hull(&turning(&self.minima, task)?, self.largest_delay);
+        Ok(())
+    }
+
     fn minima_at(&self, level: f64) -> Result<Vec<Candidate>, Error> {
         check_level(level)?;
         Ok(self.minima.iter().map(|one| one.at_level(level)).collect())
@@ -165,6 +187,20 @@ fn check_level(level: f64) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Argument`] for numbers out of range or too few rows, and as a task ends.
 pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Result<Family, Error> {
+    if !question.causes {
+        return of_readings(records, question, task);
+    }
+    let read = records.iter().enumerate();
+    let (read, faults): (Vec<_>, Vec<_>) = read
+        .map(|(place, record)| without_faults(record, place))
+        .unzip();
+    let mut out = of_readings(&read, question, task)?;
+    out.sensor = faults.concat();
+    Ok(out)
+}
+
+/// Fit the family to records whose outputs are readings.
+fn of_readings(records: &[Record], question: &Question, task: &Task) -> Result<Family, Error> {
     let starts = starts_of(records, question)?;
     let shortest = shortest(records);
     if let Some(delay) = question.largest_delay {
@@ -395,6 +431,7 @@ fn one_kind(
             classes: &classes,
             noises: &[Noise::White],
             seeds: &[],
+            grids: true,
         };
         let found = minima(&white, task)?;
         (room, seeds, weights) = (largest, seeds_of(&found), weights_of(&found));
@@ -415,6 +452,7 @@ fn one_kind(
             classes: &classes,
             noises: &noises,
             seeds: &seeds,
+            grids: true,
         };
         let found = minima(&plan, task)?;
         // Coloured noise may need a longer delay than the white noise of the first pass.
@@ -430,7 +468,11 @@ fn one_kind(
             continue;
         }
         let silent = without_plant(&plan, task)?;
-        let mut out = answer(&found, silent, question, largest, task)?;
+        let answered = |found: &[Minimum<'_>]| answer(found, silent, question, largest, task);
+        let mut out = answered(&found)?;
+        if question.causes {
+            out = with_causes(out, &plan, &found, &answered, task)?;
+        }
         (out.room, out.weights) = (room, weights);
         return Ok(out);
     }
@@ -441,7 +483,7 @@ const REWEIGHTED: usize = 2;
 const CHANGED: f64 = 0.1;
 
 /// Classes and numbers of minima.
-fn seeds_of(found: &[Minimum<'_>]) -> Vec<(Class, Numbers)> {
+pub(super) fn seeds_of(found: &[Minimum<'_>]) -> Vec<(Class, Numbers)> {
     let numbers = |one: &Minimum<'_>| (one.model.class, one.model.numbers(&one.point.x));
     found.iter().map(numbers).collect()
 }
@@ -541,6 +583,9 @@ fn answer(
         first_rows: parts.iter().filter_map(first).collect(),
         shift: 0,
         excited,
+        causes: Vec::new(),
+        rivals: Vec::new(),
+        sensor: Vec::new(),
         largest_delay,
         room: largest_delay,
         weights: Vec::new(),

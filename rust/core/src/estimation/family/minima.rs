@@ -56,6 +56,8 @@ pub(super) struct Plan<'a> {
     pub(super) noises: &'a [Noise],
     /// Numbers of minima that are known; a grid takes the place of those of a class that has none.
     pub(super) seeds: &'a [(Class, Numbers)],
+    /// Are grids searched where noise is coloured?
+    pub(super) grids: bool,
 }
 
 /// The minima of all classes, best first; each class under the noise that suits it best.
@@ -264,7 +266,7 @@ fn under<'a>(
             responds: true,
             level: true,
         };
-        let mut starts = if kind == Noise::Arma11 {
+        let mut starts = if kind == Noise::Arma11 && plan.grids {
             grid(&on(plan.thin, &model), task)?
         } else {
             Vec::new()
@@ -275,9 +277,18 @@ fn under<'a>(
         };
         for known in own.filter(hopeful) {
             let plant = known.model.plant_numbers();
-            let mut x = known.point.x[..plant].to_vec();
-            x.extend(noise(&model, &known.point, &known.point.x[plant..]));
-            starts.push(x);
+            let (numbers, own) = known.point.x.split_at(plant);
+            // A number at its limit is left by no step: a start without it stands beside.
+            let begins = if own.is_empty() {
+                vec![own]
+            } else {
+                vec![own, &[]]
+            };
+            for own in begins {
+                let mut x = numbers.to_vec();
+                x.extend(noise(&model, &known.point, own));
+                starts.push(x);
+            }
         }
         // The best of those that it contains, under this noise.
         let contained = all.iter().filter_map(|known: &Minimum<'a>| {

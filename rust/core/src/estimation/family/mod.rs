@@ -9,10 +9,12 @@
 //! count, `response` is exact, `model` the likelihood of one class under one `noise`, `search` its
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
-//! leave open, `hull` intervals over all classes within reach, `verdict` what is claimed.
+//! leave open, `causes` what a linear plant lacks,
+//! `sensors` which readings are none, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
 mod between;
 mod candidate;
+mod causes;
 mod class;
 mod dispersion;
 mod excitation;
@@ -27,14 +29,17 @@ mod refine;
 mod response;
 mod rows;
 mod search;
+mod sensors;
 mod starts;
 mod tolerances;
 mod verdict;
 
 pub use candidate::Candidate;
+pub use causes::{Cause, CauseKind};
 pub use class::{Class, Numbers};
 pub use fit::{Between, Family, Question, fit_family, refine_family};
 pub use hull::{Named, Triple};
 pub use noise::{Coefficients, Noise};
 pub use rows::Record;
+pub use sensors::{SensorFault, SensorKind};
 pub use verdict::{Grade, Verdict};

@@ -9,6 +9,7 @@
 use super::class::{Class, Numbers};
 use super::rows::Part;
 use crate::elementary::{exp, sin_cos};
+use crate::linear_algebra::vectors::add_multiple;
 
 /// Two steps closer than this share of a row are one, and their transition is computed once.
 const SAME_STEP: f64 = 1e-9;
@@ -27,6 +28,22 @@ pub(super) struct Response {
 }
 
 impl Response {
+    /// None at so many rows.
+    pub(super) fn zero(rows: usize) -> Self {
+        Self {
+            value: vec![0.0; rows],
+            by_delay: vec![0.0; rows],
+            by_zero: vec![0.0; rows],
+        }
+    }
+
+    /// With another one, times a factor, added.
+    pub(super) fn add(&mut self, factor: f64, other: &Self) {
+        add_multiple(&mut self.value, factor, &other.value);
+        add_multiple(&mut self.by_delay, factor, &other.by_delay);
+        add_multiple(&mut self.by_zero, factor, &other.by_zero);
+    }
+
     /// With that of the next record behind it.
     pub(super) fn append(&mut self, mut next: Self) {
         self.value.append(&mut next.value);
@@ -189,7 +206,7 @@ pub(super) fn pulse(
     response_to(&[start, end], &command, false, rows, class, numbers).value
 }
 
-fn response_to(
+pub(super) fn response_to(
     sent: &[f64],
     command: &[f64],
     straight: bool,

@@ -1,0 +1,313 @@
+//! Causes fitted with the whole family of plants, and adopted where they explain the record clearly better.
+
+use super::super::fit::Family;
+use super::super::fit::seeds_of;
+use super::super::minima::{Minimum, Plan, minima};
+use super::super::model::Model;
+use super::super::noise::Noise;
+use super::super::rows::Rows;
+use super::super::search::minimum;
+use super::super::tolerances::{CAUSES, EVIDENCE, STARTS};
+use super::asides::{Aside, from_time, moving};
+use super::screen::{Suspect, begins_again, suspects};
+use super::{Cause, CauseKind};
+use crate::elementary::log;
+use crate::{Error, Task};
+
+/// Makes an answer of minima.
+pub(in super::super) type Answer<'f> = dyn Fn(&[Minimum<'_>]) -> Result<Family, Error> + 'f;
+
+/// The rows with a suspect, and its size where the command passes it.
+fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+    let kind = suspect.kind;
+    if kind.begins() {
+        return beginning(suspect, rows, task).map(|rows| (rows, 0.0));
+    }
+    if kind.is_passed() {
+        return with_size(suspect, rows, task);
+    }
+    // As the plant moves without it, and then as it moves with it.
+    let mut own = rows.clone();
+    let mut x = suspect.x.clone();
+    for round in 0..=CAUSES.rounds {
+        let model = beside(suspect, &own);
+        let point = if round == 0 {
+            model.at(x)
+        } else {
+            minimum(&model, model.at(x), f64::INFINITY, task)?
+        };
+        let each = 0..rows.parts.len();
+        let asides = each.map(|at| moving(kind, &model, &point, at)).collect();
+        x = point.x;
+        own = rows.with_asides(kind, asides);
+    }
+    Ok((own, 0.0))
+}
+
+/// The rows with something that begins, at the likeliest time beside that of the score.
+fn beginning(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
+    let with = |time: f64| {
+        let mut asides: Vec<Option<Aside>> = vec![None; rows.parts.len()];
+        let part = &rows.parts[suspect.record];
+        asides[suspect.record] = Some(from_time(suspect.kind, part, time));
+        rows.with_asides(suspect.kind, asides)
+    };
+    let mut x = suspect.x.clone();
+    let mut deviance = |time: f64| -> Result<f64, Error> {
+        let own = with(time);
+        let model = beside(suspect, &own);
+        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
+        let found = model.deviance(&point);
+        x = point.x;
+        Ok(found)
+    };
+    let mut best = (deviance(suspect.time)?, suspect.time);
+    let mut reach = suspect.between.1;
+    while reach > CAUSES.near * rows.parts[suspect.record].row {
+        reach *= 0.5;
+        for time in [best.1 - reach, best.1 + reach] {
+            let found = deviance(time)?;
+            if found < best.0 {
+                best = (found, time);
+            }
+        }
+    }
+    let out = with(best.1);
+    suspect.time = best.1;
+    Ok(out)
+}
+
+/// The plant beside which a suspect is likeliest.
+fn beside<'a>(suspect: &Suspect, rows: &'a Rows) -> Model<'a> {
+    Model {
+        rows,
+        class: suspect.class,
+        noise: suspect.noise,
+        responds: true,
+        level: true,
+    }
+}
+
+/// The rows with a suspect of the likeliest size.
+fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+    let kind = suspect.kind;
+    if kind == CauseKind::Stiction {
+        return sticking(suspect, rows, task);
+    }
+    let (mut size, mut best) = (suspect.size, (f64::INFINITY, suspect.size));
+    let mut x = suspect.x.clone();
+    for _ in 0..CAUSES.refined {
+        let own = rows.behind(kind, size);
+        let model = beside(suspect, &own);
+        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
+        let deviance = model.deviance(&point);
+        if deviance < best.0 {
+            best = (deviance, size);
+            x.clone_from(&point.x);
+        }
+        let change = point.of_causes().last().copied().unwrap_or(0.0) / model.gain(&point);
+        let (low, high) = suspect.between;
+        let reach = 0.5 * (high - low);
+        let next = (size + change).clamp((size - reach).max(0.5 * size), size + reach);
+        if !next.is_finite() || (next - size).abs() < CAUSES.settled * size {
+            break;
+        }
+        size = next;
+    }
+    Ok((rows.behind(kind, best.1), best.1))
+}
+
+/// The same of what sticks, whose likelihood jumps between sizes.
+fn sticking(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+    let (low, high) = suspect.between;
+    let mut best = (f64::INFINITY, suspect.size);
+    for step in 1..CAUSES.between {
+        let size = low + (high - low) * step as f64 / CAUSES.between as f64;
+        let own = rows.behind(suspect.kind, size);
+        let model = beside(suspect, &own);
+        let point = minimum(&model, model.at(suspect.x.clone()), f64::INFINITY, task)?;
+        let deviance = model.deviance(&point);
+        if deviance < best.0 {
+            best = (deviance, size);
+        }
+    }
+    Ok((rows.behind(suspect.kind, best.1), best.1))
+}
+
+/// The causes of a minimum, the last one with the size that the command had passed.
+fn causes_of(
+    known: &[Cause],
+    suspect: &Suspect,
+    size: f64,
+    best: &Minimum<'_>,
+    lead: f64,
+) -> Vec<Cause> {
+    let (model, point) = (&best.model, &best.point);
+    let gain = model.gain(point);
+    let mut out = known.to_vec();
+    out.push(Cause {
+        kind: suspect.kind,
+        size,
+        error: 0.0,
+        time: suspect.time,
+        record: suspect.record,
+        lead,
+    });
+    let count = out.len();
+    for (at, (cause, factor)) in out.iter_mut().zip(point.of_causes()).enumerate() {
+        let scale = if cause.kind == CauseKind::OutputStep {
+            1.0
+        } else {
+            gain
+        };
+        if cause.kind == CauseKind::Stiction {
+            if at + 1 < count {
+                continue;
+            }
+            let step = (suspect.between.1 - suspect.between.0) / CAUSES.between as f64;
+            cause.error = step / 12.0_f64.sqrt();
+            continue;
+        }
+        let passed = if cause.kind.is_passed() {
+            cause.size
+        } else {
+            0.0
+        };
+        cause.size = passed + factor / scale;
+        cause.error = model.error_of_cause(point, at) / scale.abs();
+    }
+    out
+}
+
+/// The answer with what the plant lacks: a cause that is clearly better is adopted, and then a second one is
+/// looked for; those that the record does not rule out widen the intervals.
+pub(in super::super) fn with_causes(
+    own: Family,
+    plan: &Plan<'_>,
+    found: &[Minimum<'_>],
+    answer: &Answer<'_>,
+    task: &Task,
+) -> Result<Family, Error> {
+    if plan
+        .rows
+        .causes
+        .iter()
+        .map(|kind| kind.parameters())
+        .sum::<usize>()
+        >= CAUSES.most
+    {
+        return Ok(own);
+    }
+    let Some(best) = found.first() else {
+        return Ok(own);
+    };
+    let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
+    for mut suspect in suspects(plan.rows, found, task)? {
+        let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
+        tried.push((suspect, rows, size));
+    }
+    let seeds = seeds_of(found);
+    let thin: Vec<Rows> = tried
+        .iter()
+        .map(|(_, rows, _)| rows.thinned(STARTS.thin))
+        .collect();
+    let plans: Vec<Plan<'_>> = tried
+        .iter()
+        .zip(&thin)
+        .map(|((_, rows, _), thin)| Plan {
+            rows,
+            thin,
+            seeds: &seeds,
+            grids: false,
+            ..*plan
+        })
+        .collect();
+    let mut fits: Vec<Vec<Minimum<'_>>> = Vec::with_capacity(tried.len());
+    for plan in &plans {
+        fits.push(minima(plan, task)?);
+    }
+    let mut families: Vec<Family> = Vec::with_capacity(fits.len());
+    for ((suspect, _, size), fit) in tried.iter().zip(&fits) {
+        let mut family = answer(fit)?;
+        if let Some(first) = fit.first() {
+            family.causes = causes_of(&own.causes, suspect, *size, first, best.bic - first.bic);
+        }
+        families.push(family);
+    }
+    let bic = |at: usize| fits[at].first().map_or(f64::INFINITY, |one| one.bic);
+    let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
+    let mut adopted = None;
+    if let Some(at) = winner.filter(|at| bic(*at) < best.bic - CAUSES.adopted)
+        && is_there(&families[at].causes, &fits[at], plan, task)?
+    {
+        adopted = Some(at);
+    }
+    let (mut out, floor) = match adopted {
+        Some(at) => {
+            let family = families[at].clone();
+            let deeper = with_causes(family, &plans[at], &fits[at], answer, task)?;
+            (deeper, bic(at) + EVIDENCE.reach)
+        }
+        None => (own.clone(), best.bic),
+    };
+    if adopted.is_some() {
+        out.add_within(&own, floor);
+    }
+    for (at, family) in families.iter().enumerate() {
+        if Some(at) != adopted {
+            out.add_within(family, floor);
+            let is_rival = adopted.is_some_and(|own| bic(at) < bic(own) + EVIDENCE.likely);
+            if is_rival && let Some(cause) = family.causes.last() {
+                out.rivals.push(cause.kind);
+            }
+        }
+    }
+    out.rehull(task)?;
+    Ok(out)
+}
+
+/// Is the last of these causes there: of a size that is not zero, better than the same plant under the same
+/// noise without it, and no beginning of many?
+fn is_there(
+    causes: &[Cause],
+    fit: &[Minimum<'_>],
+    plan: &Plan<'_>,
+    task: &Task,
+) -> Result<bool, Error> {
+    let (Some(cause), Some(best)) = (causes.last(), fit.first()) else {
+        return Ok(false);
+    };
+    let first = causes.first().map_or(0.0, |first| first.lead);
+    if causes.len() > 1 && cause.lead < CAUSES.further * first {
+        return Ok(false);
+    }
+    let size = if cause.kind.is_positive() {
+        cause.size
+    } else {
+        cause.size.abs()
+    };
+    if size.is_nan() || size < CAUSES.sure * cause.error {
+        return Ok(false);
+    }
+    let model = Model {
+        rows: plan.rows,
+        ..best.model
+    };
+    let start = model.at(best.point.x.clone());
+    let without = Minimum::new(model, minimum(&model, start, f64::INFINITY, task)?);
+    if best.bic > without.bic - CAUSES.adopted {
+        return Ok(false);
+    }
+    if !cause.kind.begins() {
+        return Ok(true);
+    }
+    let again = begins_again(cause.kind, cause.time, best);
+    let rows = plan.rows.count() as f64;
+    let penalty = log(rows) * cause.kind.parameters() as f64;
+    let most = if best.model.noise == Noise::White {
+        penalty + CAUSES.adopted
+    } else {
+        CAUSES.again * (cause.lead + penalty)
+    };
+    Ok(again < most)
+}

@@ -1,0 +1,170 @@
+//! Inputs beside the command, and steps of the output, each times one number.
+
+use super::super::class::{Class, Numbers};
+use super::super::model::{Model, Point};
+use super::super::response::{Response, response, response_to};
+use super::super::rows::{Part, Rows};
+use super::CauseKind;
+
+/// Something that adds to the output of one record.
+#[derive(Debug, Clone)]
+pub(in super::super) enum Aside {
+    /// A signal at the input of the plant: its times, its values less the first one.
+    Input {
+        /// Times, s.
+        sent: Vec<f64>,
+        /// Values less the first one.
+        value: Vec<f64>,
+        /// Is it straight between them, or held?
+        straight: bool,
+    },
+    /// A step of the output from this time on.
+    Step(f64),
+    /// A delay that is longer by a half after this time, and shorter before it.
+    Later(f64),
+}
+
+impl Aside {
+    /// A signal at the input of the plant.
+    pub(super) fn input(sent: Vec<f64>, mut value: Vec<f64>, straight: bool) -> Self {
+        let first = value.first().copied().unwrap_or(0.0);
+        value.iter_mut().for_each(|entry| *entry -= first);
+        Self::Input {
+            sent,
+            value,
+            straight,
+        }
+    }
+
+    /// What it adds to the output, times one.
+    pub(in super::super) fn response(
+        &self,
+        part: &Part,
+        class: Class,
+        numbers: &Numbers,
+    ) -> Response {
+        match self {
+            Self::Input {
+                sent,
+                value,
+                straight,
+            } => response_to(sent, value, *straight, part, class, numbers),
+            Self::Step(from) => {
+                let mut out = Response::zero(part.used.len());
+                for (value, row) in out.value.iter_mut().zip(&part.used) {
+                    *value = f64::from(u8::from(part.time[*row] >= *from));
+                }
+                out
+            }
+            Self::Later(from) => {
+                let mut out = response(part, class, numbers);
+                for (value, row) in out.by_delay.iter_mut().zip(&part.used) {
+                    *value *= if part.time[*row] >= *from { 0.5 } else { -0.5 };
+                }
+                out.value = out.by_delay;
+                let none = Response::zero(out.value.len());
+                (out.by_delay, out.by_zero) = (none.by_delay, none.by_zero);
+                out
+            }
+        }
+    }
+}
+
+/// What begins at a time.
+pub(super) fn from_time(kind: CauseKind, part: &Part, time: f64) -> Aside {
+    match kind {
+        CauseKind::OutputStep => Aside::Step(time),
+        CauseKind::DelayChange => Aside::Later(time),
+        _ => {
+            // Nothing before it.
+            let sent = vec![time.min(part.time[0]) - part.row, time];
+            Aside::input(sent, vec![0.0, 1.0], false)
+        }
+    }
+}
+
+/// The input of a gain that changes or of a drag, as the plant of a minimum moves.
+pub(super) fn moving(
+    kind: CauseKind,
+    model: &Model<'_>,
+    point: &Point,
+    at: usize,
+) -> Option<Aside> {
+    let rows: &Rows = model.rows;
+    let (part, place) = (&rows.parts[at], rows.places()[at].clone());
+    let delay = model.numbers(&point.x).delay;
+    let times: Vec<f64> = part.used.iter().map(|row| part.time[*row]).collect();
+    let full = || {
+        part.sent
+            .iter()
+            .zip(part.command.iter().map(|u| u + part.base))
+    };
+    match kind {
+        CauseKind::GainRamp => {
+            let middle = 0.5 * (part.time[0] + part.time[part.time.len() - 1]);
+            let value = full().map(|(t, u)| u * (t - middle) / part.span);
+            Some(Aside::input(
+                part.sent.clone(),
+                value.collect(),
+                part.straight,
+            ))
+        }
+        CauseKind::GainByLevel => {
+            let residual = &point.residual[place];
+            let pairs = part.output.iter().zip(residual);
+            let level: Vec<f64> = pairs.map(|(output, left)| output - left).collect();
+            let (low, high) = ends(&level);
+            let range = high - low;
+            if range.is_nan() || range <= 0.0 {
+                return None;
+            }
+            let middle = level.iter().sum::<f64>() / level.len() as f64;
+            let value =
+                full().map(|(t, u)| u * (between(&times, &level, t + delay) - middle) / range);
+            Some(Aside::input(
+                part.sent.clone(),
+                value.collect(),
+                part.straight,
+            ))
+        }
+        CauseKind::Drag if model.class.integrating => {
+            let gain = model.gain(point);
+            let speed = point.speed(place).map(|v| gain * v);
+            let value = speed.map(|v| -v * v.abs() * gain.signum()).collect();
+            let sent = times.iter().map(|t| t - delay).collect();
+            Some(Aside::input(sent, value, true))
+        }
+        _ => None,
+    }
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    let wider = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
+    values.iter().fold(start, wider)
+}
+
+/// The value between points at a time, of the nearest one outside.
+fn between(times: &[f64], values: &[f64], time: f64) -> f64 {
+    let after = times.partition_point(|own| *own <= time);
+    if after == 0 {
+        return values[0];
+    }
+    if after == times.len() {
+        return values[after - 1];
+    }
+    let share = (time - times[after - 1]) / (times[after] - times[after - 1]);
+    values[after - 1] + share * (values[after] - values[after - 1])
+}
+
+impl Rows {
+    /// With something aside in some of its records.
+    pub(super) fn with_asides(&self, kind: CauseKind, asides: Vec<Option<Aside>>) -> Self {
+        let mut out = self.clone();
+        for (part, aside) in out.parts.iter_mut().zip(asides) {
+            part.asides.push(aside);
+        }
+        out.causes.push(kind);
+        out
+    }
+}

@@ -1,0 +1,119 @@
+//! What a linear plant lacks: a load, play, a dead zone and the like, fitted beside the plants.
+//!
+//! A cause changes the command that reaches the plant, by a size that is one number more:
+//! ```text
+//! u → play(u, b), stiction(u, b), dead zone(u, b), min(u, b), max(u, −b),
+//! u → u + c w,  w = 1(t ≥ t₀), u (t − t̄)/span, u (y − ȳ)/range, −v |v|.
+//! ```
+//! `commands` has the first kind, `asides` the second, with a step of the output, which is a sensor's.
+//! `screen` scores all sizes against what plants without a cause leave, `adopt` fits what may be one
+//! with the whole family and compares it by BIC with the most flexible plant.
+
+mod adopt;
+mod asides;
+mod commands;
+mod screen;
+
+pub(super) use adopt::with_causes;
+pub(super) use asides::Aside;
+
+/// A kind of cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CauseKind {
+    /// A load at the input of the plant from some row on, in units of the command.
+    Load,
+    /// A step of the measured output at some row.
+    OutputStep,
+    /// The delay changes by this at some row, s.
+    DelayChange,
+    /// A command within ± the size does nothing.
+    DeadZone,
+    /// An actuator with play of this width between it and the plant.
+    Play,
+    /// An actuator that moves only when the command is this far from it, and then all of the way.
+    Stiction,
+    /// A command is not above this.
+    UpperLimit,
+    /// A command is not below minus this.
+    LowerLimit,
+    /// A force against the motion, by its square.
+    Drag,
+    /// The gain changes by this share over the record.
+    GainRamp,
+    /// The gain changes by this share over the range of the output.
+    GainByLevel,
+}
+
+impl CauseKind {
+    /// All of them.
+    pub(super) const ALL: [Self; 11] = [
+        Self::Load,
+        Self::OutputStep,
+        Self::DelayChange,
+        Self::DeadZone,
+        Self::Play,
+        Self::Stiction,
+        Self::UpperLimit,
+        Self::LowerLimit,
+        Self::Drag,
+        Self::GainRamp,
+        Self::GainByLevel,
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Load => "load",
+            Self::OutputStep => "output step",
+            Self::DelayChange => "delay change",
+            Self::DeadZone => "dead zone",
+            Self::Play => "play",
+            Self::Stiction => "stiction",
+            Self::UpperLimit => "upper limit",
+            Self::LowerLimit => "lower limit",
+            Self::Drag => "drag",
+            Self::GainRamp => "gain ramp",
+            Self::GainByLevel => "gain by level",
+        }
+    }
+
+    /// Does it begin at some row?
+    pub(super) fn begins(self) -> bool {
+        matches!(self, Self::Load | Self::OutputStep | Self::DelayChange)
+    }
+
+    /// Is its size a number of the command's transformation?
+    pub(super) fn is_passed(self) -> bool {
+        matches!(
+            self,
+            Self::DeadZone | Self::Play | Self::Stiction | Self::UpperLimit | Self::LowerLimit
+        )
+    }
+
+    /// Is its size above zero?
+    pub(super) fn is_positive(self) -> bool {
+        self.is_passed() || self == Self::Drag
+    }
+
+    /// How many numbers it needs.
+    pub(super) fn parameters(self) -> usize {
+        1 + usize::from(self.begins())
+    }
+}
+
+/// A cause that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cause {
+    /// Its kind.
+    pub kind: CauseKind,
+    /// Its size.
+    pub size: f64,
+    /// The standard error of the size.
+    pub error: f64,
+    /// When it began, s, NaN where it was there all the time.
+    pub time: f64,
+    /// The record in which it began.
+    pub record: usize,
+    /// BIC by which the record is explained better with it.
+    pub lead: f64,
+}
