@@ -85,7 +85,9 @@ def estimates(row: Row, size: float, seed: int, which: range) -> list[Estimate]:
     chain = row.fault.chain(runs, sizes) if row.fault else nothing(runs)
     logs = logged(runs, chain)
     truth = truth_of(runs, logs, row.fault, sizes)
-    own = named_size(row.fault, chain, sizes) if row.fault else np.full(len(runs), math.nan)
+    own = np.full(len(runs), math.nan)
+    if row.fault:
+        own = named_size(row.fault, chain, sizes, logs.output)
     out = []
     for i, number in enumerate(which):
         ranges = zip(truth.low[i].tolist(), truth.high[i].tolist(), strict=True)

@@ -275,7 +275,7 @@ FAULTS = {
         Fault("repeated readings", _repeated, 0.8, in_loop=True),
         Fault("frozen", _frozen, 0.3),
         Fault("glitches", _glitches, 3.0),
-        Fault("offset jump", _jump, 1.5),
+        Fault("offset jump", _jump, 1.5, "output step"),
         Fault("smoothed", _smoothed, 30.0),
         Fault("shifted column", _shifted, 1.0, "shifted column"),
         Fault("wave", _wave, 0.6),
@@ -285,16 +285,18 @@ FAULTS = {
 }
 
 
-def named_size(fault: Fault, chain: Chain, sizes: Array) -> Array:
-    """The size in the units in which an estimate gives that of its cause.
+def named_size(fault: Fault, chain: Chain, sizes: Array, output: Array) -> Array:
+    """The size in the units in which an estimate gives that of its cause, from logged outputs.
 
-    Load: what is added to the command. Dead zone: command on each side that has no effect. Play and
-    stiction: width between the two sides. Unequal limits: the nearer limit. Drag: the factor of
-    v|v|, taken from the command. Ramp: relative change of the gain over the record. Level: relative
-    change for one unit of the output. Delay change: s. Column: rows.
+    Load: what is added to the command. Output step: the step. Dead zone: command on each side that
+    has no effect. Play and stiction: width between the two sides. Unequal limits: the nearer limit.
+    Drag: the factor of v|v|, taken from the command. Ramp: relative change of the gain over the
+    record. Level: that over the range of the output. Delay change: s. Column: rows.
     """
     if fault.name == "load":
-        return np.abs(chain.load).max(axis=1)
+        return np.asarray(np.abs(chain.load).max(axis=1))
+    if fault.name == "offset jump":
+        return sizes * chain.span
     if fault.name == "unequal limits":
         return chain.runs.kind.swing - chain.width
     if chain.actuator:
@@ -302,7 +304,7 @@ def named_size(fault: Fault, chain: Chain, sizes: Array) -> Array:
     if fault.name == "drag":
         return chain.drag
     if fault.name == "gain by level":
-        return np.abs(chain.level)
+        return np.asarray(np.abs(chain.level) * np.ptp(output, axis=1))
     if fault.name == "delay change":
         return sizes * chain.runs.linear.delay
     return sizes

@@ -31,6 +31,9 @@ BATCH = 10
 #: Causes that are one name, for stiction of every size and for small play.
 ALIKE = {"play", "stiction"}
 
+#: Names of the one limit that is nearer.
+LIMITS = {"unequal limits", "lower limit"}
+
 #: Faults that are none of the plant, in which a name is a false one.
 DISTURBANCES = ("wind", "wave", "drift")
 
@@ -56,9 +59,9 @@ def names(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
         return out | {"false": len(naming)}
     for one in naming:
         cause = one.causes[0]
-        out["right"] += cause["name"] in accepted(row)
-        near = abs(abs(cause["size"]) - one.size) <= SIZE_ERROR * one.size
-        out["size right"] += cause["name"] == row.fault.cause and near
+        right = cause["name"] in accepted(row)
+        out["right"] += right
+        out["size right"] += right and abs(abs(cause["size"]) - one.size) <= SIZE_ERROR * one.size
     return out
 
 
@@ -68,7 +71,7 @@ def accepted(row: Row) -> set[str]:
         return set()
     if row.fault.name == "stiction" or (row.fault.name == "play" and row.size == "small"):
         return ALIKE
-    return {row.fault.cause}
+    return LIMITS if row.fault.name == "unequal limits" else {row.fault.cause}
 
 
 #: Title, key, width and digits of each column, by groups.

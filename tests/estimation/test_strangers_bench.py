@@ -170,16 +170,17 @@ def test_a_moving_mean_keeps_a_line_and_widens_with_its_size():
 
 
 def test_sizes_are_in_the_unit_of_their_cause():
-    runs = some("height lag", 2)
+    runs, output = some("height lag", 2), np.array([[0.0, 3.0], [-1.0, 0.5]])
     found = {
-        name: named_size(fault, fault.chain(runs, np.full(2, 0.1)), np.full(2, 0.1))
+        name: named_size(fault, fault.chain(runs, np.full(2, 0.1)), np.full(2, 0.1), output)
         for name, fault in FAULTS.items()
         if fault.cause and fault.suits(runs.kind)
     }
     np.testing.assert_allclose(found["load"], 0.1)
     np.testing.assert_allclose(found["unequal limits"], 0.9)
     np.testing.assert_allclose(found["delay change"], 0.1 * runs.linear.delay)
-    np.testing.assert_allclose(found["gain by level"], 0.1 / 1.5)
+    np.testing.assert_allclose(found["offset jump"], 0.1 * 1.5)
+    np.testing.assert_allclose(found["gain by level"], [0.1 / 1.5 * 3.0, 0.1])
 
 
 def test_a_delay_is_that_beside_the_integrators_of_the_true_plant():
@@ -215,7 +216,7 @@ def test_an_answer_is_counted_as_what_it_is():
     named = replace(made, causes=[{"name": "stiction", "size": 0.002, "ends": (0.001, 0.003)}])
     other = replace(made, causes=[{"name": "load", "size": 0.002, "ends": (0.001, 0.003)}])
     line = table.summary(row, [made, named, other])
-    assert (line["named"], line["right"], line["size right"]) == (2, 1, 0)
+    assert (line["named"], line["right"], line["size right"]) == (2, 1, 1)
     assert (line["runs"], line["reliable"], line["wrong delay"]) == (3, 3, 3)
     clean = chosen(["height lag: clean"])[0]
     assert table.summary(clean, [made, other])["false"] == 1
