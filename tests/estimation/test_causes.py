@@ -70,7 +70,7 @@ def check_the_linear_part(fit: dtm.PlantEstimate) -> None:
         ):
             reach = 0.75 * (high - low)
             assert abs(value - 0.5 * (low + high)) < reach
-            assert reach < 0.1 * value
+            assert reach < 0.15 * value
 
 
 @pytest.mark.parametrize(

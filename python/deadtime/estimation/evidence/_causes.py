@@ -21,6 +21,8 @@ WORDS = {
     "stiction": "the actuator sticks until the command is {size} away from it",
     "upper limit": "the command does nothing more above {size}",
     "lower limit": "the command does nothing more below -{size}",
+    "rate limit": "what reaches the plant changes by at most {size} in a second",
+    "slope limit": "the plant's response changes by at most {size} of the command in a second",
     "drag": "a force of {size} times the square of the speed slows the motion",
     "gain ramp": "the gain changes by {share} over the recording",
     "gain by level": "the gain changes by {share} over the range of the output",
@@ -36,6 +38,8 @@ REMEDIES = {
     "stiction": "free the actuator, or command moves that are large against it",
     "upper limit": "give the controller this limit",
     "lower limit": "give the controller this limit",
+    "rate limit": "give the loop this limit of the command's rate",
+    "slope limit": "keep commands small enough not to reach it, or give the plant this limit",
     "drag": "the gain holds for speeds as in this recording",
     "gain ramp": "look what changes, such as a battery or a temperature",
     "gain by level": "record around the level at which the loop is to work",
@@ -59,7 +63,8 @@ class Cause:
     ----------
     name : str
         ``"load"``, ``"output step"``, ``"delay change"``, ``"dead zone"``, ``"play"``,
-        ``"stiction"``, ``"unequal limits"``, ``"drag"``, ``"gain ramp"`` or ``"gain by level"``.
+        ``"stiction"``, ``"unequal limits"``, ``"rate limit"``, ``"slope limit"``, ``"drag"``,
+        ``"gain ramp"`` or ``"gain by level"``.
     size : float
         In units of the command for a load, a dead zone, play, stiction and limits; of the output
         for its step; a share for a gain that changes; s for a change of delay.

@@ -445,6 +445,7 @@ fn one_kind(
             rows = Rows::new(records, starts, room, straight, question.in_loop);
         }
         rows.weights.clone_from(&weights);
+        rows.flexible = question.causes;
         let thin = rows.thinned(STARTS.thin);
         let plan = Plan {
             rows: &rows,
@@ -544,14 +545,16 @@ fn answer(
     let rows = found.first().map(|best| best.model.rows);
     let excited = rows.map_or(Vec::new(), excited);
     let is_sine = rows.is_some_and(|rows| is_one_sine(rows, &excited));
-    let candidate = |one: &Minimum<'_>| {
-        let mut out = Candidate::new(one, question.level);
+    let made = |one: &Minimum<'_>, may_be_wrong: bool| {
+        let mut out = Candidate::new(one, question.level, may_be_wrong);
         if is_sine {
             out.told = out.told.min(TOLD_BY_SINE);
         }
         out
     };
-    let mut minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
+    let candidate = |one: &Minimum<'_>| made(one, false);
+    let reached = within_reach(found).into_iter();
+    let mut minima: Vec<Candidate> = reached.map(|one| made(one, true)).collect();
     // What is further behind in BIC, though more likely, counts where the record tells all of it.
     let reach = minima.first().map_or(0.0, |best| best.bic) + EVIDENCE.reach;
     minima.retain(|one| one.bic <= reach || one.told == one.values.len());

@@ -300,9 +300,18 @@ fn under<'a>(
         });
         let contained = contained.min_by(|a, b| a.0.total_cmp(&b.0));
         starts.extend(contained.map(|(_, x)| x));
-        // Richer noise makes no class less likely.
-        let best = most_likely(&all).min(most_likely(before));
-        all.extend(distinct(&model, starts, (STARTS.refined, best), task)?);
+        // Richer noise makes no class less likely; the richest may begin far from where it ends.
+        let best = if kind == Noise::Arma22 {
+            most_likely(&all)
+        } else {
+            most_likely(&all).min(most_likely(before))
+        };
+        let follow = if kind == Noise::Arma22 {
+            STARTS.coloured
+        } else {
+            STARTS.refined
+        };
+        all.extend(distinct(&model, starts, (follow, best), task)?);
     }
     Ok(all)
 }

@@ -10,7 +10,7 @@
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
 //! leave open, `causes` what a linear plant lacks,
-//! `sensors` which readings are none, `hull` intervals over all classes within reach, `verdict` what is claimed.
+//! `sensors` which readings are none, `series` the error of a class, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
 mod between;
 mod candidate;
@@ -30,6 +30,7 @@ mod response;
 mod rows;
 mod search;
 mod sensors;
+mod series;
 mod starts;
 mod tolerances;
 mod verdict;

@@ -215,7 +215,8 @@ impl Model<'_> {
             }
             out
         };
-        (0..self.rows.causes.len()).map(of_one).collect()
+        let columns = self.rows.causes.iter().map(|cause| cause.columns());
+        (0..columns.sum()).map(of_one).collect()
     }
 
     /// The output, less its mean where a level is free.
@@ -421,33 +422,38 @@ impl Model<'_> {
         (point.squares / (free as f64 * dot(&own, &own))).sqrt()
     }
 
-    /// Take what the linear numbers explain, apart from the gain, from the slopes of the plant's
-    /// numbers: ln gain, delay, those of the lags, zero.
-    pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
-        let whitener = self.whitener(&point.x);
-        let mut beside: Vec<Vec<f64>> = point.asides.iter().map(|own| own.value.clone()).collect();
-        beside.extend(self.beside(&point.free));
-        let nuisance = Projection::new(
-            beside
-                .iter()
-                .map(|column| whitener.whiten(column))
-                .collect(),
-        );
+    /// What the command explains of the output.
+    pub(super) fn commanded(&self, point: &Point) -> Vec<f64> {
         let gain = self.gain(point);
-        let by_gain = point
+        point
             .response
             .value
             .iter()
             .map(|entry| gain * entry)
-            .collect();
-        std::iter::once(by_gain)
-            .chain(self.raw_slopes(point))
-            .map(|raw: Vec<f64>| {
-                let mut column = whitener.whiten(&raw);
+            .collect()
+    }
+
+    /// Whitened columns without what the linear numbers explain, apart from the gain.
+    pub(super) fn beside_linear(&self, point: &Point, raw: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let whitener = self.whitener(&point.x);
+        let asides = point.asides.iter().map(|own| own.value.clone());
+        let beside = asides.chain(self.beside(&point.free));
+        let nuisance = Projection::new(beside.map(|column| whitener.whiten(&column)).collect());
+        raw.iter()
+            .map(|raw| {
+                let mut column = whitener.whiten(raw);
                 nuisance.taken(&mut column);
                 column
             })
             .collect()
+    }
+
+    /// The slopes of the plant's numbers without what the other linear numbers explain: ln gain, delay,
+    /// those of the lags, zero.
+    pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
+        let mut raw = vec![self.commanded(point)];
+        raw.extend(self.raw_slopes(point));
+        self.beside_linear(point, raw)
     }
 }
 

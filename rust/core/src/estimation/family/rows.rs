@@ -295,6 +295,8 @@ pub(super) struct Rows {
     pub(super) in_loop: bool,
     /// What is fitted beside the plant.
     pub(super) causes: Vec<CauseKind>,
+    /// May the class be in error?
+    pub(super) flexible: bool,
 }
 
 impl Rows {
@@ -319,6 +321,7 @@ impl Rows {
             largest_delay,
             in_loop,
             causes: Vec::new(),
+            flexible: false,
             parts,
         }
     }

@@ -70,7 +70,7 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
         }
     };
     let repeats = repeats(&values);
-    let usual = median(repeats.iter().map(|run| run.len() as f64).collect());
+    let usual = usual_run(&values);
     let long = SENSORS.frozen.max(SENSORS.longer * usual);
     let (frozen, short): (Vec<_>, Vec<_>) = repeats
         .into_iter()
@@ -81,6 +81,12 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
     leave(SensorKind::Repeated, &short);
     leave(SensorKind::Glitch, &glitches(&values));
     (out, faults)
+}
+
+/// How many rows a reading usually lasts.
+fn usual_run(values: &[f64]) -> f64 {
+    let runs = values.chunk_by(|one, next| one == next);
+    median(runs.map(|run| run.len() as f64).collect())
 }
 
 /// Readings that repeat the one before them by more than chance.

@@ -84,6 +84,8 @@ pub(super) struct Starts {
     pub(super) followed: usize,
     /// The same where minima of the class are known.
     pub(super) refined: usize,
+    /// The same under the richest noise, whose numbers may begin at a limit.
+    pub(super) coloured: usize,
     /// Minima of a class that are kept.
     pub(super) kept: usize,
     /// All of these for a class without lags, whose delays may be periods of the command apart.
@@ -102,6 +104,7 @@ pub(super) const STARTS: Starts = Starts {
     gridded: 2,
     followed: 4,
     refined: 3,
+    coloured: 5,
     kept: 2,
     delays_only: 8,
     thin: 400,
@@ -251,7 +254,7 @@ pub(super) const CAUSES: Causes = Causes {
     refined: 8,
     settled: 0.002,
     adopted: 6.0,
-    further: 0.1,
+    further: 0.04,
     apart: 0.1,
     again: 0.3,
     between: 8,
@@ -292,4 +295,27 @@ pub(super) const SENSORS: Sensors = Sensors {
     longest: 5,
     around: 6,
     far: 3.0,
+};
+
+/// The series that stands for a plant's error.
+pub(super) struct Flexible {
+    /// Its pole in multiples of one over the delay and lags: more sees errors at higher frequencies.
+    pub(super) pole: f64,
+    /// Half of the angle of a row from which on it stays as it is, below π/2.
+    pub(super) highest: f64,
+    /// Deviations of its factors that are tried: the least, the largest, how many.
+    pub(super) least: f64,
+    pub(super) most: f64,
+    pub(super) sizes: usize,
+    /// Fall of −2 ln L from which on a series is taken: more is narrower.
+    pub(super) fall: f64,
+}
+
+pub(super) const SERIES: Flexible = Flexible {
+    pole: 2.0,
+    highest: 1.5,
+    least: 1e-3,
+    most: 1.0,
+    sizes: 25,
+    fall: 0.0,
 };

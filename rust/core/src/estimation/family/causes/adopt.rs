@@ -7,8 +7,10 @@ use super::super::model::Model;
 use super::super::noise::Noise;
 use super::super::rows::Rows;
 use super::super::search::minimum;
+use super::super::series::flexible_bic;
 use super::super::tolerances::{CAUSES, EVIDENCE, STARTS};
-use super::asides::{Aside, from_time, moving};
+use super::asides::{columns_from, moving};
+use super::commands::Shape;
 use super::screen::{Suspect, begins_again, suspects};
 use super::{Cause, CauseKind};
 use crate::elementary::log;
@@ -37,7 +39,8 @@ fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows
             minimum(&model, model.at(x), f64::INFINITY, task)?
         };
         let each = 0..rows.parts.len();
-        let asides = each.map(|at| moving(kind, &model, &point, at)).collect();
+        let asides = each.map(|at| moving(kind, &model, &point, at).map(|own| vec![own]));
+        let asides = asides.collect();
         x = point.x;
         own = rows.with_asides(kind, asides);
     }
@@ -47,33 +50,41 @@ fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows
 /// The rows with something that begins, at the likeliest time beside that of the score.
 fn beginning(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
     let with = |time: f64| {
-        let mut asides: Vec<Option<Aside>> = vec![None; rows.parts.len()];
+        let mut asides = vec![None; rows.parts.len()];
         let part = &rows.parts[suspect.record];
-        asides[suspect.record] = Some(from_time(suspect.kind, part, time));
+        asides[suspect.record] = Some(columns_from(suspect.kind, part, time));
         rows.with_asides(suspect.kind, asides)
     };
     let mut x = suspect.x.clone();
-    let mut deviance = |time: f64| -> Result<f64, Error> {
-        let own = with(time);
-        let model = beside(suspect, &own);
-        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
-        let found = model.deviance(&point);
-        x = point.x;
-        Ok(found)
-    };
-    let mut best = (deviance(suspect.time)?, suspect.time);
-    let mut reach = suspect.between.1;
-    while reach > CAUSES.near * rows.parts[suspect.record].row {
-        reach *= 0.5;
-        for time in [best.1 - reach, best.1 + reach] {
-            let found = deviance(time)?;
-            if found < best.0 {
-                best = (found, time);
+    let mut best = (f64::INFINITY, suspect.time, 0.0);
+    let mut time = suspect.time;
+    if suspect.kind == CauseKind::Load {
+        for _ in 0..CAUSES.refined {
+            let own = with(time);
+            let model = beside(suspect, &own);
+            let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
+            let deviance = model.deviance(&point);
+            let later = match point.of_causes() {
+                [.., slope, size] => -slope / size,
+                _ => 0.0,
+            };
+            if deviance < best.0 {
+                best = (deviance, time, later);
+                x = point.x;
+            } else {
+                // Too far.
+                best.2 *= 0.5;
             }
+            let step = best.2.clamp(-suspect.between.1, suspect.between.1);
+            if !step.is_finite() || step.abs() < CAUSES.near * rows.parts[suspect.record].row {
+                break;
+            }
+            time = best.1 + step;
         }
+        time = best.1;
     }
-    let out = with(best.1);
-    suspect.time = best.1;
+    let out = with(time);
+    suspect.time = time;
     Ok(out)
 }
 
@@ -94,15 +105,23 @@ fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64),
     if kind == CauseKind::Stiction {
         return sticking(suspect, rows, task);
     }
-    let (mut size, mut best) = (suspect.size, (f64::INFINITY, suspect.size));
+    let mut size = suspect.size;
     let mut x = suspect.x.clone();
+    let first = Shape {
+        kind,
+        size,
+        lag: 0.0,
+    };
+    let mut best = (f64::INFINITY, first);
     for _ in 0..CAUSES.refined {
-        let own = rows.behind(kind, size);
+        let lag = beside(suspect, rows).numbers(&x).lag();
+        let shape = Shape { kind, size, lag };
+        let own = rows.behind(shape);
         let model = beside(suspect, &own);
         let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
         let deviance = model.deviance(&point);
         if deviance < best.0 {
-            best = (deviance, size);
+            best = (deviance, shape);
             x.clone_from(&point.x);
         }
         let change = point.of_causes().last().copied().unwrap_or(0.0) / model.gain(&point);
@@ -114,24 +133,29 @@ fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64),
         }
         size = next;
     }
-    Ok((rows.behind(kind, best.1), best.1))
+    Ok((rows.behind(best.1), best.1.size))
 }
 
 /// The same of what sticks, whose likelihood jumps between sizes.
 fn sticking(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
     let (low, high) = suspect.between;
-    let mut best = (f64::INFINITY, suspect.size);
+    let mut shape = Shape {
+        kind: suspect.kind,
+        size: suspect.size,
+        lag: 0.0,
+    };
+    let mut best = (f64::INFINITY, shape);
     for step in 1..CAUSES.between {
-        let size = low + (high - low) * step as f64 / CAUSES.between as f64;
-        let own = rows.behind(suspect.kind, size);
+        shape.size = low + (high - low) * step as f64 / CAUSES.between as f64;
+        let own = rows.behind(shape);
         let model = beside(suspect, &own);
         let point = minimum(&model, model.at(suspect.x.clone()), f64::INFINITY, task)?;
         let deviance = model.deviance(&point);
         if deviance < best.0 {
-            best = (deviance, size);
+            best = (deviance, shape);
         }
     }
-    Ok((rows.behind(suspect.kind, best.1), best.1))
+    Ok((rows.behind(best.1), best.1.size))
 }
 
 /// The causes of a minimum, the last one with the size that the command had passed.
@@ -153,19 +177,19 @@ fn causes_of(
         record: suspect.record,
         lead,
     });
-    let count = out.len();
-    for (at, (cause, factor)) in out.iter_mut().zip(point.of_causes()).enumerate() {
+    let (count, mut end) = (out.len(), 0);
+    for (at, cause) in out.iter_mut().enumerate() {
+        end += cause.kind.columns();
         let scale = if cause.kind == CauseKind::OutputStep {
             1.0
         } else {
             gain
         };
         if cause.kind == CauseKind::Stiction {
-            if at + 1 < count {
-                continue;
+            if at + 1 == count {
+                let step = (suspect.between.1 - suspect.between.0) / CAUSES.between as f64;
+                cause.error = step / 12.0_f64.sqrt();
             }
-            let step = (suspect.between.1 - suspect.between.0) / CAUSES.between as f64;
-            cause.error = step / 12.0_f64.sqrt();
             continue;
         }
         let passed = if cause.kind.is_passed() {
@@ -173,8 +197,8 @@ fn causes_of(
         } else {
             0.0
         };
-        cause.size = passed + factor / scale;
-        cause.error = model.error_of_cause(point, at) / scale.abs();
+        cause.size = passed + point.of_causes()[end - 1] / scale;
+        cause.error = model.error_of_cause(point, end - 1) / scale.abs();
     }
     out
 }
@@ -236,8 +260,13 @@ pub(in super::super) fn with_causes(
     }
     let bic = |at: usize| fits[at].first().map_or(f64::INFINITY, |one| one.bic);
     let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
+    // Plants whose class is in error explain what a cause would.
+    let near = found
+        .iter()
+        .filter(|one| one.bic < best.bic + EVIDENCE.reach);
+    let linear = near.map(flexible_bic).fold(best.bic, f64::min);
     let mut adopted = None;
-    if let Some(at) = winner.filter(|at| bic(*at) < best.bic - CAUSES.adopted)
+    if let Some(at) = winner.filter(|at| bic(*at) < linear - CAUSES.adopted)
         && is_there(&families[at].causes, &fits[at], plan, task)?
     {
         adopted = Some(at);
@@ -248,7 +277,7 @@ pub(in super::super) fn with_causes(
             let deeper = with_causes(family, &plans[at], &fits[at], answer, task)?;
             (deeper, bic(at) + EVIDENCE.reach)
         }
-        None => (own.clone(), best.bic),
+        None => (own.clone(), linear),
     };
     if adopted.is_some() {
         out.add_within(&own, floor);

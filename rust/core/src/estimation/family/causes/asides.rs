@@ -6,6 +6,9 @@ use super::super::response::{Response, response, response_to};
 use super::super::rows::{Part, Rows};
 use super::CauseKind;
 
+/// The length of an impulse, in rows.
+const SHORT: f64 = 0.05;
+
 /// Something that adds to the output of one record.
 #[derive(Debug, Clone)]
 pub(in super::super) enum Aside {
@@ -18,10 +21,41 @@ pub(in super::super) enum Aside {
         /// Is it straight between them, or held?
         straight: bool,
     },
+    /// The difference of two signals at the input of the plant, times a factor.
+    Difference(Signal, Signal, f64),
     /// A step of the output from this time on.
     Step(f64),
     /// A delay that is longer by a half after this time, and shorter before it.
     Later(f64),
+}
+
+/// A signal at the input of the plant.
+#[derive(Debug, Clone)]
+pub(in super::super) struct Signal {
+    /// Times, s.
+    pub(super) sent: Vec<f64>,
+    /// Values.
+    pub(super) value: Vec<f64>,
+    /// Is it straight between them, or held?
+    pub(super) straight: bool,
+}
+
+impl Signal {
+    fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
+        let first = self.value.first().copied().unwrap_or(0.0);
+        let value: Vec<f64> = self.value.iter().map(|own| own - first).collect();
+        response_to(&self.sent, &value, self.straight, part, class, numbers)
+    }
+
+    /// What it has more than another one, times a factor.
+    pub(super) fn less(self, other: Self, factor: f64) -> Aside {
+        if self.sent != other.sent || self.straight != other.straight {
+            return Aside::Difference(self, other, factor);
+        }
+        let pairs = self.value.iter().zip(&other.value);
+        let value = pairs.map(|(one, other)| factor * (one - other)).collect();
+        Aside::input(self.sent, value, self.straight)
+    }
 }
 
 impl Aside {
@@ -49,6 +83,13 @@ impl Aside {
                 value,
                 straight,
             } => response_to(sent, value, *straight, part, class, numbers),
+            Self::Difference(one, other, factor) => {
+                let mut out = Response::zero(part.used.len());
+                for (signal, factor) in [(one, *factor), (other, -factor)] {
+                    out.add(factor, &signal.response(part, class, numbers));
+                }
+                out
+            }
             Self::Step(from) => {
                 let mut out = Response::zero(part.used.len());
                 for (value, row) in out.value.iter_mut().zip(&part.used) {
@@ -81,6 +122,18 @@ pub(super) fn from_time(kind: CauseKind, part: &Part, time: f64) -> Aside {
             Aside::input(sent, vec![0.0, 1.0], false)
         }
     }
+}
+
+/// The columns of what begins at a time, that of its size last.
+pub(super) fn columns_from(kind: CauseKind, part: &Part, time: f64) -> Vec<Aside> {
+    let own = from_time(kind, part, time);
+    if kind != CauseKind::Load {
+        return vec![own];
+    }
+    // The slope over the time: an impulse.
+    let (early, width) = (time.min(part.time[0]) - part.row, SHORT * part.row);
+    let sent = vec![early, time, time + width];
+    vec![Aside::input(sent, vec![0.0, 1.0 / width, 0.0], false), own]
 }
 
 /// The input of a gain that changes or of a drag, as the plant of a minimum moves.
@@ -158,11 +211,14 @@ fn between(times: &[f64], values: &[f64], time: f64) -> f64 {
 }
 
 impl Rows {
-    /// With something aside in some of its records.
-    pub(super) fn with_asides(&self, kind: CauseKind, asides: Vec<Option<Aside>>) -> Self {
+    /// With the columns of a cause aside in some of its records.
+    pub(super) fn with_asides(&self, kind: CauseKind, asides: Vec<Option<Vec<Aside>>>) -> Self {
         let mut out = self.clone();
         for (part, aside) in out.parts.iter_mut().zip(asides) {
-            part.asides.push(aside);
+            match aside {
+                Some(own) => part.asides.extend(own.into_iter().map(Some)),
+                None => part.asides.extend((0..kind.columns()).map(|_| None)),
+            }
         }
         out.causes.push(kind);
         out

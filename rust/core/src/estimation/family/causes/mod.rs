@@ -2,7 +2,7 @@
 //!
 //! A cause changes the command that reaches the plant, by a size that is one number more:
 //! ```text
-//! u → play(u, b), stiction(u, b), dead zone(u, b), min(u, b), max(u, −b),
+//! u → play(u, b), stiction(u, b), dead zone(u, b), min(u, b), max(u, −b), |u′| ≤ b, |v′| ≤ b,
 //! u → u + c w,  w = 1(t ≥ t₀), u (t − t̄)/span, u (y − ȳ)/range, −v |v|.
 //! ```
 //! `commands` has the first kind, `asides` the second, with a step of the output, which is a sensor's.
@@ -36,6 +36,10 @@ pub enum CauseKind {
     UpperLimit,
     /// A command is not below minus this.
     LowerLimit,
+    /// What reaches the plant changes by at most this in a second.
+    RateLimit,
+    /// The output of the plant's lag changes by at most this in a second, in units of the command.
+    SlopeLimit,
     /// A force against the motion, by its square.
     Drag,
     /// The gain changes by this share over the record.
@@ -46,7 +50,7 @@ pub enum CauseKind {
 
 impl CauseKind {
     /// All of them.
-    pub(super) const ALL: [Self; 11] = [
+    pub(super) const ALL: [Self; 13] = [
         Self::Load,
         Self::OutputStep,
         Self::DelayChange,
@@ -55,6 +59,8 @@ impl CauseKind {
         Self::Stiction,
         Self::UpperLimit,
         Self::LowerLimit,
+        Self::RateLimit,
+        Self::SlopeLimit,
         Self::Drag,
         Self::GainRamp,
         Self::GainByLevel,
@@ -71,6 +77,8 @@ impl CauseKind {
             Self::Stiction => "stiction",
             Self::UpperLimit => "upper limit",
             Self::LowerLimit => "lower limit",
+            Self::RateLimit => "rate limit",
+            Self::SlopeLimit => "slope limit",
             Self::Drag => "drag",
             Self::GainRamp => "gain ramp",
             Self::GainByLevel => "gain by level",
@@ -86,7 +94,13 @@ impl CauseKind {
     pub(super) fn is_passed(self) -> bool {
         matches!(
             self,
-            Self::DeadZone | Self::Play | Self::Stiction | Self::UpperLimit | Self::LowerLimit
+            Self::DeadZone
+                | Self::Play
+                | Self::Stiction
+                | Self::UpperLimit
+                | Self::LowerLimit
+                | Self::RateLimit
+                | Self::SlopeLimit
         )
     }
 
@@ -95,9 +109,19 @@ impl CauseKind {
         self.is_passed() || self == Self::Drag
     }
 
+    /// Does it depend on where the actuator was at first?
+    pub(super) fn remembers(self) -> bool {
+        matches!(self, Self::Play | Self::Stiction)
+    }
+
+    /// How many columns it has, that of its size last; of a load the other is that of its time.
+    pub(super) fn columns(self) -> usize {
+        1 + usize::from(self.remembers() || self == Self::Load)
+    }
+
     /// How many numbers it needs.
     pub(super) fn parameters(self) -> usize {
-        1 + usize::from(self.begins())
+        1 + usize::from(self.remembers() || self.begins())
     }
 }
 

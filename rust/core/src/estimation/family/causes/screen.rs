@@ -12,7 +12,7 @@ use super::super::rows::{Part, Rows};
 use super::super::tolerances::{CAUSES, EVIDENCE};
 use super::CauseKind;
 use super::asides::{Aside, from_time, moving};
-use super::commands::{neighbours, sizes};
+use super::commands::{Shape, neighbours, sizes};
 use crate::elementary::log;
 use crate::linear_algebra::vectors::dot;
 use crate::{Error, Task};
@@ -28,7 +28,7 @@ pub(super) struct Suspect {
     pub(super) record: usize,
     pub(super) time: f64,
     /// BIC to expect.
-    bic: f64,
+    pub(super) bic: f64,
     /// The plant beside which it is most likely.
     pub(super) class: Class,
     pub(super) x: Vec<f64>,
@@ -206,11 +206,15 @@ fn lasting(kind: CauseKind, rows: &Rows, frames: &[Frame<'_>]) -> Vec<Suspect> {
             continue;
         }
         let gain = frame.model.gain(&frame.point);
+        let lag = frame.model.numbers(&frame.point.x).lag();
         for (place, size) in tried.iter().enumerate() {
+            let shape = Shape {
+                kind,
+                size: *size,
+                lag,
+            };
             let each = rows.parts.iter();
-            let asides: Vec<_> = each
-                .map(|part| Some(rows.taken(kind, *size, part)))
-                .collect();
+            let asides: Vec<_> = each.map(|part| Some(shape.taken(part))).collect();
             let (bic, factor) = frame.bic_with(kind, &asides, gain);
             if factor > CAUSES.share {
                 let mut one = suspect(kind, frame, bic);
