@@ -84,7 +84,8 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
     }
     let mut simpler = Vec::new();
     let near = least(&out) + EVIDENCE.reach;
-    for found in &mut out {
+    let hopeless = least(&out) + EVIDENCE.hopeless;
+    for found in out.iter_mut().filter(|found| found.bic < hopeless) {
         let closely = found.bic < near;
         if let Some(without) = without_level(found, closely, task)? {
             if without.bic < found.bic {
@@ -166,8 +167,9 @@ fn least(found: &[Minimum<'_>]) -> f64 {
 
 fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Error> {
     let mut all: Vec<Minimum<'a>> = Vec::new();
-    // Classes that are contained in those asked for are fitted too: they are starts.
-    for class in Class::all() {
+    // Classes at which those asked for may start are fitted too.
+    let starts = |class: &Class| plan.classes.iter().any(|asked| class.leads_to(*asked));
+    for class in Class::all().filter(starts) {
         let model = Model {
             rows: plan.rows,
             class,
