@@ -389,6 +389,8 @@ fn one_kind(
         .largest_delay
         .unwrap_or(RANGES.delay_share * shortest(records));
     let (mut classes, noises) = asked(question);
+    let leads = |class: &Class| classes.iter().any(|asked| class.leads_to(*asked));
+    let begun: Vec<Class> = Class::all().filter(leads).collect();
     let mut rows = Rows::new(records, starts, largest, straight, question.in_loop);
     check_rows(&rows, largest)?;
     let (mut room, mut seeds, mut weights);
@@ -401,6 +403,7 @@ fn one_kind(
             rows: &thin,
             thin: &thin,
             classes: &classes,
+            begun: &begun,
             noises: &[Noise::White],
             seeds: &[],
         };
@@ -421,6 +424,7 @@ fn one_kind(
             rows: &rows,
             thin: &thin,
             classes: &classes,
+            begun: &begun,
             noises: &noises,
             seeds: &seeds,
         };

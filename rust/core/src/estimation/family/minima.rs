@@ -53,6 +53,8 @@ pub(super) struct Plan<'a> {
     /// Fewer rows, for grids.
     pub(super) thin: &'a Rows,
     pub(super) classes: &'a [Class],
+    /// Those that are fitted under white noise, for others may start at them.
+    pub(super) begun: &'a [Class],
     pub(super) noises: &'a [Noise],
     /// Numbers of minima that are known; a grid takes the place of those of a class that has none.
     pub(super) seeds: &'a [(Class, Numbers)],
@@ -84,8 +86,7 @@ pub(super) fn minima<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>
     }
     let mut simpler = Vec::new();
     let near = least(&out) + EVIDENCE.reach;
-    let hopeless = least(&out) + EVIDENCE.hopeless;
-    for found in out.iter_mut().filter(|found| found.bic < hopeless) {
+    for found in &mut out {
         let closely = found.bic < near;
         if let Some(without) = without_level(found, closely, task)? {
             if without.bic < found.bic {
@@ -167,9 +168,7 @@ fn least(found: &[Minimum<'_>]) -> f64 {
 
 fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Error> {
     let mut all: Vec<Minimum<'a>> = Vec::new();
-    // Classes at which those asked for may start are fitted too.
-    let starts = |class: &Class| plan.classes.iter().any(|asked| class.leads_to(*asked));
-    for class in Class::all().filter(starts) {
+    for class in plan.begun.iter().copied() {
         let model = Model {
             rows: plan.rows,
             class,
