@@ -25,6 +25,11 @@ pub(super) fn minimum(
             let Some(x) = next else {
                 break;
             };
+            // A step that a range cuts short may promise more where it is shorter.
+            if count * normal.promised(&best.x, &x) < SEARCH.fall * best.squares {
+                damping *= SEARCH.change * SEARCH.change;
+                continue;
+            }
             let point = model.at(x);
             if point.squares < best.squares {
                 fallen = Some(count * (best.squares - point.squares) / best.squares);
