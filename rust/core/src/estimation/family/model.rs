@@ -6,7 +6,7 @@
 
 use super::class::{Class, Numbers};
 use super::noise::{Noise, Whitener};
-use super::projection::Projection;
+use super::projection::{Column, Projection};
 use super::response::{Response, free_responses, response};
 use super::rows::{Part, Rows, Start};
 use super::tolerances::{RANGES, SEARCH};
@@ -43,7 +43,7 @@ pub(super) struct Point {
     response: Response,
     /// Of each cause.
     asides: Vec<Response>,
-    free: Vec<Vec<f64>>,
+    free: Vec<Column>,
     pub(super) projection: Projection,
 }
 
@@ -153,31 +153,21 @@ impl Model<'_> {
         }
     }
 
-    /// A column that is zero outside one record.
-    fn column_of(
-        &self,
-        own: impl Iterator<Item = f64>,
-        place: &std::ops::Range<usize>,
-    ) -> Vec<f64> {
-        let mut out = vec![0.0; self.rows.count()];
-        for (entry, value) in out[place.clone()].iter_mut().zip(own) {
-            *entry = value;
-        }
-        out
-    }
-
     /// The linear columns beside the response, the free responses of the lags last.
-    fn beside(&self, free: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn beside(&self, free: &[Column]) -> Vec<Column> {
         let mut columns = Vec::with_capacity(2 * self.rows.parts.len() + free.len());
         for (part, place) in self.rows.parts.iter().zip(self.rows.places()) {
+            let from = place.start;
             if self.level || self.class.integrating {
-                columns.push(self.column_of(std::iter::repeat(1.0), &place));
+                let values = vec![1.0; place.len()];
+                columns.push(Column { from, values });
             }
             if part.start != Start::Rest && self.class.integrating && self.level {
-                let middle = 0.5 * part.span;
-                let from = part.time[0] + middle;
-                let slope = part.used.iter().map(|at| (part.time[*at] - from) / middle);
-                columns.push(self.column_of(slope, &place));
+                let half = 0.5 * part.span;
+                let middle = part.time[0] + half;
+                let slope = part.used.iter().map(|at| (part.time[*at] - middle) / half);
+                let values = slope.collect();
+                columns.push(Column { from, values });
             }
         }
         columns.extend(free.iter().cloned());
@@ -229,12 +219,13 @@ impl Model<'_> {
     }
 
     /// The free responses of the lags, one column a record and state.
-    fn free(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
+    fn free(&self, numbers: &Numbers) -> Vec<Column> {
         let mut columns = Vec::new();
         for (part, place) in self.rows.parts.iter().zip(self.rows.places()) {
             if part.start != Start::Rest {
                 let own = free_responses(part, self.class, numbers).into_iter();
-                columns.extend(own.map(|own| self.column_of(own.into_iter(), &place)));
+                let from = place.start;
+                columns.extend(own.map(|values| Column { from, values }));
             }
         }
         columns
@@ -281,20 +272,19 @@ impl Model<'_> {
             (Response::default(), Vec::new(), Vec::new())
         };
         let whitener = self.whitener(&x);
-        let mut raw: Vec<Vec<f64>> = asides.iter().map(|own| own.value.clone()).collect();
+        let mut raw: Vec<Column> = asides.iter().map(|own| own.value.clone().into()).collect();
         raw.extend(self.beside(&free));
         if self.responds {
-            raw.push(response.value.clone());
+            raw.push(response.value.clone().into());
         }
-        let whitened: Vec<Vec<f64>> = raw.iter().map(|column| whitener.whiten(column)).collect();
-        let projection = Projection::new(whitened);
+        let projection = Projection::new(raw.iter().map(|column| whitener.column(column)));
         let output = self.output();
         let mut left = whitener.whiten(&output);
         let parts = projection.taken(&mut left);
         let linear = projection.coefficients(&parts);
         let mut residual = output;
         for (column, factor) in raw.iter().zip(&linear) {
-            add_multiple(&mut residual, -factor, column);
+            column.add_to(&mut residual, -factor);
         }
         let parts = whitener.squares(&left, self.rows);
         Point {
@@ -391,8 +381,8 @@ impl Model<'_> {
                 for ((factor, after), before) in
                     point.linear[places].iter().zip(&later).zip(&point.free)
                 {
-                    add_multiple(&mut change, factor / SEARCH.step, after);
-                    add_multiple(&mut change, -factor / SEARCH.step, before);
+                    after.add_to(&mut change, factor / SEARCH.step);
+                    before.add_to(&mut change, -factor / SEARCH.step);
                 }
             }
             columns.push(change);
@@ -408,16 +398,12 @@ impl Model<'_> {
         let whitener = self.whitener(&point.x);
         let mut others = self.beside(&point.free);
         let asides = point.asides.iter().enumerate();
-        others.extend(
-            asides
-                .filter(|(own, _)| *own != at)
-                .map(|(_, own)| own.value.clone()),
-        );
-        others.push(point.response.value.clone());
-        others.extend(self.raw_slopes(point));
-        let whitened = others.iter().map(|column| whitener.whiten(column));
+        let asides = asides.filter(|(own, _)| *own != at);
+        others.extend(asides.map(|(_, own)| own.value.clone().into()));
+        others.push(point.response.value.clone().into());
+        others.extend(self.raw_slopes(point).into_iter().map(Column::from));
         let mut own = whitener.whiten(&point.asides[at].value);
-        Projection::new(whitened.collect()).taken(&mut own);
+        Projection::new(others.iter().map(|column| whitener.column(column))).taken(&mut own);
         let free = self.rows.count().saturating_sub(self.parameters()).max(1);
         (point.squares / (free as f64 * dot(&own, &own))).sqrt()
     }
@@ -436,9 +422,9 @@ impl Model<'_> {
     /// Whitened columns without what the linear numbers explain, apart from the gain.
     pub(super) fn beside_linear(&self, point: &Point, raw: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let whitener = self.whitener(&point.x);
-        let asides = point.asides.iter().map(|own| own.value.clone());
+        let asides = point.asides.iter().map(|own| own.value.clone().into());
         let beside = asides.chain(self.beside(&point.free));
-        let nuisance = Projection::new(beside.map(|column| whitener.whiten(&column)).collect());
+        let nuisance = Projection::new(beside.map(|column| whitener.column(&column)));
         raw.iter()
             .map(|raw| {
                 let mut column = whitener.whiten(raw);
@@ -472,6 +458,22 @@ impl Whiteners<'_> {
         pairs
             .flat_map(|(own, place)| own.whiten(&column[place.clone()]))
             .collect()
+    }
+
+    /// A column of one record, or of all.
+    fn column(&self, column: &Column) -> Column {
+        let pairs = self.own.iter().zip(&self.places);
+        let own = pairs
+            .into_iter()
+            .find(|(_, place)| **place == column.rows());
+        let values = match own {
+            Some((own, _)) => own.whiten(&column.values),
+            None => self.whiten(&column.values),
+        };
+        Column {
+            from: column.from,
+            values,
+        }
     }
 
     /// The sum of squares of each record, not below that of rounding.
