@@ -48,7 +48,7 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
     let mut out = record.clone();
     let mut faults = Vec::new();
     let known: Vec<usize> = (0..out.output.len())
-        .filter(|row| out.output[*row].is_finite())
+        .filter(|row| *row >= out.earlier && out.output[*row].is_finite())
         .collect();
     if known.len() < SENSORS.fewest {
         return (out, faults);
@@ -124,7 +124,8 @@ fn repeats(values: &[f64]) -> Vec<std::ops::Range<usize>> {
         let leaves = steps
             .get(at)
             .is_none_or(|step| *step >= SENSORS.coarse * least);
-        if (at - start) as f64 >= longest && leaves {
+        // A plant may rest before its first command.
+        if start > 0 && (at - start) as f64 >= longest && leaves {
             out.push(start + 1..at + 1);
         }
         at += 1;

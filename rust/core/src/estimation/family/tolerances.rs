@@ -224,6 +224,8 @@ pub(super) struct Causes {
     pub(super) settled: f64,
     /// BIC by which a cause has to lead: less names what is not there.
     pub(super) adopted: f64,
+    /// BIC by which it leads where the plant without it is ruled out: more widens intervals.
+    pub(super) certain: f64,
     /// The same for a further one, as a share of the lead of the first: less takes for a second cause what
     /// is wrong with the first.
     pub(super) further: f64,
@@ -254,6 +256,7 @@ pub(super) const CAUSES: Causes = Causes {
     refined: 8,
     settled: 0.002,
     adopted: 6.0,
+    certain: 40.0,
     further: 0.04,
     apart: 0.1,
     again: 0.3,

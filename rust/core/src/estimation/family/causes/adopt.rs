@@ -279,8 +279,8 @@ pub(in super::super) fn with_causes(
         }
         None => (own.clone(), linear),
     };
-    if adopted.is_some() {
-        out.add_within(&own, floor);
+    if adopted.is_some_and(|at| best.bic < bic(at) + CAUSES.certain) {
+        out.add_within(&own, f64::INFINITY);
     }
     for (at, family) in families.iter().enumerate() {
         if Some(at) != adopted {
