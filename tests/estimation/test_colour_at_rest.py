@@ -66,11 +66,13 @@ def test_an_estimate_under_such_noise_is_reliable_and_its_intervals_hold_the_tru
 
 
 @pytest.mark.parametrize("plant", [LAGGED, OVERSHOOTING])
-def test_a_plant_that_lacks_something_is_refused_under_such_noise(plant):
-    fits = [dtm.estimate_delay(flown(seed, plant), LOOP, free=FREE) for seed in range(3)]
+@pytest.mark.parametrize("flights", [1, pytest.param(3, marks=NIGHTLY)])
+def test_a_plant_that_lacks_something_is_refused_under_such_noise(plant, flights):
+    fits = [dtm.estimate_delay(flown(seed, plant), LOOP, free=FREE) for seed in range(flights)]
     assert not any(fit.verdict == "reliable" for fit in fits)
 
 
+@pytest.mark.survey
 def test_a_plant_that_overshoots_is_told_from_one_that_lags():
     loop = LOOP.replace(plant=dtm.Integrator(1.0, lag=0.1))
     fit = dtm.estimate_delay(flown(1, OVERSHOOTING), loop, free=(*FREE, "lag"))
@@ -83,8 +85,12 @@ def test_a_plant_that_overshoots_is_told_from_one_that_lags():
     assert low < DELAY + 0.03 < high
 
 
-def test_a_colour_that_is_not_there_at_rest_is_a_reason():
-    fits = [dtm.estimate_delay(flown(seed, moving_only=True), LOOP, free=FREE) for seed in range(4)]
+@pytest.mark.parametrize("flights", [2, pytest.param(4, marks=NIGHTLY)])
+def test_a_colour_that_is_not_there_at_rest_is_a_reason(flights):
+    fits = [
+        dtm.estimate_delay(flown(seed, moving_only=True), LOOP, free=FREE)
+        for seed in range(flights)
+    ]
     assert not any(fit.verdict == "reliable" for fit in fits)
 
 

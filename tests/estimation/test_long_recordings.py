@@ -79,6 +79,8 @@ def test_the_search_uses_the_rows_in_which_the_command_changes():
     assert excited_part(short) is short
 
 
+@pytest.mark.long
+@pytest.mark.survey
 def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
     known = TRUTH.replace(delay=None, lag=0.0)
     fit = dtm.estimate_delay(recorded(20_000), known)
@@ -86,6 +88,8 @@ def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
     assert "a further lag" in fit.message
 
 
+@pytest.mark.long
+@pytest.mark.survey
 def test_rows_that_were_lost_before_the_part_are_no_unknowns_of_it():
     recording = recorded(7000)
     kept = np.random.default_rng(1).random(7000) > 0.05

@@ -44,7 +44,13 @@ def test_a_hole_in_the_rise_costs_no_more_than_the_bound_says(number):
 # Of 522 and 203 the whole answer lies in the hole; 40 was predicted from two noisy rows before it;
 # in 360 the nearest maximum of the likelihood was 60 ms away from the highest.
 @pytest.mark.parametrize(
-    ("name", "number"), [("hole of 1 s", n) for n in (40, 203, 522)] + [("rows lost 20 %", 360)]
+    ("name", "number"),
+    [
+        ("hole of 1 s", 203),
+        ("hole of 1 s", 522),
+        pytest.param("hole of 1 s", 40, marks=pytest.mark.survey),
+        pytest.param("rows lost 20 %", 360, marks=pytest.mark.survey),
+    ],
 )
 def test_the_highest_of_several_maxima_is_found(name, number):
     run, fit = estimate(name, number)
@@ -54,6 +60,7 @@ def test_the_highest_of_several_maxima_is_found(name, number):
     assert abs(fit.delay - run.vehicle.delay) < 5.0 * least
 
 
+@pytest.mark.survey
 def test_a_lag_near_zero_beside_a_hole_is_estimated():
     # A step of the curvature leads below zero, where the likelihood has no finite value.
     condition = replace(NAMED["lag free white"], name="hole, lag free", hole=1.0)
@@ -101,6 +108,7 @@ def test_values_are_smoothed_around_their_own_place(rows):
         assert np.std(means - np.sin(6.0 * place)) < 0.05
 
 
+@pytest.mark.survey
 def test_the_reference_may_change_in_any_of_many_missing_rows():
     # Five rows are missing around the step, which begins in the fourth of them.
     run, fit = estimate("rows lost 20 %", 118)

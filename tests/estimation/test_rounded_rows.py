@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from deadtime.estimation.fit._directions import all_directions
 from deadtime.estimation.likelihood._rounded import RoundedLikelihood
+from marks import NIGHTLY
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -121,9 +122,12 @@ def estimated(recordings: list[dtm.Recording]) -> dtm.DelayEstimate:
     )
 
 
-def test_intervals_of_rounded_flights_cover_and_their_errors_are_those_of_the_bound() -> None:
+@pytest.mark.parametrize(("flights", "least"), [(6, 4), pytest.param(12, 9, marks=NIGHTLY)])
+def test_intervals_of_rounded_flights_cover_and_their_errors_are_those_of_the_bound(
+    flights: int, least: int
+) -> None:
     errors, held, bounds, read = [], [], [], 0
-    for seed in range(12):
+    for seed in range(flights):
         fit = estimated([flight(seed)])
         # In some flights rounding errors are taken for air, and their rows for values.
         read += "interval of its rounding" in fit.message
@@ -135,11 +139,11 @@ def test_intervals_of_rounded_flights_cover_and_their_errors_are_those_of_the_bo
                 for (low, high), true in ((fit.ci(), DELAY), (fit.ci(name="gain"), GAIN))
             ]
         )
-    assert read >= 9
+    assert read >= least
     # Their own bounds scatter, as the noise is known from the few rows next to a step.
     assert np.sqrt(np.mean(np.square(errors))) < 1.7 * np.median(bounds)
-    # Of 12 intervals that hold in 95 %, fewer than 9 do once in 450.
-    assert np.all(np.sum(held, axis=0) >= 9)
+    # Of 12 intervals that hold in 95 %, fewer than 9 do once in 450, as of 6 fewer than 4.
+    assert np.all(np.sum(held, axis=0) >= least)
 
 
 def test_its_profile_is_zero_at_the_estimate_and_the_quantile_at_the_ends() -> None:

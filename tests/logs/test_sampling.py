@@ -14,6 +14,9 @@ from deadtime.logs.latencies._relation import WindowTime
 from sampled_loops import LOGGERS, fly, made
 from scipy import stats
 
+#: The part of a log that answers already.
+PART = {"rate": 0.3, "height": 0.5}
+
 #: Those of two minutes are in the survey alone.
 SHORT = [(kind, logger) for kind in ("rate", "height") for logger in LOGGERS[kind][1]]
 
@@ -56,7 +59,7 @@ def is_mostly_reliable(answers):
 
 @pytest.mark.parametrize(("kind", "logger"), SHORT)
 def test_a_log_is_answered_rightly_or_doubted(kind, logger):
-    one, truth = answered(kind, logger, 500, part=0.5)
+    one, truth = answered(kind, logger, 500, PART[kind])
     assert one.verdict != "none"
     if one.verdict == "reliable":
         assert abs(one.time - truth) < 4.0 * one.stderr
