@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.logs.latencies._between import is_smooth, moving_mean, refined
 from deadtime.logs.latencies._commands import Sampling
-from deadtime.logs.latencies._relation import LoopLatency, relation_of
+from deadtime.logs.latencies._relation import LoopLatency, _no_answer, relation_of
+from deadtime.logs.latencies._table import cells_of
 from deadtime.logs.latencies._windows import (
     MOST,
     Window,
@@ -256,6 +258,28 @@ def test_few_windows_are_an_indication(alike):
     few = answer_of(flown([0.03], seconds=1.6))
     assert few.verdict == "indication"
     assert "are needed to know how far it differs over the log" in few.reason
+
+
+def test_a_plant_that_is_not_determined_has_a_time_where_windows_show_it(alike):
+    fit = alike.estimate
+    unknown = SimpleNamespace(
+        best=fit.best,
+        recording=fit.recording,
+        verdict="none",
+        reason="the command moves too little",
+    )
+    found = replace(alike, estimate=unknown)
+    assert _no_answer(found) == ""
+    assert _no_answer(replace(found, times=found.times[:3])) == unknown.reason
+    assert _no_answer(replace(alike, times=alike.times[:3])) == ""
+
+
+def test_an_interval_from_zero_is_shown_as_a_bound(alike):
+    one = replace(alike, time=0.033, interval=(0.0, 0.0902))
+    assert one.shown() == "below 90 ms (95 %)"
+    assert cells_of(one)[2:5] == ("below 90 ms", "0 to 90 ms", "reliable")
+    assert one.doubted("it may be").shown() == "about 33.0 ms"
+    assert "below" not in alike.shown()
 
 
 def test_a_response_against_its_command_is_no_answer():

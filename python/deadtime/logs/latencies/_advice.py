@@ -7,12 +7,12 @@ the setting. Bits and defaults are those of the pages of 2025 and 2026.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import NamedTuple, TypeAlias
 
 from deadtime._base.digits import shown
-from deadtime.logs._log import Log
-from deadtime.logs.latencies._advice_facts import WANTED, Facts, Rule, share_of
+from deadtime.logs._log import Log, LogLoop
+from deadtime.logs.latencies._advice_facts import WANTED, Facts, share_of
 from deadtime.logs.latencies._promise import promises_of
 
 #: Moves that are asked for at least and at most, and how long each is held, in times of the loop.
@@ -39,6 +39,10 @@ SYSTEM_ID, FIELDS, CHIRP = (4, 0), (4, 3), (2025, 12)
 SID_AXES = {
     "roll": 1, "pitch": 2, "yaw": 3, "roll rate": 7, "pitch rate": 8, "yaw rate": 9,
 }  # fmt: skip
+
+
+#: What to set or to fly, and the page that names it.
+Said: TypeAlias = Iterator[tuple[str, str]]
 
 
 class Advice(NamedTuple):
@@ -85,8 +89,11 @@ def advice(log: Log, loops: Iterable[str] | None = None) -> tuple[Advice, ...]:
     """
     chosen = list(log.loops.values()) if loops is None else [log.loop(name) for name in loops]
     facts = Facts(log, chosen, promises_of(log))
-    rules = (*RULES.get(log.autopilot, ()), *FLOWN)
-    return tuple(Advice(one.text(facts), one.page) for one in rules if one.when(facts))[:LINES]
+    rules = RULES.get(log.autopilot)
+    found = [Advice(*one) for one in rules(facts)] if rules else []
+    if (loop := facts.worst()) is not None:
+        found.append(Advice(_flown(loop, facts), ""))
+    return tuple(found[:LINES])
 
 
 def _with(name: str, bit: int, facts: Facts) -> str:
@@ -95,10 +102,8 @@ def _with(name: str, bit: int, facts: Facts) -> str:
     return f"{name} = {now | bit} (now {now})"
 
 
-def _flown(facts: Facts) -> str:
+def _flown(loop: LogLoop, facts: Facts) -> str:
     """How to fly the loop that is known worst."""
-    loop = facts.worst()
-    assert loop is not None
     promise = facts.promises[loop.name]
     if not math.isfinite(promise.stderr):
         return f"{loop.name}: move its setpoint; in this log the response follows next to nothing"
@@ -137,129 +142,92 @@ def _sampled(facts: Facts) -> str:
     return f"set blackbox_sample_rate = 1/{share}: {1.0 / (period * share):.0f} rows a second"
 
 
-RULES: Mapping[str, tuple[Rule, ...]] = {
-    "ArduPilot": (
-        Rule(
-            lambda facts: facts.is_slow and not facts.plane and facts.lacks("LOG_BITMASK", FAST),
-            lambda facts: (
-                f"{_with('LOG_BITMASK', FAST, facts)}: fast attitude, ATT and RATE in each loop"
-            ),
-            "ArduPilot: Parameters, LOG_BITMASK",
-        ),
-        Rule(
-            lambda facts: facts.is_slow and facts.plane and facts.lacks("LOG_BITMASK", FULL_RATE),
-            lambda facts: f"{_with('LOG_BITMASK', FULL_RATE, facts)}: attitude in each loop",
-            "ArduPilot: Parameters, LOG_BITMASK",
-        ),
-        Rule(
-            lambda facts: facts.is_slow and facts.settings.get("LOG_FILE_RATEMAX", 0.0) > 0.0,
-            lambda facts: (
-                f"LOG_FILE_RATEMAX = 0 (now {facts.settings['LOG_FILE_RATEMAX']:g} Hz): every row"
-            ),
-            "ArduPilot: Parameters, LOG_FILE_RATEMAX",
-        ),
-        Rule(
-            lambda facts: (
-                facts.worst(*SID_AXES) is not None
-                and facts.version >= SYSTEM_ID
-                and not facts.plane
-            ),
-            _sid,
-            "ArduPilot: System ID Mode Operation",
-        ),
-        Rule(
-            lambda facts: (
-                any(loop.kind == "rate" for loop in facts.loops)
-                and facts.lacks("LOG_BITMASK", RAW_IMU)
-            ),
-            lambda facts: (
-                f"{_with('LOG_BITMASK', FAST | RAW_IMU, facts)}: raw IMU too, as filters see it"
-            ),
-            "ArduPilot: Measuring Vibration with IMU Batch Sampler",
-        ),
-    ),
-    "PX4": (
-        Rule(
-            lambda facts: facts.is_slow and facts.lacks("SDLOG_PROFILE", HIGH_RATE),
-            lambda facts: (
-                f"{_with('SDLOG_PROFILE', DEFAULT_SET | HIGH_RATE, facts)}: rates, attitude and "
-                "actuators each time they are computed"
-            ),
-            "PX4: Logging, SDLOG_PROFILE",
-        ),
-        Rule(
-            lambda facts: (
-                facts.is_slow and facts.lacks("SDLOG_PROFILE", IDENTIFICATION | HIGH_RATE)
-            ),
-            lambda facts: (
-                f"if the card is too slow for that, "
-                f"{_with('SDLOG_PROFILE', DEFAULT_SET | IDENTIFICATION, facts)}: actuators and IMU"
-            ),
-            "PX4: Logging, SDLOG_PROFILE",
-        ),
-        Rule(
-            lambda facts: facts.settings.get("SDLOG_MODE", 0.0) not in (0.0, 3.0) and facts.is_slow,
-            lambda facts: (
-                f"SDLOG_MODE = 0 (now {facts.settings['SDLOG_MODE']:g}): from arming to disarming, "
-                "which leaves room for more rows"
-            ),
-            "PX4: Logging, SDLOG_MODE",
-        ),
-    ),
-    "Betaflight": (
-        Rule(
-            lambda facts: bool(_missing(facts)) and facts.version >= FIELDS,
-            lambda facts: ", ".join(
-                f"set blackbox_disable_{name} = OFF" for name in _missing(facts)
-            ),
-            "Betaflight: CLI commands, blackbox_disable_*",
-        ),
-        Rule(
-            lambda facts: bool(_missing(facts)) and facts.version < FIELDS,
-            lambda facts: (
-                f"this firmware logs no {', '.join(_missing(facts))}: update to 4.3 or later"
-            ),
-            "Betaflight: CLI commands, blackbox_disable_*",
-        ),
-        Rule(
-            lambda facts: any(loop.setpoint.rate < 0.4 * BLACKBOX for loop in facts.loops),
-            _sampled,
-            "Betaflight: CLI commands, blackbox_sample_rate",
-        ),
-        Rule(
-            lambda facts: facts.version >= CHIRP,
-            lambda facts: (
-                "set debug_mode = CHIRP, chirp_amplitude_roll = 230, chirp_amplitude_pitch = 230, "
-                "chirp_amplitude_yaw = 180, chirp_time_seconds = 20; fly with CHIRP on a switch"
-            ),
-            "Betaflight: 2025.12 Release Notes, Chirp",
-        ),
-    ),
-    "INAV": (
-        Rule(
-            lambda facts: any(loop.setpoint.rate < 0.4 * BLACKBOX for loop in facts.loops),
-            lambda facts: "set blackbox_rate_num = 1, blackbox_rate_denom = 1: each loop is logged",
-            "INAV: Blackbox",
-        ),
-    ),
-    "Crazyflie": (
-        Rule(
-            lambda facts: not facts.log.loops,
-            lambda facts: (
-                "log setpoints beside responses: controller.rollRate and gyro.x, controller.roll "
-                "and stateEstimate.roll, ctrltarget.z and stateEstimate.z"
-            ),
-            "Bitcraze: Micro SD card deck",
-        ),
-        Rule(
-            lambda facts: facts.is_slow or not facts.log.loops,
-            lambda facts: (
-                "on:fixedFrequency, 500, 1 in config.txt: 500 Hz, at the loop of the stabilizer"
-            ),
-            "Bitcraze: Micro SD card deck",
-        ),
-    ),
-}
+def _ardupilot(facts: Facts) -> Said:
+    if facts.is_slow and facts.plane and facts.lacks("LOG_BITMASK", FULL_RATE):
+        words = f"{_with('LOG_BITMASK', FULL_RATE, facts)}: attitude in each loop"
+        yield words, "ArduPilot: Parameters, LOG_BITMASK"
+    elif facts.is_slow and not facts.plane and facts.lacks("LOG_BITMASK", FAST):
+        words = f"{_with('LOG_BITMASK', FAST, facts)}: fast attitude, ATT and RATE in each loop"
+        yield words, "ArduPilot: Parameters, LOG_BITMASK"
+    most = facts.settings.get("LOG_FILE_RATEMAX", 0.0)
+    if facts.is_slow and most > 0.0:
+        words = f"LOG_FILE_RATEMAX = 0 (now {most:g} Hz): every row"
+        yield words, "ArduPilot: Parameters, LOG_FILE_RATEMAX"
+    if facts.worst(*SID_AXES) is not None and facts.version >= SYSTEM_ID and not facts.plane:
+        yield _sid(facts), "ArduPilot: System ID Mode Operation"
+    if facts.lacks("LOG_BITMASK", RAW_IMU) and any(one.kind == "rate" for one in facts.loops):
+        words = f"{_with('LOG_BITMASK', FAST | RAW_IMU, facts)}: raw IMU too, as filters see it"
+        yield words, "ArduPilot: Measuring Vibration with IMU Batch Sampler"
 
-#: What holds for every autopilot, last.
-FLOWN = (Rule(lambda facts: facts.worst() is not None, _flown, ""),)
+
+def _px4(facts: Facts) -> Said:
+    if not facts.is_slow:
+        return
+    if facts.lacks("SDLOG_PROFILE", HIGH_RATE):
+        yield (
+            f"{_with('SDLOG_PROFILE', DEFAULT_SET | HIGH_RATE, facts)}: rates, attitude and "
+            "actuators each time they are computed",
+            "PX4: Logging, SDLOG_PROFILE",
+        )
+    if facts.lacks("SDLOG_PROFILE", IDENTIFICATION | HIGH_RATE):
+        yield (
+            "if the card is too slow for that, "
+            f"{_with('SDLOG_PROFILE', DEFAULT_SET | IDENTIFICATION, facts)}: actuators and IMU",
+            "PX4: Logging, SDLOG_PROFILE",
+        )
+    mode = facts.settings.get("SDLOG_MODE", 0.0)
+    if mode not in (0.0, 3.0):
+        yield (
+            f"SDLOG_MODE = 0 (now {mode:g}): from arming to disarming, which leaves room for more "
+            "rows",
+            "PX4: Logging, SDLOG_MODE",
+        )
+
+
+def _betaflight(facts: Facts) -> Said:
+    if missing := _missing(facts):
+        words = ", ".join(f"set blackbox_disable_{name} = OFF" for name in missing)
+        if facts.version < FIELDS:
+            words = f"this firmware logs no {', '.join(missing)}: update to 4.3 or later"
+        yield words, "Betaflight: CLI commands, blackbox_disable_*"
+    if _is_rare(facts):
+        yield _sampled(facts), "Betaflight: CLI commands, blackbox_sample_rate"
+    if facts.version >= CHIRP:
+        yield (
+            "set debug_mode = CHIRP, chirp_amplitude_roll = 230, chirp_amplitude_pitch = 230, "
+            "chirp_amplitude_yaw = 180, chirp_time_seconds = 20; fly with CHIRP on a switch",
+            "Betaflight: 2025.12 Release Notes, Chirp",
+        )
+
+
+def _inav(facts: Facts) -> Said:
+    if _is_rare(facts):
+        words = "set blackbox_rate_num = 1, blackbox_rate_denom = 1: each loop is logged"
+        yield words, "INAV: Blackbox"
+
+
+def _is_rare(facts: Facts) -> bool:
+    """Whether Blackbox leaves out most rows of a loop."""
+    return any(loop.setpoint.rate < 0.4 * BLACKBOX for loop in facts.loops)
+
+
+def _crazyflie(facts: Facts) -> Said:
+    page = "Bitcraze: Micro SD card deck"
+    if not facts.log.loops:
+        yield (
+            "log setpoints beside responses: controller.rollRate and gyro.x, controller.roll "
+            "and stateEstimate.roll, ctrltarget.z and stateEstimate.z",
+            page,
+        )
+    if facts.is_slow or not facts.log.loops:
+        words = "on:fixedFrequency, 500, 1 in config.txt: 500 Hz, at the loop of the stabilizer"
+        yield words, page
+
+
+RULES: Mapping[str, Callable[[Facts], Said]] = {
+    "ArduPilot": _ardupilot,
+    "PX4": _px4,
+    "Betaflight": _betaflight,
+    "INAV": _inav,
+    "Crazyflie": _crazyflie,
+}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from deadtime.logs._log import Log, LogLoop
@@ -65,14 +65,6 @@ class Facts(NamedTuple):
         ]
         poor = [(loop, share) for loop, share in known if share > WANTED]
         return max(poor, key=lambda one: (math.isfinite(one[1]), one[1]))[0] if poor else None
-
-
-class Rule(NamedTuple):
-    """When a rule applies, what it says, and the page that it cites."""
-
-    when: Callable[[Facts], bool]
-    text: Callable[[Facts], str]
-    page: str
 
 
 def share_of(promise: Promise) -> float:

@@ -201,19 +201,17 @@ def _betaflight(told: Mapping[str, float]) -> list[FilterDelay]:
             continue
         found += _low_pass(told, name, path, f"{prefix}_hz", delay_of)
         found += _low_pass(told, name, path, f"{prefix}_static_hz", delay_of)
-    for k in (0, 1):
-        centre, cutoff = (told.get(f"gyro_notch_{end}[{k}]", 0.0) for end in ("hz", "cutoff"))
+    notches = [(f"gyro notch {k + 1}", "response", "gyro_notch", f"[{k}]") for k in (0, 1)]
+    for name, path, prefix, place in (
+        *notches,
+        ("notch of the derivative", "D", "dterm_notch", ""),
+    ):
+        ends = "hz", "cutoff"
+        centre, cutoff = (told.get(f"{prefix}_{end}{place}", 0.0) for end in ends)
         if centre > cutoff > 0.0:
             quality = centre * cutoff / (centre**2 - cutoff**2)
-            source = f"gyro_notch_hz {centre:g}, gyro_notch_cutoff {cutoff:g}"
-            found.append(
-                FilterDelay(f"gyro notch {k + 1}", "response", notch(centre, quality), source)
-            )
-    centre, cutoff = told.get("dterm_notch_hz", 0.0), told.get("dterm_notch_cutoff", 0.0)
-    if centre > cutoff > 0.0:
-        quality = centre * cutoff / (centre**2 - cutoff**2)
-        source = f"dterm_notch_hz {centre:g}, dterm_notch_cutoff {cutoff:g}"
-        found.append(FilterDelay("notch of the derivative", "D", notch(centre, quality), source))
+            source = f"{prefix}_hz {centre:g}, {prefix}_cutoff {cutoff:g}"
+            found.append(FilterDelay(name, path, notch(centre, quality), source))
     found += _rpm_notches(told)
     quality, lowest = told.get("dyn_notch_q", 0.0) / 100.0, told.get("dyn_notch_min_hz", 0.0)
     count = told.get("dyn_notch_count", 1.0)

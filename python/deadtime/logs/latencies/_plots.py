@@ -9,7 +9,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.digits import time_unit
-from deadtime._base.drawing import COLOURS, DATA, REFERENCE, Axes, Figure, bare_axes, new_figure
+from deadtime._base.drawing import COLOURS, DATA, REFERENCE, Figure, new_figure
 from deadtime.logs.latencies._moves import Moves
 from deadtime.logs.latencies._relation import LoopLatency
 
@@ -103,16 +103,9 @@ def plot_moves(
 
 def plot_fit(one: LoopLatency) -> Figure:
     """The response of a loop over its best window, and the fitted plant."""
-    figure, ax = new_figure(7.5, 2.8)
-    draw_fit(ax, one)
-    return figure
-
-
-def draw_fit(ax: Axes, one: LoopLatency) -> None:
-    """Draw command, response and fit of a loop."""
     fit = one.estimate
     assert fit is not None
-    bare_axes(ax)
+    figure, ax = new_figure(7.5, 2.8)
     recording = fit.recording
     unit = recording.units.get("output", "")
     ax.plot(recording.time, recording.output, **DATA, label="response")
@@ -121,4 +114,5 @@ def draw_fit(ax: Axes, one: LoopLatency) -> None:
     ax.plot(recording.time, fit.fitted, color=COLOURS[1], lw=1.4, label="fit")
     ax.set_xlabel("time from the start of the log [s]")
     ax.set_ylabel(f"{one.loop} [{unit}]" if unit else one.loop)
-    ax.figure.legend(loc="outside upper center", ncols=3, frameon=False)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False)
+    return figure

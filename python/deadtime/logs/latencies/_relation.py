@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from deadtime._base.arrays import Array
-from deadtime._base.digits import between as ends_of, stated
+from deadtime._base.digits import between as ends_of, shown, stated
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.plain import plain_fields
@@ -167,6 +167,11 @@ class LoopLatency(ReadOnlyArrays):
         """The standard error that the interval amounts to, s."""
         return (self.interval[1] - self.interval[0]) / TWO_SIDED
 
+    @property
+    def is_bound(self) -> bool:
+        """Whether the interval begins at zero, so that only its upper end says something."""
+        return self.verdict == "reliable" and self.interval[0] <= 0.0
+
     def doubted(self, why: str) -> LoopLatency:
         """The time as an indication, for this reason too."""
         reason = f"{self.reason}; {why}" if self.reason else why
@@ -183,10 +188,16 @@ class LoopLatency(ReadOnlyArrays):
         """The time with its interval where that is claimed to hold."""
         if self.verdict == "none":
             return "—"
+        if self.is_bound:
+            return f"{self.bound()} (95 %)"
         value = claimed(self.verdict, self.time, self.stderr, "s")
         if self.verdict != "reliable":
             return value
         return f"{value} (95 %: {ends_of(*self.interval, self.stderr, 's')})"
+
+    def bound(self) -> str:
+        """The upper end of the interval: "below 90 ms"."""
+        return f"below {shown(self.interval[1], self.stderr, 's')}"
 
     def to_dict(self) -> dict[str, Any]:
         """The time as plain values for JSON."""
@@ -400,6 +411,9 @@ def _no_answer(found: LoopLatency) -> str:
     if found.interval[1] <= 0.0 or found.time <= 0.0:
         ahead = rough(-found.time, "s")
         return f"the response comes {ahead} before its command: it follows something else"
+    if fit.verdict == "none" and len(found.times) < FEW:
+        # Only windows that agree show the time of a plant which the log does not determine.
+        return fit.reason
     if not _says_something(found.time, found.stderr, fit.recording):
         value = stated(found.time, found.stderr, "s")
         return f"the time comes out as {value}: that says nothing"

@@ -74,6 +74,8 @@ def cells_of(one: LoopLatency) -> tuple[str, ...]:
         return (one.loop, one.command, "—", "", "none", "", "", "")
     reliable = one.verdict == "reliable"
     time = shown(one.time, one.stderr, "s") if reliable else f"about {about(one.time, 's')}"
+    if one.is_bound:
+        time = one.bound()
     ends = between(*one.interval, one.stderr, "s") if reliable else ""
     return (one.loop, one.command, time, ends, one.verdict, seen_in(one), *_gains(one))
 

@@ -16,6 +16,9 @@ use crate::linear_algebra::vectors::dot;
 /// The spread of a number about which the record says nothing, in its scale: errors end there.
 const UNKNOWN: f64 = 10.0;
 
+/// Share by which two sums of the same squares differ at most, as the records are added up.
+const ALIKE: f64 = 1e-9;
+
 /// Lags at which residuals are compared, and rows for each.
 const LAGS: usize = 20;
 const ROWS_A_LAG: usize = 5;
@@ -251,7 +254,7 @@ fn explained(open: &Open, information: &[f64], scales: &[f64]) -> f64 {
 
 /// Are the residuals smaller than what is taken for the rounding of the output?
 fn is_rounding(point: &Point) -> bool {
-    dot(&point.whitened, &point.whitened) < point.squares
+    dot(&point.whitened, &point.whitened) < (1.0 - ALIKE) * point.squares
 }
 
 /// WᵀW/σ² in the scale of each number.

@@ -76,6 +76,15 @@ impl Class {
             && (self.has_zero || !other.has_zero)
     }
 
+    /// Can a search of the other class start at the numbers of this one? An integrator may be a slow lag.
+    pub(super) fn leads_to(self, other: Self) -> bool {
+        let poles = |one: Self| one.order + usize::from(one.integrating);
+        self == other
+            || poles(self) <= poles(other)
+                && self.integrating >= other.integrating
+                && self.has_zero <= other.has_zero
+    }
+
     /// How many starts or minima: those given, or more where only the delay is searched.
     pub(super) fn starts(self, given: usize) -> usize {
         if self.order == 0 {

@@ -6,7 +6,7 @@ use super::excitation::{excited, is_one_sine};
 use super::hull::{Named, Triple, at, hull, mean_delay, turning};
 use super::minima::{Minimum, Plan, minima, without_plant};
 use super::noise::Noise;
-use super::refine::beside;
+use super::refine::{Seed, beside};
 use super::rows::{Part, Record, Rows, Start};
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
 use super::verdict::{Findings, Verdict, shifted, verdict};
@@ -235,9 +235,12 @@ pub fn refine_family(
 ) -> Result<Family, Error> {
     let starts = starts_of(records, question)?;
     let count = records.iter().map(|record| record.time.len()).sum();
-    let mut seeds = known.worth_refining(count);
-    seeds.retain(|one| question.class.is_none_or(|class| class == one.class));
-    let longest = seeds.iter().map(|one| one.numbers.delay);
+    let known_plants = known.worth_refining(count).into_iter();
+    let mut seeds: Vec<Seed> = known_plants
+        .map(|one| (one.class, one.numbers, one.noise))
+        .filter(|(class, ..)| question.class.is_none_or(|asked| asked == *class))
+        .collect();
+    let longest = seeds.iter().map(|(_, numbers, _)| numbers.delay);
     let longest = longest.fold(0.0, f64::max);
     let row = records.iter().map(Record::row).fold(0.0, f64::max);
     let largest = question.largest_delay.unwrap_or(known.largest_delay);
@@ -249,6 +252,11 @@ pub fn refine_family(
         let found = beside(&seeds, &rows, task)?;
         let now = weights_of(&found);
         if rounds < REWEIGHTED && differ(&now, &rows.weights) {
+            let seed = |one: &Minimum<'_>| {
+                let numbers = one.model.numbers(&one.point.x);
+                (one.model.class, numbers, one.model.noise)
+            };
+            seeds = found.iter().map(seed).collect();
             rows.weights = now;
             rounds += 1;
             continue;
@@ -381,6 +389,8 @@ fn one_kind(
         .largest_delay
         .unwrap_or(RANGES.delay_share * shortest(records));
     let (mut classes, noises) = asked(question);
+    let leads = |class: &Class| classes.iter().any(|asked| class.leads_to(*asked));
+    let begun: Vec<Class> = Class::all().filter(leads).collect();
     let mut rows = Rows::new(records, starts, largest, straight, question.in_loop);
     check_rows(&rows, largest)?;
     let (mut room, mut seeds, mut weights);
@@ -393,6 +403,7 @@ fn one_kind(
             rows: &thin,
             thin: &thin,
             classes: &classes,
+            begun: &begun,
             noises: &[Noise::White],
             seeds: &[],
         };
@@ -413,6 +424,7 @@ fn one_kind(
             rows: &rows,
             thin: &thin,
             classes: &classes,
+            begun: &begun,
             noises: &noises,
             seeds: &seeds,
         };
@@ -461,35 +473,34 @@ fn differ(new: &[f64], old: &[f64]) -> bool {
 
 /// The longest delay of the minima that may be the true one, s.
 fn longest_delay(found: &[Minimum<'_>]) -> f64 {
-    let delays = within_reach(found).into_iter().map(|one| one.point.x[0]);
-    delays.fold(0.0, f64::max)
+    let delays = within_reach(found).into_iter();
+    delays.fold(0.0, |longest, at| longest.max(found[at].point.x[0]))
 }
 
 /// The minima that may be the true one, those that are clearly more likely among them: of many rows BIC
-/// asks more of a number than its errors do.
-fn within_reach<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
+/// asks more of a number than its errors do. By their places.
+fn within_reach(found: &[Minimum<'_>]) -> Vec<usize> {
     let best = found.first();
     let (least, likely) = best.map_or((f64::INFINITY, f64::INFINITY), |one| {
         (one.bic, one.deviance)
     });
-    let reach = |one: &&'b Minimum<'a>| {
+    let is_near = |at: &usize| {
+        let one = &found[*at];
         one.bic <= least + EVIDENCE.reach || one.deviance < likely - EVIDENCE.likely
     };
-    found.iter().filter(reach).collect()
+    (0..found.len()).filter(is_near).collect()
 }
 
-/// The best, and the minima that are as likely, whatever number of numbers they need.
-fn as_likely<'a, 'b>(found: &'b [Minimum<'a>]) -> Vec<&'b Minimum<'a>> {
+/// The best, and the minima that are as likely, whatever number of numbers they need. By their places.
+fn as_likely(found: &[Minimum<'_>]) -> Vec<usize> {
     let best = found.first().map_or(f64::INFINITY, |best| best.deviance);
-    let is_likely = |place: &(usize, &'b Minimum<'a>)| {
-        place.0 == 0 || place.1.deviance <= best + EVIDENCE.likely
-    };
-    found
-        .iter()
-        .enumerate()
-        .filter(is_likely)
-        .map(|(_, one)| one)
-        .collect()
+    let is_likely = |at: &usize| *at == 0 || found[*at].deviance <= best + EVIDENCE.likely;
+    (0..found.len()).filter(is_likely).collect()
+}
+
+/// Those at some places.
+fn chosen(all: &[Candidate], places: Vec<usize>) -> Vec<Candidate> {
+    places.into_iter().map(|at| all[at].clone()).collect()
 }
 
 fn answer(
@@ -509,21 +520,19 @@ fn answer(
         }
         out
     };
-    let mut minima: Vec<Candidate> = within_reach(found).into_iter().map(candidate).collect();
+    let all: Vec<Candidate> = found.iter().map(candidate).collect();
+    let mut minima: Vec<Candidate> = chosen(&all, within_reach(found));
     // What is further behind in BIC, though more likely, counts where the record tells all of it.
     let reach = minima.first().map_or(0.0, |best| best.bic) + EVIDENCE.reach;
     minima.retain(|one| one.bic <= reach || one.told == one.values.len());
     leave_out_what_adds_nothing(&mut minima);
     let mut candidates: Vec<Candidate> = Vec::new();
-    for one in found {
-        if candidates
-            .iter()
-            .all(|known| known.class != one.model.class)
-        {
-            candidates.push(candidate(one));
+    for one in &all {
+        if candidates.iter().all(|known| known.class != one.class) {
+            candidates.push(one.clone());
         }
     }
-    let likely: Vec<Candidate> = as_likely(found).into_iter().map(candidate).collect();
+    let likely = chosen(&all, as_likely(found));
     let evidence = Findings {
         response: silent - found.first().map_or(f64::INFINITY, |best| best.bic),
         is_sine: is_sine && question.class.is_none(),

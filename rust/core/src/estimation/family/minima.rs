@@ -53,6 +53,8 @@ pub(super) struct Plan<'a> {
     /// Fewer rows, for grids.
     pub(super) thin: &'a Rows,
     pub(super) classes: &'a [Class],
+    /// Those that are fitted under white noise, for others may start at them.
+    pub(super) begun: &'a [Class],
     pub(super) noises: &'a [Noise],
     /// Numbers of minima that are known; a grid takes the place of those of a class that has none.
     pub(super) seeds: &'a [(Class, Numbers)],
@@ -166,8 +168,7 @@ fn least(found: &[Minimum<'_>]) -> f64 {
 
 fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Error> {
     let mut all: Vec<Minimum<'a>> = Vec::new();
-    // Classes that are contained in those asked for are fitted too: they are starts.
-    for class in Class::all() {
+    for class in plan.begun.iter().copied() {
         let model = Model {
             rows: plan.rows,
             class,

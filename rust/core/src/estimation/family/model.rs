@@ -6,7 +6,7 @@
 
 use super::class::{Class, Numbers};
 use super::noise::{Noise, Whitener};
-use super::projection::Projection;
+use super::projection::{Column, Projection};
 use super::response::{Response, free_responses, response};
 use super::rows::{Part, Rows, Start};
 use super::tolerances::{RANGES, SEARCH};
@@ -41,7 +41,7 @@ pub(super) struct Point {
     /// Output less model.
     pub(super) residual: Vec<f64>,
     response: Response,
-    free: Vec<Vec<f64>>,
+    free: Vec<Column>,
     projection: Projection,
 }
 
@@ -137,31 +137,21 @@ impl Model<'_> {
         }
     }
 
-    /// A column that is zero outside one record.
-    fn column_of(
-        &self,
-        own: impl Iterator<Item = f64>,
-        place: &std::ops::Range<usize>,
-    ) -> Vec<f64> {
-        let mut out = vec![0.0; self.rows.count()];
-        for (entry, value) in out[place.clone()].iter_mut().zip(own) {
-            *entry = value;
-        }
-        out
-    }
-
     /// The linear columns beside the response, the free responses of the lags last.
-    fn beside(&self, free: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn beside(&self, free: &[Column]) -> Vec<Column> {
         let mut columns = Vec::with_capacity(2 * self.rows.parts.len() + free.len());
         for (part, place) in self.rows.parts.iter().zip(self.rows.places()) {
+            let from = place.start;
             if self.level || self.class.integrating {
-                columns.push(self.column_of(std::iter::repeat(1.0), &place));
+                let values = vec![1.0; place.len()];
+                columns.push(Column { from, values });
             }
             if part.start != Start::Rest && self.class.integrating && self.level {
-                let middle = 0.5 * part.span;
-                let from = part.time[0] + middle;
-                let slope = part.used.iter().map(|at| (part.time[*at] - from) / middle);
-                columns.push(self.column_of(slope, &place));
+                let half = 0.5 * part.span;
+                let middle = part.time[0] + half;
+                let slope = part.used.iter().map(|at| (part.time[*at] - middle) / half);
+                let values = slope.collect();
+                columns.push(Column { from, values });
             }
         }
         columns.extend(free.iter().cloned());
@@ -197,12 +187,13 @@ impl Model<'_> {
     }
 
     /// The free responses of the lags, one column a record and state.
-    fn free(&self, numbers: &Numbers) -> Vec<Vec<f64>> {
+    fn free(&self, numbers: &Numbers) -> Vec<Column> {
         let mut columns = Vec::new();
         for (part, place) in self.rows.parts.iter().zip(self.rows.places()) {
             if part.start != Start::Rest {
                 let own = free_responses(part, self.class, numbers).into_iter();
-                columns.extend(own.map(|own| self.column_of(own.into_iter(), &place)));
+                let from = place.start;
+                columns.extend(own.map(|values| Column { from, values }));
             }
         }
         columns
@@ -250,17 +241,16 @@ impl Model<'_> {
         let whitener = self.whitener(&x);
         let mut raw = self.beside(&free);
         if self.responds {
-            raw.push(response.value.clone());
+            raw.push(response.value.clone().into());
         }
-        let whitened: Vec<Vec<f64>> = raw.iter().map(|column| whitener.whiten(column)).collect();
-        let projection = Projection::new(whitened);
+        let projection = Projection::new(raw.iter().map(|column| whitener.column(column)));
         let output = self.output();
         let mut left = whitener.whiten(&output);
         let parts = projection.taken(&mut left);
         let linear = projection.coefficients(&parts);
         let mut residual = output;
         for (column, factor) in raw.iter().zip(&linear) {
-            add_multiple(&mut residual, -factor, column);
+            column.add_to(&mut residual, -factor);
         }
         let parts = whitener.squares(&left, self.rows);
         Point {
@@ -347,8 +337,8 @@ impl Model<'_> {
                 for ((factor, after), before) in
                     point.linear[places].iter().zip(&later).zip(&point.free)
                 {
-                    add_multiple(&mut change, factor / SEARCH.step, after);
-                    add_multiple(&mut change, -factor / SEARCH.step, before);
+                    after.add_to(&mut change, factor / SEARCH.step);
+                    before.add_to(&mut change, -factor / SEARCH.step);
                 }
             }
             columns.push(change);
@@ -364,12 +354,7 @@ impl Model<'_> {
     pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
         let whitener = self.whitener(&point.x);
         let beside = self.beside(&point.free);
-        let nuisance = Projection::new(
-            beside
-                .iter()
-                .map(|column| whitener.whiten(column))
-                .collect(),
-        );
+        let nuisance = Projection::new(beside.iter().map(|column| whitener.column(column)));
         let gain = self.gain(point);
         let by_gain = point
             .response
@@ -403,6 +388,22 @@ impl Whiteners<'_> {
         pairs
             .flat_map(|(own, place)| own.whiten(&column[place.clone()]))
             .collect()
+    }
+
+    /// A column of one record, or of all.
+    fn column(&self, column: &Column) -> Column {
+        let pairs = self.own.iter().zip(&self.places);
+        let own = pairs
+            .into_iter()
+            .find(|(_, place)| **place == column.rows());
+        let values = match own {
+            Some((own, _)) => own.whiten(&column.values),
+            None => self.whiten(&column.values),
+        };
+        Column {
+            from: column.from,
+            values,
+        }
     }
 
     /// The sum of squares of each record, not below that of rounding.

@@ -1,58 +1,97 @@
 //! Orthonormal columns by modified Gram–Schmidt, done twice where much is taken; columns that depend on others are left out.
 
 use super::tolerances::SEARCH;
+use std::ops::Range;
+
 use crate::linear_algebra::vectors::{add_multiple, dot};
 
 /// Share of a column that is left below which the rest is made orthogonal again: less loses digits.
 const AGAIN: f64 = 1e-3;
 
+/// A column that is zero outside of some rows, such as those of one record.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    /// The first of these rows.
+    pub(super) from: usize,
+    pub(super) values: Vec<f64>,
+}
+
+impl Column {
+    /// These rows.
+    pub(super) fn rows(&self) -> Range<usize> {
+        self.from..self.from + self.values.len()
+    }
+
+    /// Add a multiple of it to a vector of all rows.
+    pub(super) fn add_to(&self, out: &mut [f64], factor: f64) {
+        add_multiple(&mut out[self.rows()], factor, &self.values);
+    }
+}
+
+impl From<Vec<f64>> for Column {
+    fn from(values: Vec<f64>) -> Self {
+        Self { from: 0, values }
+    }
+}
+
 /// X = Q R of columns.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Projection {
     /// The orthonormal columns; empty where a column depends on those before it.
-    columns: Vec<Vec<f64>>,
+    columns: Vec<Column>,
     /// Column j of R, down to its diagonal.
     factor: Vec<Vec<f64>>,
 }
 
 impl Projection {
-    pub(super) fn new(columns: Vec<Vec<f64>>) -> Self {
+    pub(super) fn new(columns: impl IntoIterator<Item = impl Into<Column>>) -> Self {
         let mut out = Self::default();
         for column in columns {
-            out.add(column);
+            out.add(column.into());
         }
         out
     }
 
-    fn add(&mut self, mut column: Vec<f64>) {
-        let size = dot(&column, &column).sqrt();
-        let mut parts = self.taken(&mut column);
-        let mut left = dot(&column, &column).sqrt();
+    fn add(&mut self, mut column: Column) {
+        let (from, values) = (column.from, &mut column.values);
+        let size = dot(values, values).sqrt();
+        let mut parts = self.taken_from(from, values);
+        let mut left = dot(values, values).sqrt();
         if left < AGAIN * size {
-            for (part, more) in parts.iter_mut().zip(self.taken(&mut column)) {
+            for (part, more) in parts.iter_mut().zip(self.taken_from(from, values)) {
                 *part += more;
             }
-            left = dot(&column, &column).sqrt();
+            left = dot(values, values).sqrt();
         }
         if left > SEARCH.dependent * size {
-            column.iter_mut().for_each(|entry| *entry /= left);
+            values.iter_mut().for_each(|entry| *entry /= left);
             parts.push(left);
         } else {
-            column.clear();
+            values.clear();
             parts.push(0.0);
         }
         self.columns.push(column);
         self.factor.push(parts);
     }
 
-    /// Take the parts along the columns from a vector.
+    /// Take the parts along the columns from a vector of all rows.
     pub(super) fn taken(&self, vector: &mut [f64]) -> Vec<f64> {
-        let part = |column: &Vec<f64>| {
-            if column.is_empty() {
+        self.taken_from(0, vector)
+    }
+
+    /// The same of a vector that begins at a row and is zero outside of its own.
+    fn taken_from(&self, from: usize, vector: &mut [f64]) -> Vec<f64> {
+        let end = from + vector.len();
+        let part = |column: &Column| {
+            let rows = column.rows();
+            let (first, last) = (rows.start.max(from), rows.end.min(end));
+            if first >= last {
                 return 0.0;
             }
-            let part = dot(column, vector);
-            add_multiple(vector, -part, column);
+            let own = &column.values[first - column.from..last - column.from];
+            let other = &mut vector[first - from..last - from];
+            let part = dot(own, other);
+            add_multiple(other, -part, own);
             part
         };
         self.columns.iter().map(part).collect()
@@ -60,7 +99,7 @@ impl Projection {
 
     /// The orthonormal columns of those that are independent.
     pub(super) fn into_columns(self) -> Vec<Vec<f64>> {
-        let columns = self.columns.into_iter();
+        let columns = self.columns.into_iter().map(|column| column.values);
         columns.filter(|column| !column.is_empty()).collect()
     }
 

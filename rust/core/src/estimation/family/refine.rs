@@ -1,7 +1,6 @@
 //! Plants that some rows have left, on more rows of the same plant: searched beside their numbers alone.
 
-use super::candidate::Candidate;
-use super::class::Class;
+use super::class::{Class, Numbers};
 use super::minima::Minimum;
 use super::model::{Model, Point};
 use super::noise::Noise;
@@ -13,19 +12,22 @@ use crate::{Error, Task};
 /// Starts that are followed beside a candidate: more find more and take longer.
 const BESIDE: usize = 2;
 
-/// The minima beside these candidates on other rows, each under its own noise or a richer one, the best
+/// A plant to search beside, and its noise.
+pub(super) type Seed = (Class, Numbers, Noise);
+
+/// The minima beside these plants on other rows, each under its own noise or a richer one, the best
 /// first. A class that contains another begins at that one too, and so is no less likely.
 pub(super) fn beside<'a>(
-    known: &[Candidate],
+    known: &[Seed],
     rows: &'a Rows,
     task: &Task,
 ) -> Result<Vec<Minimum<'a>>, Error> {
     let mut out: Vec<Minimum<'a>> = Vec::new();
     for class in Class::all() {
-        for one in known.iter().filter(|one| one.class == class) {
+        for one in known.iter().filter(|(own, ..)| *own == class) {
             let mut best: Option<Minimum<'a>> = None;
             for kind in Noise::ALL {
-                if kind.order() < one.noise.order() {
+                if kind.order() < one.2.order() {
                     continue;
                 }
                 let found = beside_one(one, kind, best.as_ref(), &out, rows, task)?;
@@ -47,10 +49,10 @@ pub(super) fn beside<'a>(
     Ok(out)
 }
 
-/// The minimum of a candidate under a noise: from its own numbers, from the minimum under a simpler
+/// The minimum of a plant under a noise: from its own numbers, from the minimum under a simpler
 /// noise, and from the best class that it contains.
 fn beside_one<'a>(
-    one: &Candidate,
+    (class, numbers, _): &Seed,
     kind: Noise,
     simpler: Option<&Minimum<'a>>,
     others: &[Minimum<'a>],
@@ -59,7 +61,7 @@ fn beside_one<'a>(
 ) -> Result<Minimum<'a>, Error> {
     let model = Model {
         rows,
-        class: one.class,
+        class: *class,
         noise: kind,
         responds: true,
         level: true,
@@ -69,7 +71,7 @@ fn beside_one<'a>(
         noise: Noise::White,
         ..model
     };
-    let own = white.point_of(&one.numbers, &[]);
+    let own = white.point_of(numbers, &[]);
     let mut begins = vec![(white.at(own.clone()), own)];
     begins.extend(simpler.map(|found| (found.point.clone(), found.point.x.clone())));
     let mut starts: Vec<Vec<f64>> = Vec::new();
@@ -80,8 +82,8 @@ fn beside_one<'a>(
     }
     let contained = others.iter().filter(|other| {
         other.model.noise == kind
-            && other.model.class != one.class
-            && one.class.contains(other.model.class)
+            && other.model.class != *class
+            && class.contains(other.model.class)
     });
     if let Some(other) = contained.min_by(|a, b| a.deviance.total_cmp(&b.deviance)) {
         let numbers = other.model.numbers(&other.point.x);
@@ -102,5 +104,5 @@ fn beside_one<'a>(
             best = Some(found);
         }
     }
-    best.ok_or_else(|| Error::argument("a candidate has no start"))
+    best.ok_or_else(|| Error::argument("a plant has no start"))
 }

@@ -1,6 +1,6 @@
 //! Levenberg and Marquardt's search for a minimum of −2 ln L of one class.
 
-use super::super::damped::stepped;
+use super::super::damped::{Normal, stepped};
 use super::model::{Model, Point};
 use super::tolerances::SEARCH;
 use crate::{Error, Task};
@@ -17,14 +17,19 @@ pub(super) fn minimum(
     let count = model.rows.count() as f64;
     for _ in 0..SEARCH.steps {
         task.check()?;
-        let columns = model.slopes(&best);
+        let normal = Normal::new(&model.slopes(&best), &best.whitened);
         let mut fallen = None;
         while damping < SEARCH.most_damping {
             let clamp = |x: &mut [f64]| model.clamp(x);
-            let next = stepped(&columns, &best.whitened, &best.x, clamp, damping);
+            let next = stepped(&normal, &best.x, clamp, damping);
             let Some(x) = next else {
                 break;
             };
+            // A step that a range cuts short may promise more where it is shorter.
+            if count * normal.promised(&best.x, &x) < SEARCH.fall * best.squares {
+                damping *= SEARCH.change * SEARCH.change;
+                continue;
+            }
             let point = model.at(x);
             if point.squares < best.squares {
                 fallen = Some(count * (best.squares - point.squares) / best.squares);

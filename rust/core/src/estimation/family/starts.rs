@@ -88,9 +88,7 @@ pub(super) fn nested(model: &Model<'_>, smaller: Class, numbers: &Numbers) -> Ve
     if smaller == class {
         return vec![*numbers];
     }
-    let order = smaller.order + usize::from(smaller.integrating);
-    let own = class.order + usize::from(class.integrating);
-    if order > own || smaller.integrating && !class.integrating && smaller.order >= class.order {
+    if !smaller.leads_to(class) {
         return Vec::new();
     }
     let mut current = vec![*numbers];
@@ -103,9 +101,6 @@ pub(super) fn nested(model: &Model<'_>, smaller: Class, numbers: &Numbers) -> Ve
             .for_each(|numbers| *numbers = with_lag(numbers, slow));
         kind.integrating = false;
         kind.order += 1;
-    }
-    if !kind.integrating && class.integrating {
-        return Vec::new();
     }
     while kind.order < class.order {
         current = current
@@ -122,8 +117,6 @@ pub(super) fn nested(model: &Model<'_>, smaller: Class, numbers: &Numbers) -> Ve
             })
         };
         current = current.iter().flat_map(zeros).collect();
-    } else if kind.has_zero && !class.has_zero {
-        return Vec::new();
     }
     current
 }

@@ -1,6 +1,6 @@
 //! Least cost at each of several delays, and the lowest minimum from there.
 
-use super::super::damped::stepped;
+use super::super::damped::{Normal, stepped};
 use super::joint::{Joint, Space};
 use super::search::{Minimum, descend, minimise};
 use super::tolerances::{SEARCH, ZERO};
@@ -47,8 +47,8 @@ pub fn scan(joint: &Joint<'_>, delays: &[f64], guess: &[f64], task: &Task) -> Re
         if guess.len() > 1 {
             let along = space.along(&joint.slopes(&point, task)?);
             let left: Vec<f64> = misfit.iter().map(|x| -x).collect();
-            let from = point[1..].to_vec();
-            if let Some(next) = stepped(&along, &left, &from, |x| space.clamp(x), 0.0) {
+            let (normal, from) = (Normal::new(&along, &left), point[1..].to_vec());
+            if let Some(next) = stepped(&normal, &from, |x| space.clamp(x), 0.0) {
                 let there = space.point(&next);
                 let reached = joint.cost(&there, task)?;
                 if reached < cost {

@@ -1,6 +1,6 @@
 //! Levenberg and Marquardt's search for a minimum of a sum of squares.
 
-use super::super::damped::stepped;
+use super::super::damped::{Normal, stepped};
 use super::joint::{Joint, Space};
 use super::tolerances::SEARCH;
 use crate::linear_algebra::vectors::dot;
@@ -109,12 +109,13 @@ pub(super) fn descend(
         slopes = joint.slopes(&point, task)?;
         let along = space.along(&slopes);
         let left: Vec<f64> = misfit.iter().map(|x| -x).collect();
+        let normal = Normal::new(&along, &left);
         let mut lower = None;
         while damping < SEARCH.most_damping && used < SEARCH.evaluations {
-            let Some(next) = stepped(&along, &left, &q, |x| space.clamp(x), damping) else {
+            let Some(next) = stepped(&normal, &q, |x| space.clamp(x), damping) else {
                 break;
             };
-            if promised(&along, &left, &q, &next) <= tolerance * cost {
+            if normal.promised(&q, &next) <= tolerance * cost {
                 // A step that bounds cut short promises more where it is shorter.
                 if space.cuts(&q, &next) {
                     damping *= SEARCH.change * SEARCH.change;
@@ -149,15 +150,4 @@ pub(super) fn descend(
         misfit,
         slopes,
     })
-}
-
-/// The fall of the cost that a step promises, by the derivatives.
-fn promised(along: &[Vec<f64>], left: &[f64], from: &[f64], to: &[f64]) -> f64 {
-    let mut after = left.to_vec();
-    for (column, (from, to)) in along.iter().zip(from.iter().zip(to)) {
-        for (after, slope) in after.iter_mut().zip(column) {
-            *after -= (to - from) * slope;
-        }
-    }
-    dot(left, left) - dot(&after, &after)
 }
