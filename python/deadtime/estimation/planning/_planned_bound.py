@@ -26,7 +26,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import QUOTIENT, check_distinguishable, standard_errors
-from deadtime.estimation.likelihood._flight import names_in_kernel
+from deadtime.estimation.likelihood._plant import names_in_kernel
 from deadtime.estimation.planning._whitening import trim_response
 from deadtime.experiments import Experiment, FlightNoise
 from deadtime.loops import ControlLoop, Plant
