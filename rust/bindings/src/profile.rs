@@ -239,23 +239,6 @@ impl FlightProfile {
         self.numbers.is_none() && !self.core.is_of_plant
     }
 
-    /// The level and the name of the intervals that were found.
-    #[getter]
-    fn found(&self) -> Vec<(f64, String)> {
-        let names = self.core.known.iter().zip(self.of.known());
-        let names: Vec<(Quantity, String)> = names.map(|(k, name)| (k.quantity, name)).collect();
-        let name = |one: Quantity| {
-            names
-                .iter()
-                .find(|(own, _)| *own == one)
-                .map(|(_, n)| n.clone())
-        };
-        let found = self.core.found().into_iter();
-        found
-            .filter_map(|(one, level, _)| Some((level, name(one)?)))
-            .collect()
-    }
-
     /// Why these intervals are preferred to those of standard errors.
     #[getter]
     const fn preferred(&self) -> &'static str {

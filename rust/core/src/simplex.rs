@@ -129,6 +129,9 @@ pub(crate) fn least_around(
     most: usize,
     mut cost: impl FnMut(&[f64]) -> Result<f64, Error>,
 ) -> Result<Vec<f64>, Error> {
+    if start.is_empty() {
+        return Ok(Vec::new());
+    }
     let mut corners = vec![start.to_vec()];
     for i in 0..start.len() {
         let mut corner = start.to_vec();
