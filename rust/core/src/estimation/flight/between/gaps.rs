@@ -36,7 +36,7 @@ pub(super) fn gaps_of(time: &[f64], sample_time: f64) -> Vec<Gap> {
         let next = apart.get(row + 1).copied().unwrap_or(f64::INFINITY);
         // A row that is late, not lost, is as much closer to the next one.
         let is_late = own + next < whole + 0.5;
-        if !(whole > 1.0) || is_late || (own - whole).abs() >= GAPS.near_whole * whole {
+        if whole <= 1.0 || is_late || (own - whole).abs() >= GAPS.near_whole * whole {
             continue;
         }
         let (start, end) = (time[row], time[row + 1]);
