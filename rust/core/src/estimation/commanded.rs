@@ -4,7 +4,6 @@
 //! gain, b the output at the start. That of an integrator has a closed form; any other plant is
 //! propagated, and its derivatives are central difference quotients with an error of about 1e-9 of F.
 
-use super::flight::median_step;
 use super::least_squares::Part;
 use super::literature::HeldPath;
 use super::path::held_response;
@@ -113,7 +112,11 @@ impl Commanded {
             let found = HeldPath::new(time, command).at(times, values[SLOW]);
             return Ok((found.rate, found.by_lag));
         }
-        let step = STEP * median_step(&time);
+        let span = time
+            .last()
+            .zip(time.first())
+            .map_or(1.0, |(last, first)| last - first);
+        let step = STEP * span / (time.len().max(2) - 1) as f64;
         let at = |by: f64| {
             let moved: Vec<f64> = times.iter().map(|time| time + by).collect();
             self.path(&moved, values, task)

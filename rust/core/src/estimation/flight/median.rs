@@ -16,7 +16,7 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Median time between rows, s.
-pub(in crate::estimation) fn median_step(time: &[f64]) -> f64 {
+pub(super) fn median_step(time: &[f64]) -> f64 {
     median(time.windows(2).map(|pair| pair[1] - pair[0]).collect())
 }
 

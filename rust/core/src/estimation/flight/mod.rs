@@ -32,7 +32,6 @@ pub use judge::{
     Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge_profile,
     unseen_lag, whiteness,
 };
-pub(super) use median::median_step;
 pub use numbers::{FreeNumbers, WithNumbers, first_numbers, fit_numbers};
 pub use plant::FlightPlant;
 pub use rounds::{beside_noise, fit_flight};
