@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from deadtime._base.digits import stated
 from deadtime.estimation import Overshoot
-from deadtime.estimation.models._held import HeldResponse
+from deadtime.estimation._native import HeldResponse
 from deadtime.estimation.planning._planned_bound import from_the_command, from_the_reference
 from hypothesis import given, settings, strategies as st
 from loops import TS, held_loop
