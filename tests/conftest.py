@@ -53,7 +53,8 @@ def listens_to_ctrl_c():
 
 
 @pytest.fixture(autouse=True)
-def own_folder(request, tmp_path, monkeypatch):
+def own_folder(request):
     """Links to vehicles keep the old values of parameters in the working directory."""
+    # Asked for here, because a folder for each of all other tests takes seconds.
     if request.node.path.parent.name in ("links", "flights"):
-        monkeypatch.chdir(tmp_path)
+        request.getfixturevalue("monkeypatch").chdir(request.getfixturevalue("tmp_path"))

@@ -15,8 +15,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from deadtime._deadtime import FlightFit, FlightPlant, PlantNumbers, RowNoise
-from deadtime.estimation.likelihood._rows import FlightRows
+from deadtime._deadtime import FlightFit, FlightPlant, FlightRows, PlantNumbers, RowNoise
 
 try:
     from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
@@ -26,21 +25,19 @@ except ImportError:
 ROW, AIR, AIR_TIME, DELAY, GAIN = 0.065, 2.0, 1.5, 0.3, 0.85
 
 
-def recording(count: int) -> FlightRows:
+def recording(count: int, offset: bool = False) -> FlightRows:
     """An integrator that answers a square wave, with white noise."""
     rng = np.random.default_rng(3)
     moment = ROW * np.arange(count)
     command = np.where(np.sin(0.9 * moment) > 0.0, 1.0, -0.4)
     output = GAIN * ROW * np.cumsum(command) + 0.005 * rng.standard_normal(count)
     used = np.ones(count, dtype=bool)
-    return FlightRows(moment, ROW, output, used, moment, command, (), False)
+    return FlightRows(moment, output, used, moment, command, [], offset)
 
 
 def plant(free: bool) -> FlightPlant:
     """An integrator whose delay and gain are free, or known."""
-    return FlightPlant(
-        [1.0], [1.0, 0.0], [], delay=free, gain=free, free_lags=[], zero_is_free=False
-    )
+    return FlightPlant([1.0], [1.0, 0.0], [], [], ["delay", "gain"] if free else [])
 
 
 def peer_filter(residuals: np.ndarray) -> object:
@@ -80,9 +77,11 @@ def main() -> None:
     for count in (120, 300, 10_000):
         rows = recording(count)
         known = FlightFit(plant(False), [rows], False, numbers)
-        free = FlightFit(plant(True), [rows._replace(offset=True)], False, numbers)
+        free = plant(True), [recording(count, offset=True)], False, numbers
         calls = max(1, 30_000 // count)
-        ours = min(seconds(lambda one=free: one.objective(numbers), calls) for _ in range(rounds))
+        ours = min(
+            seconds(lambda one=free: FlightFit(*one).criterion, calls) for _ in range(rounds)
+        )
         if KalmanFilter is None:
             print(f"{count:8d}{'':12s}{1e6 * ours:12.1f}")
             continue

@@ -13,7 +13,7 @@ TOLD = ("--kp", 1, "--sample-time", 0.02, "--command", "reference")
 @pytest.fixture(scope="module")
 def roll(tmp_path_factory):
     path = tmp_path_factory.mktemp("roll") / "roll.csv"
-    recording = record_attitude(2, delay=0.047, lags=(0.15, 0.05), gain=0.95)
+    recording = record_attitude(2, rows=150, delay=0.047, lags=(0.15, 0.05), gain=0.95)
     columns = np.stack([recording.time, recording.reference, recording.output], axis=1)
     np.savetxt(path, columns, delimiter=",", header="time,reference,output", comments="")
     return str(path)

@@ -27,7 +27,7 @@ def log(tmp_path_factory):
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
     """A table of a process with a delay of 0.5 s and a lag of 1 s: its columns have odd names."""
-    at = np.arange(0.0, 60.0, 0.1)
+    at = np.arange(0.0, 40.0, 0.1)
     valve = np.sign(np.sin(0.7 * at)) + 0.5 * np.sign(np.sin(0.23 * at))
     plant = dtm.FactoredPlant([1.0]).transfer_function() * dtm.delay(0.5)
     level = np.ravel(plant.simulate(at, valve).outputs)
@@ -85,8 +85,6 @@ def test_json_and_two_logs(log):
 
 def test_any_table_by_the_names_of_its_columns(table):
     columns = ("--time", "hours", "--command", "inflow", "--output", "level_now")
-    result = run("latency", table, *columns)
-    assert result.returncode == 0, result.stderr
     (one,) = found("latency", table, *columns)["loops"]
     assert one["command"] == "actuator"
     assert one["verdict"] != "none"

@@ -3,8 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation._native import judge
-from deadtime.estimation.likelihood._flight import NoiseFit
+from deadtime.estimation._native import FlightFit, FlightRows
 from deadtime.experiments import FlightNoise
 from marks import NIGHTLY
 
@@ -42,7 +41,7 @@ def test_air_that_is_always_there_is_not_taken_for_more(flights):
     assert found <= flights / 15
 
 
-@pytest.mark.parametrize("flights", [5, pytest.param(10, marks=NIGHTLY)])
+@pytest.mark.parametrize("flights", [2, pytest.param(10, marks=NIGHTLY)])
 def test_air_that_is_there_while_the_vehicle_moves_is_found(flights):
     found = sum("while it rests" in fitted(seed, 0.1).message for seed in range(flights))
     assert found >= 0.7 * flights
@@ -50,12 +49,13 @@ def test_air_that_is_there_while_the_vehicle_moves_is_found(flights):
 
 def probability(fit):
     """Of air as much larger while the vehicle moves."""
-    found = judge(fit.native, ["total"], commands_given=True, widens=False, total=None).findings
+    found = fit.profile().judge().findings
     return next(one.p_value for one in found if one.cause == "moving air")
 
 
 def test_a_recording_without_rest_is_not_judged():
     fit = fitted(0)._profile.fit
-    short = fit.runs[0]._replace(used=TIME < 5.0)
+    time, output, _, *rest = fit.runs[0].__getnewargs__()
+    short = FlightRows(time, output, TIME < 5.0, *rest)
     assert 0.01 < probability(fit) < 1.0
-    assert probability(NoiseFit(fit.model, (short,), fit.trim, fit.numbers)) == 1.0
+    assert probability(FlightFit(fit.plant, [short], fit.trim, fit.numbers)) == 1.0

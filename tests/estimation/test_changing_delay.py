@@ -11,7 +11,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import OutputError
-from deadtime.estimation.likelihood import _judgement
+from deadtime.estimation.methods import _output_error
 from marks import NIGHTLY
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
@@ -20,8 +20,8 @@ from reality import detection, table
 from reality.conditions import CONDITIONS, SAMPLE, Condition
 from reality.generator import record
 
-#: The tests of the kernel, before they are remembered.
-_judgement_of = _judgement.judge
+#: What the tests of the kernel say, before they are remembered.
+_adequacy_of = _output_error.adequacy_of
 
 NAMED = {condition.name: condition for condition in CONDITIONS}
 
@@ -30,15 +30,15 @@ def change_of(condition: Condition, number: int) -> tuple[float, float] | None:
     """Probability and size that the test gave last in the estimate of such a recording."""
     judged = []
 
-    def remembered(*asked, **known):
-        judged.append(_judgement_of(*asked, **known))
-        return judged[-1]
+    def remembered(profile):
+        judged.append(profile.judge())
+        return _adequacy_of(profile)
 
     run = record(condition, number)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(run.vehicle.Kp), sample_time=SAMPLE, limit=1.0)
     recording = table.recording_of(condition, run)
     alone = OutputError(rivals=False)  # which would be judged too
-    with mock.patch.object(_judgement, "judge", remembered):
+    with mock.patch.object(_output_error, "adequacy_of", remembered):
         dtm.estimate_delay(recording, loop, method=alone, free=("delay", "gain"))
     found = [one for last in judged[-1:] for one in last.findings if one.cause == "change"]
     return (found[0].p_value, found[0].sizes[0]) if found else None
@@ -60,20 +60,23 @@ def test_a_constant_delay_is_called_changing_as_rarely_as_the_level_says(name, r
     assert np.sum(found < 0.01) <= most // 4
 
 
-def test_a_delay_that_grows_by_half_of_itself_is_found():
+@pytest.mark.parametrize(
+    ("flights", "reliable", "least"), [(4, 1, 2), pytest.param(16, 3, 9, marks=NIGHTLY)]
+)
+def test_a_delay_that_grows_by_half_of_itself_is_found(flights, reliable, least):
     condition = replace(NAMED["delay ramps 100 ms"], delay_ramp=0.2, white=0.002)
     fits = []
-    for number in range(16):
+    for number in range(flights):
         run = record(condition, number)
         loop = table.given_loop(condition, run, condition.free)
         fits.append(
             dtm.estimate_delay(table.recording_of(condition, run), loop, free=condition.free)
         )
-    assert sum(fit.verdict == "reliable" for fit in fits) <= 3
+    assert sum(fit.verdict == "reliable" for fit in fits) <= reliable
     named = [
         "the delay is not constant over the window: it changes by" in fit.message for fit in fits
     ]
-    assert sum(named) >= 9
+    assert sum(named) >= least
 
 
 @pytest.mark.survey
@@ -83,10 +86,11 @@ def test_a_delay_that_wanders_is_found_beside_air_that_could_stand_for_it():
     assert np.sum(found < 0.01) >= 26
 
 
-def test_the_spread_of_a_delay_that_wanders_is_about_that_of_its_commands():
+@pytest.mark.parametrize("flights", [5, pytest.param(12, marks=NIGHTLY)])
+def test_the_spread_of_a_delay_that_wanders_is_about_that_of_its_commands(flights):
     condition = replace(NAMED["delay wanders 30 ms"], delay_wander=0.06, white=0.001)
     ratios = []
-    for number in range(12):
+    for number in range(flights):
         run = record(condition, number)
         change = change_of(condition, number)
         weights = np.diff(run.command, prepend=run.command[0]) ** 2

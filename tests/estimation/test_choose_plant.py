@@ -11,8 +11,9 @@ FLAT = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0), sample_time=0.02)
 INTEGRATING = FLAT.replace(plant=dtm.Integrator())
 
 
-def test_two_lags_are_found_and_a_third_is_not():
-    choice = choose_plant(record_attitude(0, **VEHICLE), FLAT, most_lags=3)
+@pytest.mark.parametrize("most_lags", [2, pytest.param(3, marks=pytest.mark.survey)])
+def test_two_lags_are_found_and_a_third_is_not(most_lags):
+    choice = choose_plant(record_attitude(0, **VEHICLE), FLAT, most_lags=most_lags)
     assert choice.chosen == "2 lags"
     assert choice.best.verdict == "reliable"
     assert choice.criteria["1 lag"] > choice.criteria["2 lags"] + 100.0
@@ -39,7 +40,7 @@ def test_a_zero_is_found(seed):
     assert 0.004 < high - low < 0.01
 
 
-@pytest.mark.parametrize("louder", [0.0, 3e-12])
+@pytest.mark.parametrize("louder", [pytest.param(0.0, marks=pytest.mark.survey), 3e-12])
 def test_what_cannot_be_told_apart_is_refused_whatever_the_rounding(louder):
     """Columns of rounding let the search go on to a zero beside no lag, which is no plant."""
     time = 0.02 * np.arange(200)

@@ -4,10 +4,10 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import GCC, ARXScan
+from deadtime.estimation._native import HeldResponse
 from deadtime.estimation.data._input_output import FEEDBACK, feedback_p_value
 from deadtime.estimation.data._simulated import commands_over_samples
 from deadtime.estimation.methods._arx_scan import F_TEST_LEVEL, _check_response
-from deadtime.estimation.models._held import HeldResponse
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import brentq
 from scipy.stats import kstest

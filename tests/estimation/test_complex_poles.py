@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from deadtime.estimation._choose import with_pair
 from marks import NIGHTLY
 from scipy.signal import cont2discrete, lfilter, tf2ss
 
@@ -61,7 +62,7 @@ def test_a_plant_of_named_numbers_gives_the_same_estimate():
     def spring(k, d):
         return [k], [1.0, d, k]
 
-    data = recorded(1, air=0.02)
+    data = recorded(1, air=0.02, rows=250)
     factored = dtm.estimate_delay(data, KNOWN, free=NAMES)
     plant = dtm.ParametricPlant(spring, {"k": 150.0, "d": 12.0})
     named = dtm.estimate_delay(data, loop_with(plant), free=("delay", "gain", "k", "d"))
@@ -83,9 +84,10 @@ def test_known_complex_poles_count_in_the_sum():
     assert t[0] == pytest.approx(0.0, abs=0.02)
 
 
+@pytest.mark.survey
 def test_a_zero_without_lags_is_fitted_beside_the_pair():
     plant = dtm.FactoredPlant(pole_frequency=12.0, pole_damping=0.6, zero=0.01)
-    fit = dtm.estimate_delay(recorded(3), loop_with(plant), free=(*NAMES, "zero"))
+    fit = dtm.estimate_delay(recorded(3, rows=250), loop_with(plant), free=(*NAMES, "zero"))
     assert holds(fit, "delay+lag", SUM)
     assert abs(fit.loop.plant.zero) < 0.01
 
@@ -106,17 +108,26 @@ def test_what_cannot_be_fitted_is_refused_by_name():
 @pytest.mark.parametrize(
     ("how", "expected"),
     [
-        ({}, "a pair"),
-        pytest.param({"lag": 0.05}, "a pair, 1 lag", marks=NIGHTLY),
-        ({"damping": 1.6}, "2 lags"),
+        pytest.param({"rows": 250}, "a pair", marks=pytest.mark.survey),
+        pytest.param({"rows": 250, "lag": 0.05}, "a pair, 1 lag", marks=NIGHTLY),
+        ({"rows": 150, "damping": 1.6}, "2 lags"),
     ],
 )
 def test_the_evidence_tells_complex_from_real_poles(how, expected):
     loop = loop_with(dtm.FirstOrder())
     most = 3 if "lag" in how else 2
-    choice = dtm.estimation.choose_plant(recorded(4, rows=250, **how), loop, most_lags=most)
+    choice = dtm.estimation.choose_plant(recorded(4, **how), loop, most_lags=most)
     assert choice.chosen == expected
     assert choice.best.verdict == "reliable"
+
+
+def test_two_lags_that_are_alike_may_be_a_pair_of_as_much_lag():
+    pair = with_pair(dtm.FactoredPlant([0.01, 0.05, 0.04]))
+    assert pair.lags == (0.01,)
+    assert 2.0 * pair.pole_damping / pair.pole_frequency == pytest.approx(0.09)
+    for other in ([0.5, 0.01], [0.05]):
+        assert with_pair(dtm.FactoredPlant(other)) is None
+    assert with_pair(dtm.FactoredPlant([0.05, 0.04], pole_frequency=9.0, pole_damping=0.5)) is None
 
 
 @pytest.mark.parametrize("start", [0.0, 0.5])

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from deadtime._base.digits import stated
 from deadtime.estimation import Overshoot
-from deadtime.estimation.models._held import HeldResponse
+from deadtime.estimation._native import HeldResponse
 from deadtime.estimation.planning._planned_bound import from_the_command, from_the_reference
 from hypothesis import given, settings, strategies as st
 from loops import TS, held_loop
@@ -258,21 +258,21 @@ def test_estimates_scatter_as_the_bound_says_for_any_number_of_processes():
         held_loop(), dtm.Experiment.step(), noise=0.01, free=("delay",), initial_output=0.0
     )
     seen = []
-    here = plan.monte_carlo(60, processes=1, seed=3, progress=seen.append)
-    # 60 runs: the root mean square is known to 9 %.
+    here = plan.monte_carlo(40, processes=1, seed=3, progress=seen.append)
+    # 40 runs: the root mean square is known to 11 %.
     assert here.rmse["delay"] == pytest.approx(plan.stderr["delay"], rel=0.25)
     assert here.mean_bound["delay"] == pytest.approx(plan.stderr["delay"], rel=0.05)
     assert here.coverage["delay"] >= 0.88
-    assert abs(here.bias["delay"]) < 4 * plan.stderr["delay"] / np.sqrt(60)
-    assert seen[-1] == 60
+    assert abs(here.bias["delay"]) < 4 * plan.stderr["delay"] / np.sqrt(40)
+    assert seen[-1] == 40
     assert "coverage" in here.summary()
-    # The error of the root mean square of 60 runs is 9.1 % of it.
-    assert stated(here.rmse["delay"], 0.0913 * here.rmse["delay"], "s") in here.summary()
+    # The error of the root mean square of 40 runs is 11.2 % of it.
+    assert stated(here.rmse["delay"], 0.1118 * here.rmse["delay"], "s") in here.summary()
     assert "rmse" in repr(here)
-    shared = plan.monte_carlo(16, processes=2, seed=3)
-    np.testing.assert_array_equal(here.estimates["delay"][:16], shared.estimates["delay"])
+    shared = plan.monte_carlo(6, processes=2, seed=3)
+    np.testing.assert_array_equal(here.estimates["delay"][:6], shared.estimates["delay"])
     assert (
-        plan.monte_carlo(5, processes=1, seed=4).estimates["delay"][0] != here.estimates["delay"][0]
+        plan.monte_carlo(1, processes=1, seed=4).estimates["delay"][0] != here.estimates["delay"][0]
     )
 
 

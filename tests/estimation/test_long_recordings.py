@@ -5,8 +5,6 @@ from functools import cache
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime.estimation._native import SEARCHED_ROWS
-from deadtime.estimation.likelihood._rows import FlightRows, excited_part
 
 TRUTH = dtm.ControlLoop(
     dtm.Integrator(0.85, 0.1), dtm.P(1.6), delay=0.3, sample_time=0.05, limit=1.0
@@ -43,7 +41,7 @@ def test_a_long_recording_tells_delay_gain_and_lag():
 def test_the_search_on_a_part_ends_at_the_maximum_of_all_rows():
     fit = dtm.estimate_delay(recorded(6000), TRUTH.replace(delay=None), free=FREE)
     found = fit._profile.fit
-    whole = found.refit(1e-6, white=False)
+    whole, _ = found.with_numbers(lambda _: (found.plant, found.runs), [])
     for name, value in (("delay", whole.numbers.delay), ("gain", whole.gain)):
         assert getattr(fit, name) == pytest.approx(value, abs=0.05 * fit.stderr[name])
     assert fit.lag == pytest.approx(whole.numbers.lags[0], abs=0.05 * fit.stderr["lag"])
@@ -55,30 +53,8 @@ def test_the_search_on_a_part_ends_at_the_maximum_of_all_rows():
             assert reach == pytest.approx(1.96, abs=0.1)
 
 
-def test_the_search_uses_the_rows_in_which_the_command_changes():
-    recording = recorded(20_000, quiet=12_000)
-    rows = FlightRows(
-        recording.time,
-        TRUTH.sample_time,
-        recording.output,
-        np.ones(20_000, dtype=bool),
-        recording.time,
-        recording.command,
-        ((10.0, 11.0), (700.0, 701.0), (800.0, 801.0)),
-        False,
-    )
-    part = excited_part(rows)
-    assert part.time.size == SEARCHED_ROWS
-    assert part.time[0] >= 12_000 * TRUTH.sample_time - 1.0
-    # Commands of as long a time before it act on it; the output at its start is unknown.
-    assert part.command_time[0] == pytest.approx(2 * part.time[0] - part.time[-1], abs=0.1)
-    assert part.command_time[-1] == part.time[-1]
-    assert part.unknown == ((800.0, 801.0),)
-    assert part.offset
-    short = FlightRows(*(one[:4000] if isinstance(one, np.ndarray) else one for one in rows))
-    assert excited_part(short) is short
-
-
+@pytest.mark.long
+@pytest.mark.survey
 def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
     known = TRUTH.replace(delay=None, lag=0.0)
     fit = dtm.estimate_delay(recorded(20_000), known)
@@ -86,6 +62,8 @@ def test_a_long_recording_whose_plant_lacks_a_lag_is_an_indication():
     assert "a further lag" in fit.message
 
 
+@pytest.mark.long
+@pytest.mark.survey
 def test_rows_that_were_lost_before_the_part_are_no_unknowns_of_it():
     recording = recorded(7000)
     kept = np.random.default_rng(1).random(7000) > 0.05

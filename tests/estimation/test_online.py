@@ -176,14 +176,14 @@ def test_a_jump_is_found_and_followed():
 
 
 def test_short_forms_of_the_survey():
-    found = drifts(3, duration=120.0, intensity=0.018)
+    found = drifts(2, duration=120.0, intensity=0.018)
     assert found.rmse < 1.25 * found.bound
     assert 0.91 < found.coverage < 0.99
-    inside, after, coverage = quiet(2, 200.0)
+    inside, after, coverage = quiet(1, 200.0)
     assert inside < 0.04
     assert after < 0.04
     assert coverage > 0.9
-    assert changes(12).in_time > 0.8
+    assert changes(6).in_time > 0.8
 
 
 def test_rows_of_a_long_rest_are_not_kept():

@@ -6,9 +6,15 @@ import math
 
 import numpy as np
 import pytest
-from deadtime._deadtime import FlightFit, FlightPlant, OnlineBank, PlantNumbers, RowNoise
+from deadtime._deadtime import (
+    FlightFit,
+    FlightPlant,
+    FlightRows,
+    OnlineBank,
+    PlantNumbers,
+    RowNoise,
+)
 from deadtime.estimation.likelihood._disturbances import Disturbance
-from deadtime.estimation.likelihood._rows import FlightRows
 from deadtime.estimation.running._settings import BankSettings
 
 WHITE, AIR, AIR_TIME, SENSOR, SENSOR_TIME = 0.006, 0.08, 0.9, 0.004, 0.2
@@ -139,11 +145,8 @@ def test_the_posterior_over_a_range_is_that_of_the_batch_likelihood():
         delays=delays.tolist(), layers=[([0.15], 0.0, [0.0] * 41)], gain=(0.0, 300.0), trim=30.0
     )
     last = run(OnlineBank(gaussian), times, output, commands, used)[-1]
-    rows = FlightRows(times, ROW, output, used, times, commands, (), True, trim=True)
-    plant = FlightPlant(
-        (1.0,), (1.0, 0.0), [0.15], delay=False, gain=True, free_lags=[False], zero_is_free=False,
-        air_behind_lags=True,
-    )  # fmt: skip
+    rows = FlightRows(times, output, used, times, commands, [], True)
+    plant = FlightPlant([1.0], [1.0, 0.0], ["lag"], [0.15], ["gain"], air_behind_lags=True)
     noise = RowNoise(AIR_TIME, AIR / WHITE, SENSOR_TIME, SENSOR / WHITE)
     logs = []
     fine = np.linspace(0.2, 0.4, 401)

@@ -1,6 +1,7 @@
 """The plant of a recording without a loop: what the result holds, and what is refused."""
 
 import pickle
+from functools import cache
 
 import deadtime as dtm
 import numpy as np
@@ -87,11 +88,14 @@ def loop_logged(late, seed=1, rows=400, step=0.065):
     return dtm.Recording(time, reference, output, np.roll(command, late))
 
 
+@cache
+def estimate_of_rows(late):
+    return dtm.estimate_delay(loop_logged(late), controller=dtm.P(1.2), plant="integrator, lag")
+
+
 @pytest.mark.parametrize(("late", "words"), [(0, None), (1, "late"), (-1, "early")])
 def test_a_command_that_is_a_row_late_or_early_is_moved(late, words):
-    controller = dtm.P(1.2)
-    right = dtm.estimate_delay(loop_logged(0), controller=controller, plant="integrator, lag")
-    found = dtm.estimate_delay(loop_logged(late), controller=controller, plant="integrator, lag")
+    found, right = estimate_of_rows(late), estimate_of_rows(0)
     assert found.shift == -late
     assert found.delay == pytest.approx(right.delay, abs=0.01)
     line = [line for line in found.summary().splitlines() if "row" in line and "moved" in line]

@@ -5,6 +5,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
+from marks import NIGHTLY
 
 SAMPLE, PARTS = 0.065, 65
 TRUTH = {"delay": 0.2, "gain": 0.9, "lag": 0.1, "rate": 1.0, "rate_of_rate": 5.0}
@@ -56,8 +57,9 @@ def test_with_the_limits_the_numbers_are_within_their_intervals():
         assert holds(fit, name), name
 
 
-def test_without_the_limits_no_estimate_is_reliable():
-    for seed in range(3):
+@pytest.mark.parametrize("flights", [1, pytest.param(3, marks=NIGHTLY)])
+def test_without_the_limits_no_estimate_is_reliable(flights):
+    for seed in range(flights):
         fit = dtm.estimate_delay(recorded(seed), loop_with(LINEAR), free=("delay", "gain", "lag"))
         assert fit.verdict != "reliable"
         assert not holds(fit, "delay+lag")

@@ -68,7 +68,7 @@ def test_the_tools_find_a_delay_alone():
     assert crossed.value == pytest.approx(0.037, abs=0.01)
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [pytest.param(1, marks=pytest.mark.survey), 2])
 def test_the_package_answers_within_its_interval(order):
     log = record(order, 0)
     least = bound.deviation_of_sum(bound.covariance(log))

@@ -14,6 +14,7 @@ def real_flight(name, Kp):
     return recording, dtm.ControlLoop(dtm.Integrator(), dtm.P(Kp), sample_time=TS, limit=1.0)
 
 
+@pytest.mark.survey
 def test_a_real_flight_with_overshoot():
     recording, loop = real_flight("ardrone2_height_step_2_4_0_25.csv", 2.4)
     window = (13, 25.5)

@@ -6,7 +6,6 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation.data._stamps import on_regular_times
-from deadtime.estimation.likelihood._rows import on_same_step, rounding_of
 from deadtime.estimation.methods._method import Run
 from marks import NIGHTLY
 
@@ -108,14 +107,6 @@ def test_commands_that_arrive_at_scattered_times_are_reported():
     assert "times of the commands scatter" in fit.message
     low, high = fit.ci(0.95)
     assert low <= DELAY + 0.03 <= high
-
-
-def test_one_row_of_a_step_of_the_sensor_stays():
-    output = np.array([0.0, 0.0, 0.0, 0.01, 0.03, 0.03, 0.02])
-    assert rounding_of(output) == pytest.approx(0.01)
-    assert on_same_step(output).tolist() == [True, False, True, False, False, True, False]
-    assert rounding_of(np.random.default_rng(0).standard_normal(50)) == 0.0
-    assert rounding_of(np.zeros(9)) == 0.0
 
 
 def test_a_rounded_output_is_on_the_bound_of_its_steps():

@@ -3,6 +3,7 @@
 import deadtime as dtm
 import numpy as np
 import pytest
+from marks import NIGHTLY
 from vehicles import answer
 
 KNOWN = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.6), sample_time=0.065, limit=1.0)
@@ -22,15 +23,18 @@ def record_height(seed, lags=(), delay=0.3, noise=0.005, rows=120):
     return dtm.Recording(time, reference, output, command=command)
 
 
-def test_a_lag_of_that_size_is_found_nine_times_in_ten():
+@pytest.mark.parametrize(
+    ("flights", "least", "most"), [(8, 5, 8), pytest.param(30, 23, 29, marks=NIGHTLY)]
+)
+def test_a_lag_of_that_size_is_found_nine_times_in_ten(flights, least, most):
     lag = np.median(
         [dtm.estimate_delay(record_height(n), KNOWN).details["unseen_lag"] for n in range(5)]
     )
     found = 0
-    for seed in range(30):
+    for seed in range(flights):
         fit = dtm.estimate_delay(record_height(1000 + seed, (lag,), 0.3 - lag), KNOWN)
         found += "makes the recording likelier: the plant lacks it" in fit.message
-    assert 23 <= found <= 29
+    assert least <= found <= most
 
 
 def test_less_noise_shows_shorter_lags():

@@ -4,7 +4,7 @@ import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.estimation import Waveform
-from deadtime.estimation.models._held import path_of
+from deadtime.loops import open_response
 from marks import NIGHTLY
 from scipy.signal import lsim
 
@@ -137,9 +137,11 @@ def test_innovations_need_a_command_that_can_be_computed(loop, match):
         dtm.estimate_delay(recording, loop, method=Waveform(noise="loop"))
 
 
-@pytest.mark.parametrize("ts", [TS, None])
-@pytest.mark.parametrize("late", [0.04, 0.2])
-def test_a_late_clock_is_estimated(ts, late):
+@pytest.mark.parametrize(
+    ("late", "ts"),
+    [(0.04, TS), (0.04, None), (0.2, None), pytest.param(0.2, TS, marks=NIGHTLY)],
+)
+def test_a_late_clock_is_estimated(late, ts):
     recording, known = record_step(late=late, ts=ts, limit=None)
     fit = dtm.estimate_delay(recording, known, method="waveform", free=("delay", "start"))
     assert fit.delay == pytest.approx(0.36, abs=1e-6)
@@ -166,13 +168,14 @@ def test_a_start_cannot_be_separated_from_the_delay_where_the_command_is_logged(
         dtm.estimate_delay(recording, known, method="output_error", free=("delay", "start"))
 
 
-def test_a_limit_is_estimated():
-    recording, known = record_step(limit=0.7)
+@pytest.mark.parametrize("noise", [1e-4, pytest.param(0.0, marks=NIGHTLY)])
+def test_a_limit_is_estimated(noise):
+    recording, known = record_step(noise, limit=0.7, noise_in_loop=False)
     fit = dtm.estimate_delay(
         recording, known.replace(limit=1.0), method="waveform", free=("delay", "limit")
     )
-    assert fit.loop.limit == pytest.approx(0.7, abs=1e-6)
-    assert fit.delay == pytest.approx(0.36, abs=1e-6)
+    assert fit.loop.limit == pytest.approx(0.7, abs=2.0 * noise + 1e-6)
+    assert fit.delay == pytest.approx(0.36, abs=2.0 * noise + 1e-6)
 
 
 def test_the_profile_reaches_the_t_quantile_at_the_ends_of_the_interval():
@@ -201,12 +204,8 @@ def test_the_response_of_a_plant_is_that_of_a_fine_simulation(plant, system):
     held = command[np.searchsorted(time, fine, side="right") - 1]
     # lsim interpolates linearly, so a jump of 3 is smeared over one step of 1e-4.
     truth = lsim(system, held, fine)[1]
-    path = path_of(plant, time, command)
-    found = path.value(fine, plant.parameters)
+    found = open_response(plant, {**plant.parameters, "gain": 1.0}, fine, time, command)
     np.testing.assert_allclose(found, truth, rtol=0, atol=1e-3)
-    slopes = path.slopes(fine[5::999], plant.parameters, tuple(plant.parameters))
-    quotient = np.gradient(found, fine)[5::999]
-    np.testing.assert_allclose(slopes.rate, quotient, rtol=0, atol=2e-2)
 
 
 def test_the_delay_of_a_first_order_plant_from_its_command():
@@ -214,8 +213,8 @@ def test_the_delay_of_a_first_order_plant_from_its_command():
     time = np.arange(0.0, 12.0, 0.1)
     command = np.repeat(rng.choice([-1.0, 1.0], 12), 10)
     plant = dtm.FirstOrder(0.8, 0.3)
-    path = path_of(plant, time, command).value(time - 0.17, plant.parameters)
-    output = 0.8 * path + 0.05 + rng.normal(0.0, 0.002, time.size)
+    path = open_response(plant, plant.parameters, time - 0.17, time, command)
+    output = path + 0.05 + rng.normal(0.0, 0.002, time.size)
     recording = dtm.Recording(time, 0.0 * time, output, command)
     loop = dtm.ControlLoop(dtm.FirstOrder(1.0, 0.5), dtm.P(1.0))
     fit = dtm.estimate_delay(recording, loop, free=("delay", "gain", "time_constant"))

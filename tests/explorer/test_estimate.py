@@ -30,7 +30,7 @@ def estimate(
 
 
 @pytest.mark.parametrize(("lag", "air"), [(0.0, 0.0), (0.0, 0.05), (0.15, 0.0)])
-@pytest.mark.parametrize("seed", [0, 5])
+@pytest.mark.parametrize("seed", [0, pytest.param(5, marks=pytest.mark.survey)])
 def test_it_is_that_of_python(web: WebKernels, seed: int, lag: float, air: float) -> None:
     recording, loop, delay = recorded_step(seed, lag, air)
     free = ("delay", "gain", "lag") if lag else ("delay", "gain")

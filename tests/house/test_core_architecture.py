@@ -12,7 +12,7 @@ WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 
 # What each package of the core may use besides itself; every package may use the foundation.
-FOUNDATION = {"error", "memory", "order", "parallel", "simd", "status", "task"}
+FOUNDATION = {"error", "memory", "order", "parallel", "simd", "simplex", "status", "task"}
 CORE_ARROWS = {
     "linear_algebra": set(),
     "lambertw": set(),
@@ -133,6 +133,7 @@ ORDER = {
         "family",
         "least_squares",
         "literature",
+        "commanded",
     ],
 }
 

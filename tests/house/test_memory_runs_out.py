@@ -1,5 +1,6 @@
 """A failed allocation is a `MemoryError` with the size, and the interpreter continues."""
 
+import itertools
 import json
 import os
 import subprocess
@@ -54,14 +55,14 @@ CASES = {
 }  # fmt: skip
 
 #: Calls with little memory left, whether threads run before or not; MiB.
-LITTLE = {
-    "stability": "SYSTEM.is_stable()",
-    "rightmost": "SYSTEM.rightmost()",
-    "roots": "SYSTEM.poles(re=(-1, 1), im=(-3, 3))",
-    "a sweep": "dtm.sweep(LOOP, {'Kp': (0.1, 3, 2000)})",
-    "a solution": "dtm.solve_dde(lambda t, y, z: -z[0], (0, 100), np.ones(30), 1.0)",
-    "threads": "dtm.stability_map(dtm.s + Kp * dtm.delay(T), RANGES, shape=(300, 300))",
-}
+LITTLE = (
+    "SYSTEM.is_stable()",
+    "SYSTEM.rightmost()",
+    "SYSTEM.poles(re=(-1, 1), im=(-3, 3))",
+    "dtm.sweep(LOOP, {'Kp': (0.1, 3, 2000)})",
+    "dtm.solve_dde(lambda t, y, z: -z[0], (0, 100), np.ones(30), 1.0)",
+    "dtm.stability_map(dtm.s + Kp * dtm.delay(T), RANGES, shape=(300, 300))",
+)
 LEFT = (1, 3, 8, 24)
 
 #: Each case in a child of its own, which has loaded the package and started no threads.
@@ -150,10 +151,9 @@ def test_memory_that_runs_out_ends_the_call_alone(case, outcomes):
     assert alive == [0.5671432904097838, 2]
 
 
-@pytest.mark.parametrize("case", LITTLE)
-def test_little_memory_ends_no_process(case):
+def test_little_memory_ends_no_process():
     # The smallest allocations and the stacks of threads failed: SIGABRT, and an OSError.
-    calls = [(LITTLE[case], left, starts) for left in LEFT for starts in (False, True)]
+    calls = list(itertools.product(LITTLE, LEFT, (False, True)))
     for call, (said, *alive) in zip(calls, said_by(calls), strict=True):
         assert said != "it ended", call
         assert alive == [0.5671432904097838, 2], call

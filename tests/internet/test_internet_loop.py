@@ -380,7 +380,7 @@ def test_without_a_writable_folder_nothing_is_run(where, tmp_path, monkeypatch):
 
 
 def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
-    network = ["--jitter", "0.01", "--loss", "0.05", "--duration", "2", "--sample-time", "0.04"]
+    network = ["--jitter", "0.02", "--loss", "0.05", "--duration", "2", "--sample-time", "0.04"]
     arguments = [*network, "--gain", "8", "--json", "--seed", "3"]
     # In two processes, because within one the order of sets would be the same.
     whole = [sys.executable, "-m", "deadtime", "internet-loop", "--virtual-time", *arguments]

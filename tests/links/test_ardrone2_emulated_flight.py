@@ -154,7 +154,7 @@ def test_the_same_seed_gives_the_same_bytes(plant):
     assert first != noisy_flight(4, plant=plant)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(st.lists(st.floats(0.0, 6.0), max_size=50), st.sampled_from(["real", "thrust"]))
 def test_reading_the_state_does_not_change_the_flight(stops, plant):
     assert noisy_flight(1, stops, plant=plant) == undisturbed_flight(1, plant)

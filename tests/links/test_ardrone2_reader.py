@@ -167,6 +167,7 @@ def test_a_recorded_flight_is_read_without_errors():
     assert np.corrcoef(np.gradient(height, time), climb)[0, 1] > 0.8
 
 
+@pytest.mark.survey
 def test_a_recorded_flight_divides_into_link_delay_and_vehicle_lag():
     # P control with gain 1 around 1 m, 200 Hz. The command is not recorded; it is computed from
     # the height, which the ground station had. Independent fits: link 0.07 to 0.12 s, the

@@ -11,6 +11,9 @@ from deadtime.logs.latencies._page import fit_of, moves_of_page
 from flights import flight_path
 from made_logs import flown_copter
 
+#: Of the made flight, s.
+SECONDS = 20.0
+
 
 def followed(log, name):
     loop = log.loop(name)
@@ -22,7 +25,7 @@ def made(tmp_path_factory):
     """A made flight: its fit from the setpoint, its moves, and those of the fit."""
     pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
     path = tmp_path_factory.mktemp("log") / "flight.bin"
-    path.write_bytes(flown_copter(seconds=40.0).data)
+    path.write_bytes(flown_copter(seconds=SECONDS).data)
     log = dtm.open_log(path)
     one = dtm.latency(log).loop("roll rate")
     loop, between = followed(log, "roll rate")
@@ -34,7 +37,7 @@ def made(tmp_path_factory):
 
 def test_the_fit_of_a_vehicle_answers_to_its_moves_as_the_vehicle_does(made):
     _, moves, fitted = made
-    assert moves.count == pytest.approx(2 * 39 / 1.1, abs=3)
+    assert moves.count == pytest.approx(2 * (SECONDS - 1.0) / 1.1, abs=3)
     low, high = moves.interval
     assert low - 0.001 < fitted.median < high + 0.001
     known = np.isfinite(moves.response) & np.isfinite(fitted.response)

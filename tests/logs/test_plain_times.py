@@ -6,6 +6,7 @@ from deadtime.logs import Series
 from deadtime.logs.latencies import differences, modelled, plain_times
 from deadtime.logs.latencies._correlation import correlation_of, grid_of
 from deadtime.loops import FactoredPlant
+from marks import NIGHTLY
 from scipy.ndimage import gaussian_filter1d
 
 DELAY, LAG = 0.05, 0.04
@@ -69,9 +70,10 @@ def test_the_coefficient_is_that_of_the_rows_that_are_in_segments():
     assert found.without.shape == (12, found.lags.size)
 
 
-def test_intervals_hold_the_number_of_the_fit_as_often_as_they_say():
+@pytest.mark.parametrize(("flights", "least"), [(8, 0.75), pytest.param(60, 0.87, marks=NIGHTLY)])
+def test_intervals_hold_the_number_of_the_fit_as_often_as_they_say(flights, least):
     held = {"cross-correlation": [], "deconvolved step": [], "moves": []}
-    for seed in range(60):
+    for seed in range(flights):
         told, came, segments = flown(100 + seed, noise=0.3)
         found = plain(told, came, segments)
         right = modelled(FactoredPlant([LAG]), DELAY, told, came, segments, "straight")
@@ -79,8 +81,8 @@ def test_intervals_hold_the_number_of_the_fit_as_often_as_they_say():
         for one in differences(found, beside):
             held[one.name].append(not one.disagrees)
     for name, some in held.items():
-        assert len(some) > 50, name
-        assert np.mean(some) >= 0.87, name
+        assert len(some) > 0.8 * flights, name
+        assert np.mean(some) >= least, name
 
 
 def test_a_wrong_fit_disagrees():
@@ -96,9 +98,10 @@ def test_a_wrong_fit_disagrees():
         assert one.modelled - one.measured == pytest.approx(0.03, abs=0.015)
 
 
-def test_signals_without_relation_have_no_number_but_a_reason():
+@pytest.mark.parametrize("flights", [4, pytest.param(20, marks=NIGHTLY)])
+def test_signals_without_relation_have_no_number_but_a_reason(flights):
     none = 0
-    for seed in range(20):
+    for seed in range(flights):
         told, _, segments = flown(seed)
         _, other, _ = flown(1000 + seed)
         found = plain(told, other, segments)
@@ -106,7 +109,7 @@ def test_signals_without_relation_have_no_number_but_a_reason():
         if np.isnan(found.correlation.value):
             assert found.correlation.reason
             assert "none" in found.correlation.line()
-    assert none >= 18
+    assert none >= 0.9 * flights
 
 
 def test_a_setpoint_at_rest_tells_nothing():

@@ -72,6 +72,7 @@ def test_the_climb_of_a_simulated_copter_is_followed_while_it_flies():
     assert log.key_parameters["IMU_GYRO_CUTOFF"] == 40.0
 
 
+@pytest.mark.survey
 def test_an_estimate_from_the_loop_of_a_log():
     # Delay near 0, lag 0.12 s, gain 0.80: from two independent fits of this log.
     loop = opened("px4_sitl_takeoff.ulg").loops["vertical speed"]

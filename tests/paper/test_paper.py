@@ -371,13 +371,17 @@ def test_an_unknown_part_is_refused():
         paper.reproduce(only=[])
 
 
-def test_the_page_is_valid_and_fetches_nothing(found):
+@pytest.mark.parametrize(
+    "names", [("table1", "gap"), pytest.param(paper.PARTS, marks=pytest.mark.survey)]
+)
+def test_the_page_is_valid_and_fetches_nothing(found, names):
+    found = replace(found, parts={name: found.parts[name] for name in names})
     page = render_reproduction(found)
     assert "<script" not in page
     # The explorer is a page of its own, in a frame.
     page, frames = re.subn(r"<iframe .*?</iframe>", "", page, flags=re.DOTALL)
     assert frames == 1
-    assert page.count("<svg") == len(paper.PARTS)
+    assert page.count("<svg") == len(names)
     names = re.findall(r'\bid="([^"]+)"', page)
     assert len(names) == len(set(names)), "two parts of the page have one name"
     used = re.findall(r'(?:href="#|url\(#|aria-labelledby=")([^")]+)', page)

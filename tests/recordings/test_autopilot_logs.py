@@ -28,7 +28,10 @@ def arducopter(demanded, measured):
     return dtm.Recording(1e-3 * time, wanted, found, wanted, source=path.name)
 
 
-@pytest.mark.parametrize(("axis", "late", "gain"), [("Roll", 0.22, 0.65), ("Pitch", 0.17, 0.79)])
+@pytest.mark.parametrize(
+    ("axis", "late", "gain"),
+    [pytest.param("Roll", 0.22, 0.65, marks=pytest.mark.survey), ("Pitch", 0.17, 0.79)],
+)
 def test_the_roll_loop_of_a_copter(axis, late, gain):
     flight = arducopter(f"Des{axis}", axis)
     fit = dtm.estimate_delay(flight, INNER, free=FREE)

@@ -42,7 +42,7 @@ def survey(kind, count):
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_few_damaged_files_are_read_or_refused(kind):
-    survey(kind, 150)
+    survey(kind, 60)
 
 
 @pytest.mark.survey

@@ -166,19 +166,20 @@ def estimated(seeds, kept):
     return np.sqrt(np.mean(np.square(errors))), reliable, held, known
 
 
-def test_commands_that_are_logged_when_they_change_hold_until_the_next():
+@pytest.mark.parametrize(("flights", "misses"), [(4, 1), pytest.param(20, 4, marks=NIGHTLY)])
+def test_commands_that_are_logged_when_they_change_hold_until_the_next(flights, misses):
     # A rounded height gives the same command again and again.
     def kept(seed, reference, command):
         return np.append(True, np.abs(np.diff(command)) > 1e-12)
 
-    error, reliable, held, known = estimated(20, kept)
+    error, reliable, held, known = estimated(flights, kept)
     assert known == 0
     assert error < 0.001  # 0.7 ms, and 7 where those left out count as lost
-    assert reliable >= 17
-    assert held >= reliable - 4
+    assert reliable >= flights - misses
+    assert held >= reliable - misses
 
 
-@pytest.mark.parametrize(("flights", "misses"), [(5, 1), pytest.param(12, 3, marks=NIGHTLY)])
+@pytest.mark.parametrize(("flights", "misses"), [(3, 1), pytest.param(12, 3, marks=NIGHTLY)])
 def test_commands_that_the_log_has_lost_at_a_step_are_unknown(flights, misses):
     def kept(seed, reference, command):
         rows = np.random.default_rng(100 + seed).uniform(size=command.size) > 0.1

@@ -171,7 +171,7 @@ def ball_winding(system, re, im, steps=600):
     return round(float(number.mid()))
 
 
-@pytest.mark.parametrize("n", [12, pytest.param(15, marks=pytest.mark.survey)])
+@pytest.mark.parametrize("n", [8, *(pytest.param(n, marks=pytest.mark.survey) for n in (12, 15))])
 def test_ball_arithmetic_counts_the_same(n):
     system = random_system(100 + n, n)
     re, im = (-1.0, 3.0), (0.5, 6.0)

@@ -50,6 +50,7 @@ def test_a_delay_of_ten_nanoseconds():
     assert_each_is(found, loop_roots(1e8, 1e-8, range(5)))
 
 
+@pytest.mark.survey
 def test_more_than_three_thousand_roots_of_one_chain():
     """2899 of 3183 roots were returned once, without an error."""
     found = (s + delay(1.0)).roots(re=(-14, 2), im=(0, 20000))

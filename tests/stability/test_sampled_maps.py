@@ -132,7 +132,7 @@ def test_a_plant_of_high_order_at_a_kilohertz():
     den = np.poly(-np.geomspace(0.3, 60.0, 7))
     plant = dtm.RationalPlant([den[-1]], den)
     loop = dtm.ControlLoop(plant, dtm.PI(1.0, 0.3), delay=0.06, sample_time=1e-3)
-    chart = dtm.stability_map(loop, {"Kp": (0.2, 6.0), "Ki": (0.1, 2.0)}, (12, 9))
+    chart = dtm.stability_map(loop, {"Kp": (0.2, 6.0), "Ki": (0.1, 2.0)}, (6, 4))
     assert (chart.status == MapStatus.OK).any()
     for (i, j), known in np.ndenumerate(chart.status):
         cell = loop.replace(Kp=chart.axes["Kp"][i], Ki=chart.axes["Ki"][j])

@@ -110,6 +110,7 @@ def test_schedule_says_what_it_holds():
         assert min(margins) >= 2.49
 
 
+@pytest.mark.survey
 def test_flights_are_better_than_with_the_robust_gains(monkeypatch):
     import adaptation
 

@@ -23,9 +23,8 @@ from deadtime._base.digits import between
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation._criterion import bic
 from deadtime.estimation._estimate import estimate_delay, method_of
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.methods._method import Loops, Method, Recordings, Windows, paired_runs
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.estimation.methods._waveform import Waveform

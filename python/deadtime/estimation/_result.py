@@ -18,9 +18,9 @@ from deadtime._base.notebook import Pictured
 from deadtime._base.validation import non_negative, real_array
 from deadtime._base.verdicts import NOT_CLAIMED, Verdict, claimed, rough
 from deadtime.estimation._felt import FELT, WORDS, Felt, highest_excited
+from deadtime.estimation._native import FlightProfile
 from deadtime.estimation.fit._profile import Profile, floor_of, unit_of
 from deadtime.estimation.fit._residuals import Whiteness
-from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.experiments import FlightNoise
 from deadtime.loops import (
     Controller,
@@ -139,7 +139,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
     details: Mapping[str, Any] = field(default_factory=dict)
     others: tuple[FittedRun, ...] = ()
     noise: FlightNoise | None = None
-    _profile: Profile | LikelihoodProfile | None = None
+    _profile: Profile | FlightProfile | None = None
     _beside: float = 0.0
 
     @property
@@ -562,3 +562,13 @@ def holds_delay(name: str) -> bool:
 def _plain(noise: FlightNoise) -> dict[str, float | None]:
     """The noise for JSON, which has no infinite numbers."""
     return {name: value if math.isfinite(value) else None for name, value in vars(noise).items()}
+
+
+def bic(fit: DelayEstimate) -> float:
+    """Schwarz's criterion (BIC) of a fit, by which plants are compared: from the likelihood."""
+    if isinstance(fit._profile, FlightProfile):
+        return fit._profile.fit.schwarz(len(fit.free))
+    # Least squares: white noise.
+    square = np.concatenate([run.residuals for run in fit.runs]) ** 2
+    least = max(float(np.mean(square)), np.finfo(float).tiny)
+    return square.size * math.log(least) + len(fit.free) * math.log(square.size)

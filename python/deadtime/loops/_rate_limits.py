@@ -20,10 +20,6 @@ from deadtime.loops._native import rate_limited
 from deadtime.loops._plants import Plant, PlantForm, RationalPlant
 from deadtime.systems import TransferFunction
 
-#: Pieces into which a command that holds is cut. The output of an integrator is exact at their
-#: ends, and between them within rate * (length of a piece)^2 / 8.
-PIECES = 8
-
 
 @dataclass(frozen=True)
 class RateLimited(Plant):
@@ -161,7 +157,7 @@ class RateLimited(Plant):
         [0.05 0.15 0.25 0.35 0.45 0.55 0.65 0.75 0.8 ]
         """
         jerk = math.inf if self.rate_of_rate is None else self.rate_of_rate
-        return rate_limited(time, command, self.rate, jerk, PIECES)
+        return rate_limited(time, command, self.rate, jerk)
 
     def transfer_function(self) -> TransferFunction:
         """Refuse: it is not linear.

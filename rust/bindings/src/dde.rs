@@ -503,10 +503,9 @@ pub(crate) fn rate_limited<'py>(
     command: Floats<'py>,
     rate: f64,
     rate_of_rate: f64,
-    parts: usize,
 ) -> PyResult<(Vector<'py>, Vector<'py>)> {
     let (time, command) = (owned(&time)?, owned(&command)?);
     let limits = converted(RateLimits::new(rate, rate_of_rate))?;
-    let (times, held) = run_here(py, |_| limits.held(&time, &command, parts))?;
+    let (times, held) = run_here(py, |_| limits.held(&time, &command, RateLimits::PIECES))?;
     Ok((times.into_pyarray(py), held.into_pyarray(py)))
 }

@@ -1,11 +1,10 @@
 //! Bindings of `deadtime::estimation`.
 
 use deadtime::estimation::{
-    Commands, Disturbance, Entry, Evaluation, Fit, FlightRun, Noise, Plant, Point, Quantity, Rows,
-    Timing, held_response as response, whiten,
+    Disturbance, Entry, Evaluation, Fit, Noise, Plant, Point, Timing, held_response as response,
+    whiten,
 };
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, owned};
@@ -14,51 +13,6 @@ use crate::runtime::run_here;
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 type Array = Py<PyArray1<f64>>;
-
-/// The rows of one recording.
-#[derive(FromPyObject)]
-pub(crate) struct RecordedRows<'py> {
-    time: Floats<'py>,
-    output: Floats<'py>,
-    used: PyReadonlyArrayDyn<'py, bool>,
-    speed: Floats<'py>,
-    command_time: Floats<'py>,
-    command: Floats<'py>,
-    unknown: Vec<(f64, f64)>,
-    uncertain: Vec<(f64, f64, f64)>,
-    offset: bool,
-    trim: bool,
-    row_time: f64,
-    rounding: f64,
-}
-
-impl RecordedRows<'_> {
-    pub(crate) fn run(&self) -> PyResult<FlightRun> {
-        Ok(FlightRun {
-            rows: self.rows()?,
-            row_time: self.row_time,
-            rounding: self.rounding,
-        })
-    }
-
-    pub(crate) fn rows(&self) -> PyResult<Rows> {
-        let rows = Rows {
-            time: owned(&self.time)?,
-            output: owned(&self.output)?,
-            used: owned(&self.used)?,
-            speed: owned(&self.speed)?,
-            commands: Commands {
-                time: owned(&self.command_time)?,
-                value: owned(&self.command)?,
-                unknown: self.unknown.clone(),
-                uncertain: self.uncertain.clone(),
-            },
-            offset: self.offset,
-            trim: self.trim,
-        };
-        converted(rows.checked())
-    }
-}
 
 /// The noise of one recording, in deviations of the white noise.
 #[pyclass(frozen, get_all, from_py_object, module = "deadtime._deadtime")]
@@ -233,23 +187,6 @@ impl RowLikelihood {
             rate: array(found.rate),
         }
     }
-}
-
-pub(crate) fn read(quantity: &str) -> PyResult<Quantity> {
-    Ok(match quantity {
-        "delay" => Quantity::Delay,
-        "total" => Quantity::Total,
-        "gain" => Quantity::Gain,
-        "zero" => Quantity::Zero,
-        _ => match quantity.strip_prefix("lag ").and_then(|i| i.parse().ok()) {
-            Some(i) => Quantity::Lag(i),
-            None => {
-                return Err(PyValueError::new_err(format!(
-                    "quantity {quantity:?}: give 'delay', 'total', 'gain', 'zero', or 'lag 0' and so on"
-                )));
-            }
-        },
-    })
 }
 
 /// What moves the output besides the command, in deviations of the white noise.

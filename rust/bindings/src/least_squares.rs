@@ -1,10 +1,8 @@
 //! Bindings of least squares on simulated loops.
 
-use std::cell::RefCell;
-
 use deadtime::estimation::{
     self as core, Chebyshev, ClosedLoop, Fitted, FittedNumber, HeldPath, Joint, Minimum, Part,
-    PeriodicLines, Plain, RecordLines, Simulated, Vanishing,
+    PeriodicLines, Plain, RecordLines, Rounded, Simulated, Vanishing,
 };
 use deadtime::loops::Fraction;
 use deadtime::{Error, Task};
@@ -14,6 +12,8 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, in_order, owned};
+use crate::calls::Calls;
+use crate::commanded::{CommandedMisfit, RoundedPeak, RoundedReadings};
 use crate::loops::{Given, PyLoop};
 use crate::runtime::run_attached;
 
@@ -177,6 +177,7 @@ enum Source {
     Loop(Py<LoopMisfit>),
     Lines(Py<LinesMisfit>),
     Chebyshev(Py<ChebyshevMisfit>),
+    Commanded(Py<CommandedMisfit>),
     /// An object of Python with `misfit` and `jacobian`.
     Given(Py<PyAny>),
 }
@@ -189,21 +190,6 @@ struct FittedPart<'py> {
     low: Floats<'py>,
     high: Floats<'py>,
     axes: Vec<Vec<f64>>,
-}
-
-/// A function of Python fails: its error is kept until the work has ended.
-struct Calls<'py> {
-    py: Python<'py>,
-    failure: RefCell<Option<PyErr>>,
-}
-
-impl Calls<'_> {
-    fn kept<T>(&self, found: PyResult<T>) -> Result<T, Error> {
-        found.map_err(|error| {
-            *self.failure.borrow_mut() = Some(error);
-            Error::Caller
-        })
-    }
 }
 
 /// Misfit and derivatives by methods of an object of Python.
@@ -292,10 +278,7 @@ impl LeastSquares {
         py: Python<'_>,
         work: impl FnOnce(&mut Joint<'_>, &Task) -> Result<T, Error>,
     ) -> PyResult<T> {
-        let calls = Calls {
-            py,
-            failure: RefCell::new(None),
-        };
+        let calls = Calls::new(py);
         let polynomials: Vec<_> = self
             .sources
             .iter()
@@ -313,6 +296,7 @@ impl LeastSquares {
                     Lines::Periodic(lines) => Box::new(lines.clone()),
                 },
                 Source::Chebyshev(own) => Box::new(own.get().inner.clone()),
+                Source::Commanded(own) => Box::new(own.get().inner.clone()),
                 Source::Given(of) => Box::new(Called { of, calls: &calls }),
             };
             Fitted {
@@ -326,10 +310,7 @@ impl LeastSquares {
         let mut joint = Joint::new(parts.collect(), self.weights.clone(), self.common);
         joint.trade = self.trade;
         let found = run_attached(py, |task| work(&mut joint, task));
-        match calls.failure.take() {
-            Some(error) => Err(error),
-            None => found,
-        }
+        calls.ended(found)
     }
 }
 
@@ -380,6 +361,8 @@ impl LeastSquares {
                     Source::Lines(own.clone().unbind())
                 } else if let Ok(own) = part.kernel.cast::<ChebyshevMisfit>() {
                     Source::Chebyshev(own.clone().unbind())
+                } else if let Ok(own) = part.kernel.cast::<CommandedMisfit>() {
+                    Source::Commanded(own.clone().unbind())
                 } else {
                     Source::Given(part.kernel.unbind())
                 });
@@ -449,18 +432,55 @@ impl LeastSquares {
         LeastSquaresMinimum::of(py, found)
     }
 
-    /// Least sum of squares over the points base + free q.
+    /// Least sum of squares with the sum of the parameters at these places held.
     fn least_held(
         &self,
         py: Python<'_>,
         best: &LeastSquaresMinimum,
-        base: Floats<'_>,
-        free: Floats<'_>,
+        places: Vec<usize>,
+        value: f64,
     ) -> PyResult<f64> {
         let best = self.minimum(py, best)?;
-        let (base, free) = (owned(&base)?, columns(&free)?);
         self.with(py, |joint, task| {
-            core::least_held(joint, &best, &base, &free, task)
+            core::least_held(joint, &best, &places, value, task)
+        })
+    }
+
+    /// The likeliest parameters and noise of rounded rows, from a start, and their covariance.
+    fn likeliest_rounded(
+        &self,
+        py: Python<'_>,
+        readings: &RoundedReadings,
+        start: Floats<'_>,
+    ) -> PyResult<RoundedPeak> {
+        let start = owned(&start)?;
+        let (peak, cov) = self.with(py, |model, task| {
+            let rounded = Rounded {
+                model,
+                readings: &readings.core,
+            };
+            let peak = rounded.likeliest(&start, task)?;
+            let cov = rounded.covariance(&peak, task)?;
+            Ok((peak, cov))
+        })?;
+        Ok(RoundedPeak { peak, cov })
+    }
+
+    /// The least −2 ln L of rounded rows with the sum of the parameters at these places held.
+    fn rounded_held(
+        &self,
+        py: Python<'_>,
+        readings: &RoundedReadings,
+        peak: &RoundedPeak,
+        places: Vec<usize>,
+        value: f64,
+    ) -> PyResult<f64> {
+        self.with(py, |model, task| {
+            let rounded = Rounded {
+                model,
+                readings: &readings.core,
+            };
+            rounded.held(&peak.peak, &places, value, task)
         })
     }
 

@@ -2,7 +2,10 @@
 
 mod arrays;
 mod boxes;
+mod calls;
 mod certificate;
+mod commanded;
+mod commands;
 mod csv;
 mod dde;
 mod errors;
@@ -10,6 +13,7 @@ mod estimation;
 mod family;
 mod fixed_step;
 mod flight;
+mod flight_plant;
 mod frequency;
 mod judgement;
 mod least_squares;
@@ -19,6 +23,7 @@ mod loops;
 mod matrix;
 mod online;
 mod pointers;
+mod profile;
 mod quasipoly;
 mod reserve;
 mod runtime;
@@ -44,6 +49,10 @@ mod _deadtime {
     #[pymodule_export]
     use super::certificate::{Certificate, Contour, Monotone, Segment};
     #[pymodule_export]
+    use super::commanded::{CommandedMisfit, RoundedPeak, RoundedReadings};
+    #[pymodule_export]
+    use super::commands::HeldCommands;
+    #[pymodule_export]
     use super::csv::{CsvColumns, csv_columns};
     #[pymodule_export]
     use super::dde::{PyLinearLoop, PyLoopResponse, on_samples, rate_limited};
@@ -56,25 +65,26 @@ mod _deadtime {
     #[pymodule_export]
     use super::fixed_step::FixedStepResponse;
     #[pymodule_export]
-    use super::flight::{FlightFit, FlightPlant, FlightProfile, excited_part};
+    use super::flight::{FlightFit, FlightRows};
+    #[pymodule_export]
+    use super::flight_plant::FlightPlant;
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, loop_margins, ratio,
     };
     #[pymodule_export]
-    use super::judgement::{
-        FlightFinding, FlightJudgement, colour_factors, judge, unseen_lag, whiteness,
-    };
+    use super::judgement::{FlightFinding, FlightJudgement, whiteness};
     #[pymodule_export]
     use super::least_squares::{
         ChebyshevMisfit, LeastSquares, LeastSquaresMinimum, LinesMisfit, LoopMisfit, fit_covariance,
     };
     #[pymodule_export]
     use super::literature::{
-        arx_losses, correlation_coefficient, correlation_peak, cycle_crossings, cycle_delay_by_lag,
-        cycle_delays, cycle_switches, delay_of_rate, extremes_decay, feedback_test, held_losses,
-        integrator_path, loop_of_extremes, rise_tangent, step_extremes, tail_rate, x_of_overshoot,
+        HeldResponse, PathAt, arx_losses, correlation_coefficient, correlation_peak,
+        cycle_crossings, cycle_delay_by_lag, cycle_delays, cycle_switches, delay_of_rate,
+        extremes_decay, feedback_test, held_losses, loop_of_extremes, rise_tangent, step_extremes,
+        tail_rate, x_of_overshoot,
     };
     #[pymodule_export]
     use super::loops::{
@@ -85,6 +95,8 @@ mod _deadtime {
     use super::matrix::CharacteristicMatrix;
     #[pymodule_export]
     use super::online::{BankAnswer, OnlineBank};
+    #[pymodule_export]
+    use super::profile::{FlightProfile, FreeNumbers};
     #[pymodule_export]
     use super::quasipoly::{Expansion, QuasiPolynomial, Ratio};
     #[pymodule_export]

@@ -1,7 +1,9 @@
 //! Bindings of the methods of the literature.
 
 use deadtime::estimation::{self as core, Extreme, HeldPath, Tangent, Weighting};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use numpy::{
+    IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{in_order, owned};
@@ -139,23 +141,40 @@ pub(crate) fn cycle_delay_by_lag(lag: f64, half: f64) -> f64 {
     core::delay_by_lag(lag, half)
 }
 
-/// F, dF/dt and dF/dlag of an integrator under commands that hold, at times of any shape in C order.
-#[pyfunction]
-pub(crate) fn integrator_path<'py>(
-    py: Python<'py>,
-    time: Floats<'_>,
-    command: Floats<'_>,
-    times: Floats<'_>,
-    lag: f64,
-) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>)> {
-    let path = HeldPath::new(owned(&time)?, owned(&command)?);
-    let times = in_order(&times)?;
-    let found = run_here(py, |_| Ok(path.at(&times, lag)))?;
-    Ok((
-        found.value.into_pyarray(py),
-        found.rate.into_pyarray(py),
-        found.by_lag.into_pyarray(py),
-    ))
+/// F, dF/dt and dF/dlag of a plant under commands at some times.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct PathAt {
+    value: Py<PyArrayDyn<f64>>,
+    rate: Py<PyArrayDyn<f64>>,
+    by_lag: Py<PyArrayDyn<f64>>,
+}
+
+/// The response of an integrator of unit gain to commands, each of which holds from its time to the next.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct HeldResponse {
+    path: HeldPath,
+}
+
+#[pymethods]
+impl HeldResponse {
+    #[new]
+    fn new(time: Floats<'_>, command: Floats<'_>) -> PyResult<Self> {
+        let path = HeldPath::new(owned(&time)?, owned(&command)?);
+        Ok(Self { path })
+    }
+
+    /// At times of any shape, behind a lag.
+    #[pyo3(signature = (times, lag=0.0))]
+    fn at(&self, py: Python<'_>, times: Floats<'_>, lag: f64) -> PyResult<PathAt> {
+        let (shape, at) = (times.shape().to_vec(), in_order(&times)?);
+        let found = run_here(py, |_| Ok(self.path.at(&at, lag)))?;
+        let array = |part: Vec<f64>| part.into_pyarray(py).reshape(shape.clone());
+        Ok(PathAt {
+            value: array(found.value)?.unbind(),
+            rate: array(found.rate)?.unbind(),
+            by_lag: array(found.by_lag)?.unbind(),
+        })
+    }
 }
 
 /// Losses of ARX models of orders `na`, `nb` at every delay from `least` on; that of the best, and that

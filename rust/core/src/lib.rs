@@ -21,6 +21,7 @@ mod parallel;
 pub mod quasipoly;
 pub mod roots;
 mod simd;
+mod simplex;
 pub mod stability;
 pub mod status;
 pub mod task;

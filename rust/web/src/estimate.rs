@@ -2,7 +2,7 @@
 //! method `output_error` where the commands are given.
 
 use deadtime::estimation::{
-    Asked, Cause, FlightPlant, FlightProfile, FlightRun, Quantity, Rows, beside_noise, judge,
+    Cause, FlightPlant, FlightProfile, FlightRun, Quantity, Rows, beside_noise, judge_profile,
     least_squares,
 };
 use deadtime::{Error, Task};
@@ -35,7 +35,7 @@ pub(crate) fn estimate(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let mut quantities = plant.common();
     quantities.push(Quantity::Total);
     let fit = beside_noise(&white, &task)?;
-    let profile = FlightProfile::best(fit, &quantities, &quantities, LEVEL, &task)?;
+    let profile = FlightProfile::best(fit, &quantities, &quantities, &task)?;
     let mut answer = Vec::new();
     for quantity in [
         Quantity::Delay,
@@ -51,13 +51,7 @@ pub(crate) fn estimate(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
         };
         answer.extend(found);
     }
-    let asked = Asked {
-        commands_given: true,
-        widens: false,
-        total: Some(profile.interval(Quantity::Total, LEVEL, &task)?),
-        quantities: &quantities,
-    };
-    let judgement = judge(&profile.fit, &asked, &task)?;
+    let judgement = judge_profile(&profile, false, &task)?;
     let mut findings = judgement.findings.iter();
     let further = findings.find(|one| one.cause == Cause::Lag);
     let flag = |is: bool| f64::from(u8::from(is));

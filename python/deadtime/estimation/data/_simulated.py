@@ -2,10 +2,10 @@
 
 The command of every row is the logged one, or computed from the controller.
 
-This file alone turns a window of a recording into initial conditions: the loop starts at rest at
-its output at the beginning of the window, the simulation is evaluated at the time stamps of the
-recording, and in a sampled loop the commands of the last delay before the window, which its rows
-hold, are still to arrive.
+`SimulatedRecording` alone turns a window of a recording into initial conditions: the loop starts
+at rest at its output at the beginning of the window, the simulation is evaluated at the time stamps
+of the recording, and in a sampled loop the commands of the last delay before the window, which its
+rows hold, are still to arrive.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ from deadtime.recordings import Recording
 #: commands.
 ALIKE = 0.2
 
+#: Largest relative difference between the time of a row and the sample time at which a command can
+#: be computed from the rows.
+ON_SAMPLES = 1e-3
 
 #: Longest window, in samples of the recording and of the loop (bounds the time of a fit).
 MOST_SAMPLES = 50_000
@@ -96,6 +99,28 @@ def commands_over_samples(recording: Recording, loop: ControlLoop) -> tuple[Arra
         )
         before[jumps] -= new - old
     return np.append(0.5 * (command[:-1] + before), command[-1]), source
+
+
+def commands_of(recording: Recording, loop: ControlLoop, computed: bool) -> tuple[Array, str]:
+    """The command of every row: logged, or computed from reference and output."""
+    if recording.command is not None and not computed:
+        if moves_between_rows(recording, loop):
+            return commands_over_samples(recording, loop)
+        return known_commands(recording, loop)
+    found = known_commands(replace(recording, command=None, sent=None), loop)
+    if loop.sample_time is None:
+        raise NotIdentifiableError(
+            "the recording holds no command, and that of a continuous controller cannot be "
+            "computed between its rows: log the command, or use method='waveform'"
+        )
+    between = recording.sample_time
+    if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
+        raise NotIdentifiableError(
+            f"rows are {between:g} s apart and the controller samples every {loop.sample_time:g} "
+            "s: its command cannot be computed from rows that are not its samples; log it, or use "
+            "method='waveform'"
+        )
+    return found
 
 
 class SimulatedRecording:

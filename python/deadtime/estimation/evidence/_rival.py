@@ -24,8 +24,7 @@ from deadtime._base.digits import between
 from deadtime._base.errors import DeadtimeError
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
-from deadtime.estimation._criterion import bic
-from deadtime.estimation._result import DelayEstimate
+from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.data._simulated import moves_between_rows
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
 from deadtime.estimation.evidence._find import is_outside

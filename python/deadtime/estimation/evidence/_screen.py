@@ -16,13 +16,12 @@ import math
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime.estimation._native import FlightProfile, HeldResponse
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
 from deadtime.estimation.evidence._question import Question
 from deadtime.estimation.evidence._words import CLEAR
 from deadtime.estimation.likelihood._disturbances import Disturbance, whitened
-from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.models._held import HeldResponse
 
 #: Lags of the columns, from so many rows to this share of the window, and how many. More: a plant
 #: between them is seen better, and chance gains more.
@@ -38,7 +37,7 @@ def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
 
     What least squares leaves of a plant that lacks something has no noise to compare with.
     """
-    if fit.verdict == "indication" and not isinstance(fit._profile, LikelihoodProfile):
+    if fit.verdict == "indication" and not isinstance(fit._profile, FlightProfile):
         return True
     rows = question.recording.time[question.earlier :]
     known = np.isfinite(fit.residuals)
@@ -64,7 +63,7 @@ def may_have_rivals(fit: DelayEstimate, question: Question) -> bool:
 def _whitened(fit: DelayEstimate, time: Array, columns: Array) -> Array:
     """Columns, a row each, whitened by the air and the coloured noise of a fit."""
     profile = fit._profile
-    if not isinstance(profile, LikelihoodProfile):
+    if not isinstance(profile, FlightProfile):
         return columns
     noise = profile.fit.numbers.noise[0]
     every = (

@@ -96,19 +96,12 @@ class ModelOfOne(Fit):
     @property
     @abstractmethod
     def kernel(self) -> Any:
-        """What gives the misfit: a misfit of the kernel, or an object with `misfit` and `jacobian`.
-
-        It may be the model itself.
-        """
+        """What gives the misfit: one of the kernel, or an object with `misfit` and `jacobian`."""
 
     @property
     def problem(self) -> LeastSquares:
         """The model as the kernel fits it."""
         return LeastSquares([self], self.weights, len(self.names), *trading(self.names))
-
-    def starts(self) -> list[Array]:
-        """The first point at which searches start."""
-        return [np.array([axis[0] for axis in self.axes])]
 
     @cached_property
     def size(self) -> float:
@@ -195,11 +188,6 @@ class JointModel(Fit):
     def high(self) -> Array:
         """Upper bounds."""
         return self.problem.bounds()[1]
-
-    def starts(self) -> list[Array]:
-        """That of the first recording, with what is the own of the others."""
-        count, starts = len(self.names), [part.starts()[0] for part in self.parts]
-        return [np.concatenate([starts[0][:count], *(start[count:] for start in starts)])]
 
 
 #: A model of one recording, or of several.

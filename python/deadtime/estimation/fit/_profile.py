@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deadtime.estimation.fit._directions import held_directions
 from deadtime.estimation.fit._least_squares import Minimum, Model
 
 #: Farthest end of an interval, in multiples of the Gaussian one.
@@ -127,5 +126,17 @@ class ProfileCost:
 
     def __call__(self, name: str, value: float) -> float:
         """Return the least sum of squares with `name`, a parameter or a sum, at `value`."""
-        space = held_directions(self.model, self.best.point, name.split("+"), value, self.known)
-        return self.model.problem.least_held(self.best, space.base, space.free)
+        held = places_of(name, value, self.model, self.known)
+        return self.model.problem.least_held(self.best, *held)
+
+
+def places_of(
+    name: str, value: float, model: Model, known: Mapping[str, float]
+) -> tuple[list[int], float]:
+    """Places of the parameters in a sum, and what they add up to where the sum is `value`.
+
+    `known` holds the parameters that are not moved.
+    """
+    parts, labels = name.split("+"), model.labels
+    value -= sum(known.get(part, 0.0) for part in parts if part not in labels)
+    return [labels.index(part) for part in parts if part in labels], value

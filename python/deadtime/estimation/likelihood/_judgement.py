@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass
 
 from deadtime._base.digits import stated
-from deadtime.estimation._native import FlightFinding, judge
+from deadtime.estimation._native import FlightFinding, FlightProfile
 from deadtime.estimation.fit._residuals import Whiteness
-from deadtime.estimation.likelihood._profile import LEVEL, LikelihoodProfile
-from deadtime.estimation.likelihood._rows import is_long
 
 #: What speaks against a fit, by the kernel's name of it, with its sizes.
 WORDS = {
@@ -49,9 +47,6 @@ WORDS = {
     "totals": "the recordings contradict one another: {name} {times}",
 }
 
-#: The kernel's name of what recordings contradict one another about.
-CONTRADICTED = {"gains": "gain", "totals": "total"}
-
 
 @dataclass(frozen=True)
 class Adequacy:
@@ -76,15 +71,9 @@ class Adequacy:
     coloured: bool = False
 
 
-def adequacy_of(profile: LikelihoodProfile) -> Adequacy:
+def adequacy_of(profile: FlightProfile) -> Adequacy:
     """Test a fit."""
-    found = judge(
-        profile.fit.native,
-        list(profile.names.values()),
-        commands_given=profile.commands_given,
-        widens=type(profile) is LikelihoodProfile,
-        total=_interval_of_total(profile),
-    )
+    found = profile.judge()
     against = [one for one in found.findings if one.is_against]
     return Adequacy(
         Whiteness(*found.whiteness),
@@ -101,23 +90,15 @@ def unseen_in_words(lag: float) -> str:
     return f"a further lag below {lag:.2g} s would not"
 
 
-def _interval_of_total(profile: LikelihoodProfile) -> tuple[float, float] | None:
-    """The interval of delay and lags together, if it is one of a profile."""
-    name = next((name for name in profile.names if name.startswith("delay+")), None)
-    if name is None or not profile.commands_given or is_long(profile.fit.runs):
-        return None
-    return profile.interval(name, 0.0, 0.0, LEVEL)
-
-
-def _in_words(found: FlightFinding, profile: LikelihoodProfile) -> str:
-    several = found.run is not None and len(profile.fit.runs) > 1
+def _in_words(found: FlightFinding, profile: FlightProfile) -> str:
+    several = found.run is not None and len(profile.fit.numbers.noise) > 1
     pairs = list(zip(found.sizes[::2], found.sizes[1::2], strict=False))
-    about = CONTRADICTED.get(found.cause)
+    total = next((name for name in dict(profile.stderr) if name.startswith("delay+")), "")
     return WORDS[found.cause].format(
         *found.sizes,
         where=f" in recording {found.run + 1}" if several and found.run is not None else "",
         time=stated(found.sizes[0], math.nan, "s") if found.cause == "change" else "",
-        name=next((name for name, kernel in profile.names.items() if kernel == about), ""),
+        name="gain" if found.cause == "gains" else total,
         values=", ".join(stated(value, error, "") for value, error in pairs),
         times=", ".join(stated(value, error, "s") for value, error in pairs),
     )

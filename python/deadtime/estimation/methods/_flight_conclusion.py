@@ -1,92 +1,91 @@
-"""Turn the likeliest plant and noise of recordings into an estimate."""
+"""Turn the likeliest plant and noise of recordings into an estimate, also from rounded rows."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from deadtime._base.arrays import Indices, Mask
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._native import SHORTEST_LAG, unseen_lag
+from deadtime.estimation._native import (
+    FlightFit,
+    FlightProfile,
+    FlightRows,
+    FreeNumbers,
+    RoundedPeak,
+    RoundedReadings,
+)
 from deadtime.estimation._result import REASONS, CramerRaoBound, DelayEstimate, FittedRun
-from deadtime.estimation.data._checks import LEAST_GAIN
-from deadtime.estimation.likelihood._flight import NoiseFit, PlantModel
-from deadtime.estimation.likelihood._free_numbers import NumbersProfile
+from deadtime.estimation.data._checks import LEAST_GAIN, standard_errors
+from deadtime.estimation.fit._least_squares import JointModel, Model
+from deadtime.estimation.fit._profile import Profile, places_of
 from deadtime.estimation.likelihood._judgement import Adequacy, unseen_in_words
-from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._rows import FlightRows, on_same_step
+from deadtime.estimation.methods._commanded_model import CommandedModel
 from deadtime.estimation.methods._conclusion import COLOURED, advice
 from deadtime.estimation.methods._method import Run
 from deadtime.experiments import FlightNoise
-
-#: A lag below so many times its lower bound is none.
-NO_LAG = 2.0
 
 #: Ratio of the residuals to those of least squares from which the noise stands for the plant.
 LESS = 1.5
 
 
 def profile_for(
-    fit: NoiseFit, names: tuple[str, ...], intervals: Literal["all", "sum"] = "all"
-) -> LikelihoodProfile:
-    """The profile over the names, and over the sum of delay and lag."""
-    found = profiled(fit.model, names)
-    total = [name for name, kernel in found.items() if kernel == "total"]
-    first = total if intervals == "sum" and total else found
-    return LikelihoodProfile.best(fit, found, first)
+    fit: FlightFit,
+    intervals: Literal["all", "sum"] = "all",
+    covariance: Sequence[float] | None = None,
+    numbers: FreeNumbers | None = None,
+) -> FlightProfile:
+    """The profile over what is fitted, and over the sum of delay and lag.
 
-
-def profiled(model: PlantModel, names: tuple[str, ...]) -> dict[str, str]:
-    """The kernel's name of each quantity that has an interval."""
-    kernel = dict(model.order)
-    wanted = {name: kernel[name] for name in names}
-    if "delay" in names:
-        slow = "time_constant" if "time_constant" in names else "lag"
-        wanted[f"delay+{slow}"] = "total"
-    return wanted
+    With the covariance of a fit whose commands are functions of its plant, or with numbers that
+    were searched around it.
+    """
+    names = fit.plant.names
+    total = ["delay+lag"] if "delay" in names else []
+    try:
+        first = total if intervals == "sum" and total else [*names, *total]
+        return fit.profile(first, covariance, numbers)
+    except NotIdentifiableError:
+        raise NotIdentifiableError(
+            f"{', '.join(names)} cannot be told apart by this recording: give the plant "
+            "fewer lags, or let deadtime.estimation.choose_plant choose"
+        ) from None
 
 
 def concluded_flight(
     method: str,
     names: tuple[str, ...],
     runs: Sequence[Run],
-    profile: LikelihoodProfile,
-    known: Mapping[str, float],
+    profile: FlightProfile,
     message: str,
     details: Mapping[str, Any],
     adequacy: Adequacy,
 ) -> DelayEstimate:
     """Make the estimate of a fit."""
     fit = profile.fit
-    values = values_of(fit, names, known)
-    cov = profile.common
-    order = [name for name, _ in fit.model.order]
-    place = [order.index(name) for name in names]
-    cov = cov[np.ix_(place, place)]
-    if isinstance(profile, NumbersProfile):
-        cov = profile.free.joined(names, cov)
-        values |= profile.free.values
-        names = tuple(values)
+    free = {} if profile.numbers is None else dict(profile.numbers.values)
+    values, names = fit.values | free, (*names, *free)
     noise = tuple(_noise_of(fit, run) for run in range(len(runs)))
-    unseen = unseen_lag(fit.native)
-    left_out = sum(_outliers(rows) for rows in fit.runs)
+    unseen = fit.unseen_lag
+    left_out = sum(rows.left_out for rows in fit.runs)
     fitted = tuple(
         FittedRun(run.recording, run.loop.replace(**values), part.residuals, one)
         for run, part, one in zip(runs, fit.parts, noise, strict=True)
     )
     held = [name for name in names if name.startswith(("lag", "delay")) and values[name] == 0.0]
     stderr, least = (
-        {name: 0.0 if name in held else error for name, error in errors.items()}
+        {name: 0.0 if name in held else error for name, error in errors}
         for errors in (profile.stderr, profile.bounds)
     )
     scatter = {
-        f"scatter_of_{what}": max(times)
-        for what, part in (("rows", "stamps"), ("commands", "arrivals"))
-        if any(times := [fit.scatter(run, part) for run in range(len(runs))])
+        f"scatter_of_{what}": times
+        for what in ("rows", "commands")
+        if (times := fit.scatter(what == "rows"))
     }
     labels = (*names, *(["initial output"] if fit.runs[0].offset else []))
     labels += ("trim",) * fit.trim
@@ -95,7 +94,7 @@ def concluded_flight(
         loop=fitted[0].loop,
         free=names,
         stderr=stderr,
-        cov=cov,
+        cov=profile.cov,
         crb=CramerRaoBound(labels, noise[0], least),
         recording=fitted[0].recording,
         residuals=fitted[0].residuals,
@@ -111,45 +110,8 @@ def concluded_flight(
     )
 
 
-def _outliers(rows: FlightRows) -> int:
-    """Rows left out, but those of a rounded output that tell nothing besides another."""
-    left = ~rows.used
-    return int(np.sum(left & ~on_same_step(rows.output) if rows.rounding else left))
-
-
-def values_of(
-    fit: NoiseFit, names: tuple[str, ...], known: Mapping[str, float]
-) -> dict[str, float]:
-    """The fitted parameters of the loop; a lag at its lower bound is none.
-
-    Beside no lag there is no zero: its effect would be a pulse between rows.
-    """
-    numbers = fit.numbers
-    least = NO_LAG * SHORTEST_LAG * fit.runs[0].row_time
-    found = {"delay": numbers.delay, "gain": fit.gain, "zero": numbers.zero}
-    for name, lag in zip(fit.model.lag_names, numbers.lags, strict=True):
-        if name.startswith("lag") and lag <= least:
-            found["delay"], lag = found["delay"] + lag, 0.0
-        found[name] = lag
-    found["delay"] = max(0.0, found["delay"])
-    kept = [found[name] for name in fit.model.lag_names]
-    if numbers.zero and kept and not any(kept) and len(fit.model.den) <= 2:
-        raise NotIdentifiableError(
-            "the lags come out at zero, where a zero has no effect on the rows: leave 'zero' and "
-            "the lags out of free=, or give the plant a further lag"
-        )
-    return {name: found[name] for name in names} | {
-        "delay": found["delay"] if "delay" in names else known["delay"]
-    }
-
-
-def _noise_of(fit: NoiseFit, run: int) -> FlightNoise:
-    part, one, rows = fit.parts[run], fit.numbers.noise[run], fit.runs[run]
-    white = math.sqrt(part.variance)
-    trim = 0.0
-    if fit.trim:
-        place = ("gain" in fit.model.names and len(fit.runs) == 1) + rows.offset
-        trim = part.linear[place]
+def _noise_of(fit: FlightFit, run: int) -> FlightNoise:
+    one, (trim, white) = fit.numbers.noise[run], fit.trim_and_white(run)
     return FlightNoise(
         white=white,
         air=white * one.air,
@@ -160,14 +122,13 @@ def _noise_of(fit: NoiseFit, run: int) -> FlightNoise:
     )
 
 
-def gain_is_certain(profile: LikelihoodProfile) -> bool:
+def gain_is_certain(profile: FlightProfile) -> bool:
     """Whether the gain is fitted and far from zero."""
-    if "gain" not in profile.names:
-        return False
-    return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * profile.stderr["gain"]
+    error = dict(profile.stderr).get("gain", math.inf)
+    return abs(profile.fit.gain) > 2.0 * LEAST_GAIN * error
 
 
-def explains_less(fit: NoiseFit, white: NoiseFit) -> bool:
+def explains_less(fit: FlightFit, white: FlightFit) -> bool:
     """Whether the plant beside the noise explains far less of a recording than by least squares."""
     return any(
         float(np.std(part.residuals)) > LESS * float(np.std(least.residuals))
@@ -207,3 +168,99 @@ def _message(
     if adequacy.reasons:
         return f"{text}{REASONS}{'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
     return f"{text}; {unseen_in_words(unseen)} have been seen"
+
+
+def rounding_is_all(fit: FlightFit) -> bool:
+    """Whether every recording is rounded, and has no other noise than white beside."""
+    return all(
+        rows.rounding > 0.0 and not (one.air or one.sensor or one.stamps or one.arrivals)
+        for rows, one in zip(fit.runs, fit.numbers.noise, strict=True)
+    )
+
+
+def read_as_intervals(
+    estimate: DelayEstimate,
+    models: Sequence[CommandedModel],
+    first: Sequence[FlightRows],
+    repeated: Sequence[Indices],
+) -> DelayEstimate:
+    """The estimate with each row as the interval that was rounded to it.
+
+    Parameters
+    ----------
+    estimate : DelayEstimate
+        That of one row for each step.
+    models : sequence of CommandedModel
+    first : sequence of FlightRows
+        The rows before outliers were found.
+    repeated : sequence of ndarray
+        Rows of each recording that repeat the one before.
+    """
+    profile = estimate._profile
+    assert isinstance(profile, FlightProfile)
+    fit = profile.fit
+    parts = tuple(one.started(fit, {}) for one in models)
+    model: Model = parts[0] if len(parts) == 1 else JointModel(parts, (1.0,) * len(parts))
+    readings = RoundedReadings(
+        np.concatenate([one.recording.output for one in parts]),
+        np.repeat(np.arange(len(parts)), model.sizes),
+        np.concatenate([_read(*each) for each in zip(first, fit.runs, repeated, strict=True)]),
+        [rows.rounding for rows in fit.runs],
+    )
+    names, count = estimate.free, len(estimate.free)
+    start = np.concatenate([parts[0].start[:count], *(one.start[count:] for one in parts)])
+    peak = model.problem.likeliest_rounded(readings, start)
+    plain, bounds = standard_errors(names, peak.cov), dict(profile.bounds)
+    unseen = {name: error / bounds[name] for name, error in profile.stderr}
+    freedom = readings.count - peak.point.size - len(parts)
+    values = dict(zip(names, peak.point.tolist(), strict=False))
+    residuals = np.split(-model.misfit(peak.point), np.cumsum(model.sizes)[:-1])
+    noise = [FlightNoise(white=one) for one in peak.noise]
+    runs = tuple(
+        FittedRun(run.recording, run.loop.replace(**values), piece, one)
+        for run, piece, one in zip(estimate.runs, residuals, noise, strict=True)
+    )
+    message = estimate.message.replace(str(estimate.noise), f"{noise[0]} before the rounding")
+    return replace(
+        estimate,
+        loop=runs[0].loop,
+        stderr={name: error * unseen[name] for name, error in plain.items()},
+        cov=peak.cov[:count, :count],
+        crb=CramerRaoBound(model.labels, noise[0], plain),
+        residuals=runs[0].residuals,
+        noise=noise[0],
+        message=f"{message}; each row is read as the interval of its rounding",
+        details={**estimate.details, "initial_output": parts[0].start_of(peak.point)},
+        others=runs[1:],
+        _profile=Profile(
+            RoundedCost(model, readings, peak, runs[0].loop.parameters, freedom),
+            best=float(freedom),
+            freedom=freedom,
+            widening=unseen,
+            preferred="rows are rounded",
+        ),
+    )
+
+
+def _read(first: FlightRows, fitted: FlightRows, repeated: Indices) -> Mask:
+    """Rows that are read as intervals: all but outliers and those that repeat the one before."""
+    mask = ~(first.used & ~fitted.used)
+    mask[repeated] = False
+    return mask
+
+
+@dataclass(frozen=True)
+class RoundedCost:
+    """-2 ln L with one quantity held, as the cost of a `Profile` whose variance is one."""
+
+    model: Model
+    readings: RoundedReadings
+    peak: RoundedPeak
+    known: Mapping[str, float]
+    freedom: int
+
+    def __call__(self, name: str, value: float) -> float:
+        """The rise, on top of what a sum of squares has at its least."""
+        held = places_of(name, value, self.model, self.known)
+        least = self.model.problem.rounded_held(self.readings, self.peak, *held)
+        return self.freedom + max(0.0, least - self.peak.value)

@@ -30,7 +30,7 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive, whole_number
 from deadtime._base.verdicts import verdict_if
-from deadtime.estimation._native import LEVEL_OF_TESTS, LinesMisfit
+from deadtime.estimation._native import LEVEL_OF_TESTS, HeldResponse, LinesMisfit
 from deadtime.estimation._result import ADVICE, REASONS
 from deadtime.estimation.data._checks import (
     check_distinguishable,
@@ -49,7 +49,6 @@ from deadtime.estimation.fit._profile import Profile, ProfileCost
 from deadtime.estimation.fit._residuals import whiteness_of
 from deadtime.estimation.methods._conclusion import OfOne, Read, is_rounding
 from deadtime.estimation.methods._method import Run
-from deadtime.estimation.models._held import HeldResponse
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
 
@@ -111,12 +110,12 @@ class Frequency(OfOne):
         data, rows = recording.window(*window), recording.rows(*window)
         check_even(data, EVEN, "a DFT needs evenly spaced ones; use method='output_error'")
         command, source = commands_over_samples(recording, loop)
-        response = HeldResponse(recording.time[: rows.stop], command[: rows.stop])
+        commands = recording.time[: rows.stop], command[: rows.stop]
         check_moves(data.output, command[rows])
         top = math.inf if self.highest is None else self.highest
         known = {**loop.parameters, "delay": 0.0 if loop.delay is None else loop.delay}
         if self.period is None:
-            lines = _record_lines((data, names, 0.0, known), response, top)
+            lines = _record_lines((data, names, 0.0, known), commands, top)
         else:
             periods = whole_periods(data, self.period, self.left_out, top)
             lines = _periodic_lines((data, names, 0.0, known), command[rows], periods)
@@ -134,7 +133,7 @@ class Frequency(OfOne):
         errors = standard_errors(names, cov)
         check_gain(values, errors)
         found = {**known, **values}
-        residuals = _residuals(data, response, found)
+        residuals = _residuals(data, HeldResponse(*commands), found)
         whiteness = whiteness_of(residuals, len(names))
         white = p_value > LEVEL_OF_TESTS if lines.known_noise else whiteness.white
         reliable = white or is_rounding(residuals, data)
@@ -211,7 +210,7 @@ class _Lines(ModelOfOne):
         return found
 
 
-def _record_lines(asked: _Asked, response: HeldResponse, highest: float) -> _Lines:
+def _record_lines(asked: _Asked, commands: tuple[Array, Array], highest: float) -> _Lines:
     """Lines of one record without the mean; white noise has the same size at each."""
     data, names, *_ = asked
     size = len(data)
@@ -227,7 +226,7 @@ def _record_lines(asked: _Asked, response: HeldResponse, highest: float) -> _Lin
     every = int(kept.sum()) == size // 2
     made = partial(
         LinesMisfit.of_record,
-        commands=(response.time, response.command),
+        commands=commands,
         time=data.time,
         output=data.output,
         last=None if every else int(kept.sum()),

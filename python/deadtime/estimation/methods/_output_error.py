@@ -11,42 +11,26 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import product
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import LAG_FACTORS, LONGEST_DELAY
+from deadtime.estimation._native import (
+    LONGEST_DELAY,
+    MOST_NUMBERS,
+    FlightFit,
+    FlightPlant,
+    FlightProfile,
+    FlightRows,
+)
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import VEHICLE_PARAMETERS, checked_names
 from deadtime.estimation.data._known_filter import KnownFilter
 from deadtime.estimation.data._stamps import on_regular_times
 from deadtime.estimation.fit._least_squares import Minimum, Model, solve_jointly
-from deadtime.estimation.likelihood._coloured import coloured_profile
-from deadtime.estimation.likelihood._flight import (
-    NoiseFit,
-    PlantModel,
-    fitted_flight,
-    least_squares,
-    names_in_kernel,
-)
-from deadtime.estimation.likelihood._free_numbers import (
-    MOST_NUMBERS,
-    NumbersProfile,
-    fit_numbers,
-    numbers_under_white_noise,
-)
 from deadtime.estimation.likelihood._judgement import Adequacy, adequacy_of
-from deadtime.estimation.likelihood._lost_commands import (
-    LostCommandsProfile,
-    Refilled,
-    is_calm,
-    with_lost_commands,
-)
-from deadtime.estimation.likelihood._missing import predicted_commands, with_missing
-from deadtime.estimation.likelihood._profile import LikelihoodProfile
-from deadtime.estimation.likelihood._rows import FlightRows, excited_part, is_long
+from deadtime.estimation.likelihood._plant import names_in_kernel, plant_model
 from deadtime.estimation.methods._commanded_model import Assumed, CommandedModel, commanded_model
 from deadtime.estimation.methods._conclusion import (
     check_fit,
@@ -59,19 +43,13 @@ from deadtime.estimation.methods._flight_conclusion import (
     explains_less,
     gain_is_certain,
     profile_for,
-    profiled,
-    values_of,
+    read_as_intervals,
+    rounding_is_all,
     without_the_plant,
 )
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
-from deadtime.estimation.methods._rounded_conclusion import read_as_intervals, rounding_is_all
 from deadtime.loops import ControlLoop
 from deadtime.recordings import RecordingCheck
-
-#: Most rounds of predicting the commands between rows and fitting again, and the change of Akaike's
-#: criterion that ends them. The most samples at which a reference may have changed that are tried,
-#: and by how much of that criterion one of them has to be the best.
-REFILLS, SETTLED, MOST_STEPS, CLEARLY = 6, 0.5, 8, 6.0
 
 #: Residuals of a first fit below which, as a share of the range of the output, all may be rounding.
 NEARLY_EXACT = 1e-4
@@ -137,7 +115,7 @@ class OutputError(Method):
         """Fit `free` to the response of the plant to the logged commands."""
         known = None if self.output_filter is None else KnownFilter.of(self.output_filter)
         if self.air == "vehicle" and not all(
-            PlantModel.of(r.loop.plant, ()).integrates for r in runs
+            plant_model(r.loop.plant, ()).integrates for r in runs
         ):
             raise ValueError(
                 "air='vehicle' is for a plant that integrates what its motors do, such as "
@@ -176,7 +154,7 @@ def estimate_from_commands(
 def _criterion(estimate: DelayEstimate) -> float:
     """Akaike's criterion of a fit with noise; infinite of least squares."""
     profile = estimate._profile
-    return profile.fit.criterion if isinstance(profile, LikelihoodProfile) else math.inf
+    return profile.fit.criterion if isinstance(profile, FlightProfile) else math.inf
 
 
 def _estimated(
@@ -249,14 +227,14 @@ class _Begun:
     models: list[CommandedModel]
     rows: list[FlightRows]
     checks: list[RecordingCheck | None]
-    white: NoiseFit
+    white: FlightFit
     numbers: dict[str, float]
-    whole: NoiseFit
+    whole: FlightFit
 
     @property
     def criterion(self) -> float:
         """Akaike's criterion, in which an unknown command is a number."""
-        return self.whole.criterion + 2.0 * sum(len(one.unknown) for one in self.rows)
+        return self.whole.criterion + 2.0 * sum(one.commands.unknown for one in self.models)
 
     @property
     def fitted(self) -> list[Run]:
@@ -297,7 +275,7 @@ class _Begun:
     @property
     def is_exact(self) -> bool:
         """Whether least squares leaves rounding alone."""
-        nearly = self.names.are_common and _is_nearly_exact(self.white)
+        nearly = self.names.are_common and _is_nearly_exact(self.whole, self.models)
         return nearly and is_exact(*self.plain, self.fitted)
 
     def by_least_squares(self) -> DelayEstimate:
@@ -311,52 +289,39 @@ class _Begun:
 class _Likeliest(NamedTuple):
     """The likeliest plant and noise, doubts about its commands, and the recordings with it."""
 
-    profile: LikelihoodProfile
+    profile: FlightProfile
     doubts: tuple[str, ...]
     fitted: list[Run]
 
 
 def _likeliest(begun: _Begun) -> _Likeliest:
     """Plant, noise and intervals, with the numbers around them and the commands between rows."""
-    linear, models, fitted = begun.names.linear, begun.models, begun.fitted
+    models, fitted = begun.models, begun.fitted
     fit = begun.whole.beside_noise()
-    free = None
+    numbers = covariance = None
+    unclear = False
     if begun.numbers:
-        fit, free = fit_numbers(fit, partial(_given, linear, models, fit.runs), begun.numbers)
-        fitted = [run._replace(loop=run.loop.replace(**free.values)) for run in fitted]
-    doubts: tuple[str, ...] = ()
-    if any(one.commands.computed for one in models):
-        fit, step, doubts = _with_predicted_commands(linear, fit, models, begun.runs)
-        if (lost := _with_lost_commands(begun, fit, step)) is not None:
-            return _Likeliest(lost, doubts, fitted)
-    profile = profile_for(fit, linear, begun.assumed.intervals)
-    if free is not None:
-        profile = NumbersProfile(profile.fit, profile.names, profile.preferred, free=free)
-    return _Likeliest(profile, doubts, fitted)
+        given = partial(_given, begun.names, begun.assumed, models, fit.runs)
+        fit, numbers = fit.with_numbers(given, list(begun.numbers.items()))
+        if numbers is None:
+            raise NotIdentifiableError(
+                f"the {' and '.join(begun.numbers)} cannot be told from what else is fitted by "
+                "this recording: fix one of them, or record larger steps"
+            )
+        values = dict(numbers.values)
+        fitted = [run._replace(loop=run.loop.replace(**values)) for run in fitted]
+    if any(one.commands.are_computed for one in models):
+        commands = [one.commands for one in models]
+        fit, unclear, covariance = fit.between_rows(commands, not begun.numbers)
+    profile = profile_for(fit, begun.assumed.intervals, covariance, numbers)
+    doubts = (
+        "the reference changes between rows that are further apart than samples, and the "
+        "recording does not tell when",
+    )
+    return _Likeliest(profile, doubts * unclear, fitted)
 
 
-def _with_lost_commands(
-    begun: _Begun, fit: NoiseFit, step: int | None
-) -> LostCommandsProfile | None:
-    """The profile whose commands in missing rows follow from its plant; None where they need not.
-
-    Single rows are predicted well enough. Where most are missing, as in a log at a lower rate, the
-    likelihood has too many kinks.
-    """
-    linear, models = begun.names.linear, begun.models
-    missing = max(one.commands.longest for one in models)
-    few = all(one.commands.time.size < 2 * one.logged.size for one in models)
-    period = max(run.loop.sample_time or 0.0 for run in begun.fitted)
-    if missing <= 1 or not few or not period or begun.numbers or is_long(begun.rows):
-        return None
-    found = with_lost_commands(fit, _refilling(linear, models, begun.runs, step), period)
-    if found is None:
-        return None
-    fit, cov = found
-    return LostCommandsProfile(fit, profiled(fit.model, linear), cov=cov)
-
-
-def _check_delay(begun: _Begun, profile: LikelihoodProfile) -> None:
+def _check_delay(begun: _Begun, profile: FlightProfile) -> None:
     """Refuse a fit at the longest delay, and one that explains hardly more than a constant does."""
     longest = min(LONGEST_DELAY * one.span for one in begun.models)
     if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
@@ -370,7 +335,7 @@ def _check_delay(begun: _Begun, profile: LikelihoodProfile) -> None:
 
 
 def _without_the_plant(
-    begun: _Begun, profile: LikelihoodProfile, adequacy: Adequacy
+    begun: _Begun, profile: FlightProfile, adequacy: Adequacy
 ) -> DelayEstimate | None:
     """The estimate of least squares where the noise stands for what the plant lacks."""
     astray = adequacy.reasons and explains_less(profile.fit, begun.whole)
@@ -389,22 +354,21 @@ def _concluded(begun: _Begun, found: _Likeliest, adequacy: Adequacy) -> DelayEst
     """The estimate of the likelihood; of rounded rows alone, with each as an interval."""
     profile, message = found.profile, f"maximum likelihood {begun.message}"
     if adequacy.coloured:
-        profile = coloured_profile(profile)
+        profile = profile.coloured()
         message += ", intervals widened for residuals that are coloured at rest, too"
     estimate = concluded_flight(
         begun.method,
         begun.names.linear,
         found.fitted,
         profile,
-        begun.models[0].known,
         message,
-        begun.details(profile.initial_output),
+        begun.details(profile.fit.initial_output),
         adequacy,
     )
-    plain = begun.names.are_common and type(profile) is LikelihoodProfile
+    plain = begun.names.are_common and profile.is_plain and not adequacy.coloured
     if (
         plain
-        and not is_long(begun.rows)
+        and not profile.fit.is_long
         and estimate.verdict == "reliable"
         and rounding_is_all(profile.fit)
     ):
@@ -430,8 +394,11 @@ def _begun_with(method: str, runs: Sequence[Run], names: _Names, assumed: Assume
     rows = [
         one.rows(assumed.initial_output, check) for one, check in zip(models, checks, strict=True)
     ]
-    white, numbers = _first(names.linear, models, rows, names.others)
-    whole = replace(white, runs=tuple(_given(names.linear, models, rows, numbers)[1]))
+    given, known = partial(_given, names, assumed, models, rows), models[0].known
+    first = [known[name] for name in names.others]
+    white, found = FlightFit.first(given, first, known["delay"], known["gain"])
+    numbers = dict(zip(names.others, found, strict=True))
+    whole = white.on(given(found)[1])
     return _Begun(method, runs, names, assumed, models, rows, checks, white, numbers, whole)
 
 
@@ -447,121 +414,24 @@ def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
             raise ValueError(f"{name}=0: give another value to start from, of the sign it has")
 
 
-def _first(
-    names: tuple[str, ...],
-    models: Sequence[CommandedModel],
-    rows: Sequence[FlightRows],
-    others: Sequence[str],
-) -> tuple[NoiseFit, dict[str, float]]:
-    """Least squares on parts of the rows, and the other numbers under which it is best."""
-    known = models[0].known
-    found = []
-
-    def within(values: Mapping[str, float]) -> tuple[PlantModel, list[FlightRows]]:
-        model, whole = _given(names, models, rows, values)
-        return model, [excited_part(one) for one in whole]
-
-    for factors in product(LAG_FACTORS, repeat=len(others)):
-        values = {name: factor * known[name] for name, factor in zip(others, factors, strict=True)}
-        fit = least_squares(*within(values), known["delay"], known["gain"])
-        found.append((fit, values))
-    best, values = min(found, key=lambda one: one[0].numbers.objective)
-    return numbers_under_white_noise(best, within, values) if others else (best, values)
-
-
 def _given(
-    names: tuple[str, ...],
+    names: _Names,
+    assumed: Assumed,
     models: Sequence[CommandedModel],
     rows: Sequence[FlightRows],
-    values: Mapping[str, float],
-) -> tuple[PlantModel, list[FlightRows]]:
-    """The plant with these numbers and `names` free, and the rows with the commands it gets."""
-    plant = models[0].plant
+    found: Sequence[float],
+) -> tuple[FlightPlant, list[FlightRows]]:
+    """The plant with such other numbers, and the rows with the commands that it gets."""
+    plant, values = models[0].plant, dict(zip(names.others, found, strict=True))
     if values:
         plant = plant._replace({**plant.parameters, **values})
     within = [one.limited(part, values) for one, part in zip(models, rows, strict=True)]
-    model = replace(PlantModel.of(plant, names), air_behind_lags=models[0].air == "vehicle")
-    return model, within
+    return plant_model(plant, names.linear, assumed.air == "vehicle"), within
 
 
-def _with_predicted_commands(
-    names: tuple[str, ...], fit: NoiseFit, models: Sequence[CommandedModel], runs: Sequence[Run]
-) -> tuple[NoiseFit, int | None, tuple[str, ...]]:
-    """The fit with the commands between rows that its plant predicts, and doubts about them.
-
-    Where the reference changes between rows that are further apart than samples, each sample at
-    which it may have changed is tried.
-    """
-    steps = [one.commands.steps for one in models]
-    unclear = max(steps) > 1 and sum(step > 1 for step in steps) == 1
-    tried: list[tuple[NoiseFit, int | None]] = []
-    size = abs(fit.gain)
-    for step in range(max(steps)) if unclear and max(steps) <= MOST_STEPS else (None,):
-        refilled = _refilling(names, models, runs, step, unsure=True)
-        between = [
-            one.refilled(rows, with_missing(run.recording, run.loop, one.logged, step=step), size)
-            if one.commands.computed
-            else rows
-            for one, run, rows in zip(models, runs, fit.runs, strict=True)
-        ]
-        again = fitted_flight(fit.model, between, fit.with_gain)
-        # Predicted outputs are better than a straight line between rows, or not, as where they
-        # depend on each other through the controller.
-        for _ in range(REFILLS):
-            further = fitted_flight(again.model, refilled(again), again.with_gain)
-            gained = again.criterion - further.criterion
-            again = further if gained > 0.0 else again
-            if gained < SETTLED:
-                break
-        tried.append((again, step))
-    tried.sort(key=lambda one: one[0].criterion)
-    best, step = tried[0]
-    if len(tried) > 1 and tried[1][0].criterion - best.criterion < CLEARLY:
-        return (
-            best,
-            step,
-            (
-                "the reference changes between rows that are further apart than samples, and the "
-                "recording does not tell when",
-            ),
-        )
-    return best, step, ()
-
-
-def _refilling(
-    names: tuple[str, ...],
-    models: Sequence[CommandedModel],
-    runs: Sequence[Run],
-    step: int | None,
-    unsure: bool = False,
-) -> Refilled:
-    """The rows of a fit with the commands between them that its plant predicts.
-
-    If `unsure`, the mean command over many missing rows is unknown all the same.
-    """
-    commands = [one.commands for one in models]
-
-    def refilled(fit: NoiseFit) -> list[FlightRows]:
-        values = values_of(fit, names, models[0].known)
-        found = []
-        for i, (one, run, rows) in enumerate(zip(models, runs, fit.runs, strict=True)):
-            if one.commands.computed:
-                loop = run.loop.replace(**values)
-                # The next plant is near.
-                calm = not unsure and is_calm(fit, i)
-                commands[i] = predicted_commands(
-                    run.recording, loop, one.logged, commands[i], step, unsure, calm
-                )
-                rows = one.refilled(rows, commands[i], abs(fit.gain))
-            found.append(rows)
-        return found
-
-    return refilled
-
-
-def _is_nearly_exact(fit: NoiseFit) -> bool:
+def _is_nearly_exact(fit: FlightFit, models: Sequence[CommandedModel]) -> bool:
     """Whether all that is left may be rounding."""
     return all(
-        float(np.max(np.abs(part.residuals))) <= NEARLY_EXACT * float(np.ptp(rows.output))
-        for part, rows in zip(fit.parts, fit.runs, strict=True)
+        float(np.max(np.abs(part.residuals))) <= NEARLY_EXACT * float(np.ptp(one.recording.output))
+        for part, one in zip(fit.parts, models, strict=True)
     )

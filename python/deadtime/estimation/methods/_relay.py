@@ -26,6 +26,7 @@ from deadtime._base.arrays import Array, Indices
 from deadtime._base.errors import NotIdentifiableError
 from deadtime._base.validation import positive
 from deadtime.estimation._native import (
+    HeldResponse,
     cycle_crossings,
     cycle_delay_by_lag,
     cycle_delays,
@@ -35,7 +36,6 @@ from deadtime.estimation.data._checks import integrator_of
 from deadtime.estimation.data._step_reading import noise_of_second_differences
 from deadtime.estimation.methods._conclusion import OfOne, Read
 from deadtime.estimation.methods._method import Run
-from deadtime.estimation.models._held import HeldResponse
 from deadtime.recordings import Recording
 
 #: Crossings at the beginning that are left out: from rest, where noise alone switches the relay,

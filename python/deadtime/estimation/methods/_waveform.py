@@ -24,7 +24,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from deadtime._base.errors import NotIdentifiableError
-from deadtime.estimation._native import LoopMisfit
+from deadtime.estimation._native import FlightProfile, LoopMisfit
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import (
     LOOP_PARAMETERS,
@@ -43,7 +43,6 @@ from deadtime.estimation.fit._least_squares import (
     solve_jointly,
     without_vanishing,
 )
-from deadtime.estimation.likelihood._profile import LikelihoodProfile
 from deadtime.estimation.methods._commanded_model import Assumed
 from deadtime.estimation.methods._conclusion import concluded
 from deadtime.estimation.methods._method import Method, Run, check_choice, check_initial_output
@@ -145,7 +144,7 @@ def _unlikelihood(fit: DelayEstimate) -> float:
 
     Residuals are taken as no smaller than rounding. Further numbers of the noise have their price.
     """
-    if isinstance(fit._profile, LikelihoodProfile):
+    if isinstance(fit._profile, FlightProfile):
         fitted = fit._profile.fit
         air = any(one.air > 0.0 for one in fitted.numbers.noise)
         return 0.5 * fitted.criterion + PRICE_OF_AIR * air

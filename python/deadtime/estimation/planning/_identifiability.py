@@ -26,15 +26,8 @@ from deadtime.estimation.methods._waveform import Waveform
 from deadtime.estimation.planning._monte_carlo import SLOW, MonteCarlo, run_many_times, with_sums
 from deadtime.estimation.planning._planned_bound import (
     PlannedBound,
-    bound_of,
-    from_the_command,
-    from_the_reference,
-)
-from deadtime.estimation.planning._whitening import (
-    ClosedLoop,
-    in_open_loop,
-    trim_is_free,
-    trim_response,
+    bound_with_command,
+    bound_with_reference,
 )
 from deadtime.experiments import Experiment, FlightNoise, NoiseModel
 from deadtime.loops import ControlLoop
@@ -336,38 +329,18 @@ def identifiability(
     noise = _noise_with_covariance(noise)
     _checked_start(initial_output)
     count = whole_number("runs", runs, least=0)
-    offset, trim = initial_output is None, trim_is_free(noise)
+    offset = initial_output is None
     run_loop = experiment.loop_in_run(loop)
     recording = experiment.run(loop)
     _check_excitation(run_loop, recording, names)
     seeds = np.random.SeedSequence(seed).spawn(count)
-    noisy = [experiment.run(loop, noise, one) for one in seeds]
-
-    def command_logged() -> PlannedBound:
-        if not run_loop.is_sampled:
-            raise NotIdentifiableError(
-                "a continuous loop changes its command between the samples of a log"
-            )
-        slopes = [
-            from_the_command(run_loop, one, names, offset, trim) for one in noisy or [recording]
-        ]
-        whitened = partial(in_open_loop, run_loop, experiment.time, noise=noise)
-        return bound_of(slopes, whitened, names, noise, loop.plant)
-
-    def reference_only() -> PlannedBound:
-        slopes = from_the_reference(run_loop, experiment, names, offset, noise.white)
-        if not noise.moves_plant:
-            whitened = partial(in_open_loop, run_loop, experiment.time, noise=noise)
-            return bound_of([slopes], whitened, names, noise, loop.plant)
-        assert recording.command is not None
-        closed = ClosedLoop.along(run_loop, experiment, recording.command)
-        if trim:
-            slopes["trim"] = closed.response(trim_response(run_loop, experiment.time))
-        whitened = partial(closed.whitened, run_loop, noise=noise)
-        return bound_of([slopes], whitened, names, noise, loop.plant)
-
-    cases = {"command logged": command_logged, "reference only": reference_only}
-    (logged, alone), remarks = _told(cases)
+    recordings = [experiment.run(loop, noise, one) for one in seeds] or [recording]
+    asked = run_loop, names, offset, noise
+    cases = {
+        "command logged": partial(bound_with_command, *asked, recordings),
+        "reference only": partial(bound_with_reference, *asked, experiment, recording),
+    }
+    (logged, alone), remarks = _found(cases)
     if logged is None and (alone is None or run_loop.is_sampled):
         raise NotIdentifiableError("; ".join(remarks))
     return Identifiability(
@@ -383,7 +356,7 @@ def identifiability(
     )
 
 
-def _told(
+def _found(
     cases: Mapping[str, Callable[[], PlannedBound]],
 ) -> tuple[list[PlannedBound | None], list[str]]:
     """The bound of each case, None where it determines nothing, and why not."""

@@ -2,7 +2,7 @@
 
 For output y_i = f(t_i; p) + Gaussian noise of covariance V, no unbiased estimator that reads p from
 the mean has a smaller covariance than (J^T V^-1 J)^-1, J = df/dp; for white noise of standard
-deviation sigma it is sigma^2 (J^T J)^-1. `_whitening` has V. Two bounds, for two kinds of log:
+deviation sigma it is sigma^2 (J^T J)^-1. Two bounds, for two kinds of log:
 
 * command logged: f is the response of the plant to that command, which is known, with the noise
   that the controller acted on. With P its transfer function, w the command and T the delay,
@@ -13,12 +13,29 @@ deviation sigma it is sigma^2 (J^T J)^-1. `_whitening` has V. Two bounds, for tw
 
 Both are taken along the run without noise. Noise that the controller acts on moves the command too,
 which adds information; the information of the first kind is then the mean of J^T V^-1 J over runs.
+
+With V = L L' the covariance of the rows, in units of the white noise, whitened columns L⁻¹ J have
+the information J' V⁻¹ J. There are two covariances:
+
+* command logged: the command is known, so the noise is the response of the plant alone to the air
+  (`in_open_loop`). It does not depend on the delay. The kernel whitens in one Kalman pass.
+* reference only: the controller acts on the effect d of the air. Along the run, a P controller of
+  gain Kp answers with -Kp S y, where S is 1 in rows in which the command is within its limit and 0
+  in the others. With G the response of the plant and its delay to commands, y = d - G Kp S y, so
+
+      y = T d,  T = (I + G Kp S)⁻¹,  V = T V_air T' + V_sensor,
+
+  which is a dense matrix (`bound_with_reference`).
+
+That V depends on the lag, and in closed loop on the delay as well, would add a little information,
+which is left out: an estimator would have to know how the spectrum of the air depends on them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -26,10 +43,10 @@ from deadtime._base.arrays import Array
 from deadtime._base.errors import NotIdentifiableError
 from deadtime.estimation._result import CramerRaoBound
 from deadtime.estimation.data._checks import QUOTIENT, check_distinguishable, standard_errors
-from deadtime.estimation.likelihood._flight import names_in_kernel
-from deadtime.estimation.planning._whitening import trim_response
-from deadtime.experiments import Experiment, FlightNoise
-from deadtime.loops import ControlLoop, Plant
+from deadtime.estimation.likelihood._disturbances import disturbances_of, whitened
+from deadtime.estimation.likelihood._plant import names_in_kernel
+from deadtime.experiments import Experiment, FlightNoise, RandomProcess, check_reads_samples
+from deadtime.loops import ControlLoop, P, Plant
 from deadtime.recordings import Recording
 from deadtime.roots import delay, s
 from deadtime.systems import TransferFunction
@@ -40,6 +57,12 @@ LONGER = 1e-9
 
 #: Change of the initial output, as a share of the noise, in the difference quotient by it.
 START_CHANGE = 1e-3
+
+#: A random walk is taken as gusts that last so many times as long as the run.
+LONG = 1e5
+
+#: Most rows of the dense covariance.
+MOST_ROWS = 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,17 +113,17 @@ class PlannedBound(CramerRaoBound):
 
 def bound_of(
     runs: Sequence[dict[str, Array]],
-    whitened: Callable[[Array], Array],
+    white: Callable[[Array], Array],
     names: tuple[str, ...],
     noise: FlightNoise,
     plant: Plant,
 ) -> PlannedBound:
     """The bound from the mean information of runs; the sensitivities of the first are kept.
 
-    `whitened` whitens columns, a row each, in units of the white noise.
+    `white` whitens columns, a row each, in units of the white noise.
     """
     labels = tuple(runs[0])
-    jacobian = np.concatenate([whitened(np.stack(list(run.values()))).T for run in runs])
+    jacobian = np.concatenate([white(np.stack(list(run.values()))).T for run in runs])
     check_distinguishable(jacobian, list(labels))
     scale = np.linalg.norm(jacobian, axis=0)
     # P P^T is the inverse of J^T J for the pseudoinverse P of J.
@@ -168,3 +191,103 @@ def from_the_reference(
         )
         slopes["initial output"] = (high - low) / (2.0 * change)
     return slopes
+
+
+def trim_is_free(noise: FlightNoise) -> bool:
+    """Whether the trim is unknown to an estimator.
+
+    It is the mean of the air, and where the air walks at random, its value at the first row.
+    """
+    return bool(noise.trim or noise.air_walk)
+
+
+def trim_response(loop: ControlLoop, time: Array) -> Array:
+    """Derivative of the output of the plant by the trim."""
+    return FlightNoise(trim=1.0).disturbance(time, 0, loop.plant)
+
+
+def in_open_loop(loop: ControlLoop, time: Array, columns: Array, noise: FlightNoise) -> Array:
+    """Columns, a row each, whitened by the covariance of air and sensor without the loop."""
+    present = disturbances_of(noise, LONG * float(time[-1] - time[0]))
+    return whitened(loop.plant, time, columns, present)
+
+
+def bound_with_command(
+    loop: ControlLoop,
+    names: tuple[str, ...],
+    offset: bool,
+    noise: FlightNoise,
+    recordings: Sequence[Recording],
+) -> PlannedBound:
+    """The bound where the command is in the log, from the mean information of these runs."""
+    if not loop.is_sampled:
+        raise NotIdentifiableError(
+            "a continuous loop changes its command between the samples of a log"
+        )
+    trim, time = trim_is_free(noise), recordings[0].time
+    slopes = [from_the_command(loop, one, names, offset, trim) for one in recordings]
+    white = partial(in_open_loop, loop, time, noise=noise)
+    return bound_of(slopes, white, names, noise, loop.plant)
+
+
+def bound_with_reference(
+    loop: ControlLoop,
+    names: tuple[str, ...],
+    offset: bool,
+    noise: FlightNoise,
+    experiment: Experiment,
+    recording: Recording,
+) -> PlannedBound:
+    """The bound where only reference and output are known, along the run without noise."""
+    from scipy import linalg
+
+    time = experiment.time
+    slopes = from_the_reference(loop, experiment, names, offset, noise.white)
+    if not noise.moves_plant:
+        white = partial(in_open_loop, loop, time, noise=noise)
+        return bound_of([slopes], white, names, noise, loop.plant)
+    assert recording.command is not None
+    feedback = _feedback(loop, experiment, recording.command)
+    response = partial(linalg.solve_triangular, feedback, lower=True)
+    if trim_is_free(noise):
+        slopes["trim"] = response(trim_response(loop, time))
+    V = response(response(noise.process(loop.plant).covariance(time)).T)
+    if noise.sensor:
+        # Outside of the loop.
+        V += RandomProcess.of_sensor(noise.sensor, noise.sensor_time).covariance(time)
+    V[np.diag_indices_from(V)] += noise.white**2
+    root = np.linalg.cholesky(V) / noise.white
+
+    def white_in_loop(columns: Array) -> Array:
+        return np.asarray(linalg.solve_triangular(root, columns.T, lower=True).T)
+
+    return bound_of([slopes], white_in_loop, names, noise, loop.plant)
+
+
+def _feedback(loop: ControlLoop, experiment: Experiment, command: Array) -> Array:
+    """I + G Kp S around the run with this command, shape (n, n)."""
+    from scipy import linalg
+
+    check_reads_samples(loop)
+    time, controller = experiment.time, loop.controller
+    if experiment.relay_amplitude is not None:
+        raise NotIdentifiableError(
+            "the air moves the switching of the relay, which has no derivative: log the command"
+        )
+    if not isinstance(controller, P):
+        raise NotIdentifiableError(
+            f"the answer of {controller!r} to the air is not computed: log the command, or "
+            "take a P controller"
+        )
+    if time.size > MOST_ROWS:
+        raise NotIdentifiableError(
+            f"{time.size} samples with air in the loop need a matrix of as many rows, beyond "
+            f"{MOST_ROWS}: log the command, or plan a shorter experiment"
+        )
+    plant = TransferFunction(*loop.plant.polynomials()) * delay(loop.parameters["delay"])
+    pulse = np.zeros(time.size)
+    pulse[0] = 1.0
+    answer = np.asarray(plant.simulate(time, pulse, input_time=time).outputs)
+    G = linalg.toeplitz(answer, np.zeros(time.size))
+    within = np.ones(time.size) if loop.limit is None else np.abs(command) < loop.limit
+    return np.asarray(np.eye(time.size) + G * (controller.Kp * within))

@@ -25,7 +25,7 @@ from deadtime.estimation.running._settings import (
     coarser,
     is_range,
     lag_sets,
-    plant_model,
+    linear_plant,
     points_of_range,
 )
 from deadtime.experiments import FlightNoise, Noise
@@ -163,7 +163,7 @@ class OnlineEstimator:
         self._loop = loop
         points = points_of_range("delays", delays, DELAYS)
         self._lags = None if lags is None else points_of_range("lags", lags, LAGS)
-        model = plant_model(loop, ("delay", "gain"))
+        model = linear_plant(loop, ("delay", "gain"))
         known = loop.parameters.get("gain")
         size = abs(known) if known else 1.0
         self._settings = BankSettings(

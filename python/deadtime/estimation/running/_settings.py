@@ -10,8 +10,9 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import interval, non_negative
+from deadtime.estimation._native import FlightPlant
 from deadtime.estimation.likelihood._disturbances import Disturbance, disturbances_of
-from deadtime.estimation.likelihood._flight import PlantModel
+from deadtime.estimation.likelihood._plant import plant_model
 from deadtime.experiments import FlightNoise
 from deadtime.loops import ControlLoop
 
@@ -39,8 +40,8 @@ COARSE = 0.01
 class BankSettings(NamedTuple):
     """The settings of the kernel, by its names."""
 
-    num: tuple[float, ...]
-    den: tuple[float, ...]
+    num: list[float]
+    den: list[float]
     air_behind_lags: bool
     own_lag: float
     delays: list[float]
@@ -90,17 +91,17 @@ def points_of_range(name: str, given: Any, number: int) -> Array:
     return np.linspace(low, high, number)
 
 
-def plant_model(loop: ControlLoop, names: tuple[str, ...]) -> PlantModel:
+def linear_plant(loop: ControlLoop, names: tuple[str, ...]) -> FlightPlant:
     """The plant as the kernel takes it."""
     if not loop.plant.is_linear:
         raise ValueError(
             f"the plant {loop.plant!r} is not linear: the filters are for linear plants; give the "
             "plant behind its limits and the command after them"
         )
-    return PlantModel.of(loop.plant, names)
+    return plant_model(loop.plant, names)
 
 
-def lag_sets(model: PlantModel, lags: Array | None) -> list[list[float]]:
+def lag_sets(model: FlightPlant, lags: Array | None) -> list[list[float]]:
     """The lags of each layer: those of the plant, the first of them replaced by each of `lags`."""
     if lags is None:
         return [list(model.lags)]

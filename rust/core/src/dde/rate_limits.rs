@@ -29,6 +29,9 @@ struct State {
 }
 
 impl RateLimits {
+    /// Pieces of each limited command: more follow it closer, and take as much longer.
+    pub const PIECES: usize = 8;
+
     /// # Errors
     /// [`Error::Argument`] if a limit is not above zero, or that of the rate is infinite.
     pub fn new(rate: f64, rate_of_rate: f64) -> Result<Self, Error> {

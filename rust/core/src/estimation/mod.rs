@@ -13,6 +13,7 @@
 //! `least_squares` fits simulated loops, `damped` is the step of its searches, and
 //! `literature` has the formulas of other methods.
 
+mod commanded;
 mod damped;
 mod disturbance;
 mod family;
@@ -43,6 +44,7 @@ mod variables;
 mod waves;
 mod whiten;
 
+pub use commanded::{Commanded, UnitPlant};
 pub use disturbance::{Disturbance, Entry};
 pub use family::{
     Between, Candidate, Cause as FamilyCause, CauseKind, Class, Coefficients, Family, Grade, Named,
@@ -51,15 +53,16 @@ pub use family::{
 };
 pub use fit::{Fit, Model, Search};
 pub use flight::{
-    Asked, Cause, Finding, FlightFit, FlightPlant, FlightProfile, FlightRun, Judgement,
-    KnownQuantity, LAG_FACTORS, LEVEL_OF_TESTS, LONGEST_DELAY, SEARCHED_ROWS, SHORTEST_LAG,
-    Scatter, Whiteness, beside_noise, colour_factors, excited_part, fit_flight, judge,
+    BetweenRows, Cause, Controlled, Ends, Finding, FlightFit, FlightPlant, FlightProfile,
+    FlightRun, FreeNumbers, Judgement, KnownQuantity, LEVEL_OF_TESTS, LONGEST_DELAY, LoopNumbers,
+    MOST_NUMBERS, RunCommands, SHORTEST_LAG, Scatter, Sent, Whiteness, WithNumbers, beside_noise,
+    between_rows, colour_factors, first_numbers, fit_flight, fit_numbers, is_long, judge_profile,
     least_squares, scatter_of, unseen_lag, whiteness,
 };
 pub use least_squares::{
-    Chebyshev, ClosedLoop, Fitted, Given, Joint, Minimum, Number as FittedNumber, Part, Scan,
-    Simulated, Vanishing, by_scatter, least_held, local_minima, refined, robust_covariance, scan,
-    solve, white_covariance, without_vanishing,
+    Chebyshev, ClosedLoop, Fitted, Given, Joint, Minimum, Number as FittedNumber, Part, Peak,
+    Readings, Rounded, Scan, Simulated, Vanishing, by_scatter, least_held, local_minima, refined,
+    robust_covariance, scan, solve, white_covariance, without_vanishing,
 };
 pub use likelihood::{Evaluation, Noise};
 pub use literature::{

@@ -8,7 +8,8 @@ use super::super::point::{Point, Timing};
 use super::super::rows::Rows;
 use super::median::median_step;
 use super::plant::FlightPlant;
-use super::tolerances::PRICES;
+use super::rounded_rows::on_same_step;
+use super::tolerances::{NO_LAG, PRICES, SHORTEST_LAG};
 use crate::{Error, Task};
 
 /// One recording.
@@ -48,6 +49,31 @@ impl FlightRun {
             ..self.rows.clone()
         };
         Self { rows, ..*self }
+    }
+
+    /// The same under other commands.
+    ///
+    /// # Errors
+    ///
+    /// As for `Rows::checked`.
+    pub fn under(&self, time: Vec<f64>, value: Vec<f64>) -> Result<Self, Error> {
+        let mut rows = self.rows.clone();
+        (rows.commands.time, rows.commands.value) = (time, value);
+        let rows = rows.checked()?;
+        Ok(Self { rows, ..*self })
+    }
+
+    /// Rows left out as outliers: not those of a rounded output that tell nothing besides another.
+    pub fn left_out(&self) -> usize {
+        let rows = self.rows.used.iter();
+        if self.rounding > 0.0 {
+            let same = on_same_step(&self.rows.output);
+            return rows
+                .zip(same)
+                .filter(|(used, same)| !**used && !same)
+                .count();
+        }
+        rows.filter(|used| !**used).count()
     }
 
     /// Number of rows that are used.
@@ -157,6 +183,24 @@ impl FlightFit {
         Ok(total)
     }
 
+    /// Schwarz's criterion (BIC), from the plain likelihood, for so many unknown numbers of the plant
+    /// and as many rows as were logged. The trim and coloured noise of the sensor are unknown too.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn schwarz(&self, unknown: usize, task: &Task) -> Result<f64, Error> {
+        let (mut total, mut unknown, mut rows) = (0.0, unknown, 0);
+        let noises = &self.fit.point.noise;
+        for ((run, part), noise) in self.runs.iter().zip(self.parts(task)?).zip(noises) {
+            let count = run.count() as f64;
+            total += count * (part.variance * part.freedom as f64 / count).ln() + part.log_det;
+            unknown += usize::from(self.trim) + 2 * usize::from(noise.sensor > 0.0);
+            rows += part.residuals.len();
+        }
+        Ok(total + unknown as f64 * (rows as f64).ln())
+    }
+
     /// The gain.
     ///
     /// # Errors
@@ -226,6 +270,88 @@ impl FlightFit {
     /// Delay and lags less the zero, with the lag of the known part, s.
     pub fn total(&self) -> f64 {
         self.fit.point.total() + self.plant.own_lag
+    }
+}
+
+/// The numbers of a loop with a plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopNumbers {
+    /// s.
+    pub delay: f64,
+    /// The gain.
+    pub gain: f64,
+    /// s.
+    pub lags: Vec<f64>,
+    /// s.
+    pub zero: f64,
+}
+
+impl FlightFit {
+    /// The numbers of the loop; a lag at its lower bound is none.
+    ///
+    /// # Errors
+    ///
+    /// If no lag is left beside a zero: its effect would be a pulse between rows. And as for `parts`.
+    pub fn loop_numbers(&self, task: &Task) -> Result<LoopNumbers, Error> {
+        let (plant, point) = (&self.plant, &self.fit.point);
+        let row_time = self.runs.first().map_or(1.0, |run| run.row_time);
+        let (mut delay, mut lags) = (point.delay(), point.lags.clone());
+        for lag in lags.iter_mut().filter(|_| !plant.time_constant) {
+            if *lag <= NO_LAG * SHORTEST_LAG * row_time {
+                delay += *lag;
+                *lag = 0.0;
+            }
+        }
+        let is_gone = !lags.is_empty() && lags.iter().all(|lag| *lag == 0.0);
+        if point.zero != 0.0 && is_gone && plant.den.len() <= 2 {
+            return Err(Error::NotIdentifiable(
+                "the lags come out at zero, where a zero has no effect on the rows: leave 'zero' and \
+                 the lags out of free=, or give the plant a further lag"
+                    .into(),
+            ));
+        }
+        Ok(LoopNumbers {
+            delay: if plant.free.delay {
+                delay.max(0.0)
+            } else {
+                point.delay()
+            },
+            gain: self.gain(task)?,
+            lags,
+            zero: point.zero,
+        })
+    }
+
+    /// The fitted output at the start of the first recording; not a number where it is given.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn initial_output(&self, task: &Task) -> Result<f64, Error> {
+        let place = usize::from(self.gain_is_eliminated());
+        let is_free = self.runs.first().is_some_and(|run| run.rows.offset);
+        let part = self.parts(task)?.first().filter(|_| is_free);
+        Ok(part
+            .and_then(|part| part.linear.get(place))
+            .copied()
+            .unwrap_or(f64::NAN))
+    }
+
+    /// Trim and white deviation of a recording.
+    ///
+    /// # Errors
+    ///
+    /// As for `parts`.
+    pub fn trim_and_white(&self, run: usize, task: &Task) -> Result<(f64, f64), Error> {
+        let (Some(part), Some(rows)) = (self.parts(task)?.get(run), self.runs.get(run)) else {
+            refuse!(
+                "recording {run} of {}: give the number of one",
+                self.runs.len()
+            )
+        };
+        let place = usize::from(self.gain_is_eliminated()) + usize::from(rows.rows.offset);
+        let trim = part.linear.get(place).filter(|_| self.trim);
+        Ok((trim.copied().unwrap_or(0.0), part.variance.sqrt()))
     }
 }
 

@@ -8,6 +8,8 @@
 //! In a long recording the likelihood is close to a parabola, and each of its evaluations takes long:
 //! intervals are t standard errors wide, from its curvature.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::super::fit::Fit;
 use super::super::point::Quantity;
 use super::super::profile::{Limits, Seen};
@@ -15,6 +17,7 @@ use super::super::statistics::student_reach;
 use super::covariance::{Common, variance};
 use super::fit::FlightFit;
 use super::noise_known::{degrees_of_freedom, unseen_air};
+use super::numbers::FreeNumbers;
 use super::start::is_long;
 use super::tolerances::{INTERVALS, SEARCH};
 use crate::{Error, Task};
@@ -32,14 +35,24 @@ pub struct Known {
     pub unseen: f64,
     /// Degrees of freedom of its variance.
     pub freedom: f64,
+    /// Standard deviation that numbers add which are searched around the likelihood.
+    pub added: f64,
 }
 
 impl Known {
-    /// Standard error, also for air that may be there unseen.
-    pub fn error(&self) -> f64 {
+    /// Standard error, also for air that may be there unseen, with those numbers known.
+    fn own_error(&self) -> f64 {
         self.bound * self.unseen.sqrt()
     }
+
+    /// Standard error, also for air that may be there unseen.
+    pub fn error(&self) -> f64 {
+        self.own_error().hypot(self.added)
+    }
 }
+
+/// Ends found so far: of a quantity, at a level.
+pub type Ends = Vec<(Quantity, f64, (f64, f64))>;
 
 /// The profile of one fit.
 #[derive(Debug, Clone)]
@@ -56,8 +69,11 @@ pub struct FlightProfile {
     pub rows: usize,
     /// Each quantity as a sum of the numbers that all recordings share.
     pub weights: Vec<Vec<f64>>,
-    /// Ends found so far: of a quantity, at a level.
-    ends: Vec<(Quantity, f64, (f64, f64))>,
+    /// The numbers that are searched around the likelihood.
+    pub numbers: Option<Arc<FreeNumbers>>,
+    /// Are the commands functions of the plant? Intervals are then those of the covariance.
+    pub is_of_plant: bool,
+    ends: Arc<Mutex<Ends>>,
 }
 
 impl FlightProfile {
@@ -67,10 +83,8 @@ impl FlightProfile {
     ///
     /// If the recordings do not tell them apart, and as for `Model::at`.
     pub fn new(fit: FlightFit, quantities: &[Quantity], task: &Task) -> Result<Self, Error> {
-        let mut centre = fit.with_gain(task)?;
-        centre.point = fit.model().timed(centre.point);
         let parts = fit.parts(task)?;
-        let rows = parts.iter().map(|part| part.freedom).sum();
+        let rows: usize = parts.iter().map(|part| part.freedom).sum();
         let common = Common::new(&fit, task)?;
         let covariance = common.covariance(parts);
         let weights: Vec<Vec<f64>> = quantities.iter().map(|one| common.weights(*one)).collect();
@@ -86,19 +100,39 @@ impl FlightProfile {
         }
         let unseen = unseen_air(&fit, &common, &weights, &squares, task)?;
         let freedom = degrees_of_freedom(&fit, &common, &weights, rows as f64, task)?;
+        let point = fit.with_gain(task)?.point;
         let own_lag = |quantity: Quantity| match quantity {
             Quantity::Total => fit.plant.own_lag,
             _ => 0.0,
         };
         let known = quantities.iter().enumerate().map(|(i, quantity)| Known {
             quantity: *quantity,
-            value: quantity.value(&centre.point) + own_lag(*quantity),
+            value: quantity.value(&point) + own_lag(*quantity),
             bound: squares[i].sqrt(),
             unseen: unseen[i],
             freedom: freedom[i],
+            added: 0.0,
         });
         let known = known.collect();
         drop(common);
+        Self::restored(fit, known, covariance, weights, task)
+    }
+
+    /// The profile of a fit with what was found of it before.
+    ///
+    /// # Errors
+    ///
+    /// As for `FlightFit::parts`.
+    pub fn restored(
+        fit: FlightFit,
+        known: Vec<Known>,
+        covariance: Vec<f64>,
+        weights: Vec<Vec<f64>>,
+        task: &Task,
+    ) -> Result<Self, Error> {
+        let mut centre = fit.with_gain(task)?;
+        centre.point = fit.model().timed(centre.point);
+        let rows = fit.parts(task)?.iter().map(|part| part.freedom).sum();
         Ok(Self {
             fit,
             known,
@@ -106,8 +140,60 @@ impl FlightProfile {
             centre,
             rows,
             weights,
-            ends: Vec::new(),
+            numbers: None,
+            is_of_plant: false,
+            ends: Arc::default(),
         })
+    }
+
+    /// Covariance of quantities that all recordings share, and of the numbers around them.
+    pub fn covariance_of(&self, quantities: &[Quantity]) -> Vec<f64> {
+        let common = self.fit.plant.common();
+        let place = |one: &Quantity| common.iter().position(|own| own == one).unwrap_or(0);
+        let places: Vec<usize> = quantities.iter().map(place).collect();
+        let (n, all) = (places.len(), common.len());
+        let entry = |at: usize| self.covariance[places[at / n] * all + places[at % n]];
+        let own: Vec<f64> = (0..n * n).map(entry).collect();
+        match &self.numbers {
+            Some(numbers) => numbers.joined(quantities, &own),
+            None => own,
+        }
+    }
+
+    /// The same of a fit whose commands are functions of its plant, with this covariance.
+    #[must_use]
+    pub fn of_plant(mut self, covariance: Vec<f64>) -> Self {
+        for (known, weights) in self.known.iter_mut().zip(&self.weights) {
+            known.bound = variance(&covariance, weights).sqrt();
+        }
+        self.covariance = covariance;
+        self.is_of_plant = true;
+        self.ends = Arc::default();
+        self
+    }
+
+    /// The same with numbers that were searched around the likelihood.
+    #[must_use]
+    pub fn beside(mut self, numbers: FreeNumbers) -> Self {
+        for known in &mut self.known {
+            known.added = numbers.added(known.quantity);
+        }
+        self.numbers = Some(Arc::new(numbers));
+        self
+    }
+
+    /// Ends found so far.
+    pub fn found(&self) -> Ends {
+        self.ends
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    /// Keep the ends of an interval.
+    pub fn keep(&self, quantity: Quantity, level: f64, ends: (f64, f64)) {
+        let mut kept = self.ends.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.push((quantity, level, ends));
     }
 
     /// The profile, or that of a better minimum which the intervals of the `first` quantities find.
@@ -119,9 +205,9 @@ impl FlightProfile {
         fit: FlightFit,
         quantities: &[Quantity],
         first: &[Quantity],
-        level: f64,
         task: &Task,
     ) -> Result<Self, Error> {
+        let level = INTERVALS.level;
         let mut profile = Self::new(fit, quantities, task)?;
         if is_long(&profile.fit.runs) {
             return Ok(profile);
@@ -134,7 +220,7 @@ impl FlightProfile {
                     better = Some(lowest);
                     break;
                 }
-                profile.ends.push((*quantity, level, ends));
+                profile.keep(*quantity, level, ends);
             }
             let Some(better) = better else {
                 break;
@@ -158,7 +244,7 @@ impl FlightProfile {
             self.known.len()
         );
         let mut wider = self.clone();
-        wider.ends.clear();
+        wider.ends = Arc::default();
         for (known, factor) in wider.known.iter_mut().zip(factors) {
             known.unseen *= factor;
         }
@@ -203,10 +289,18 @@ impl FlightProfile {
     /// As for `known_of` and `Model::held`.
     pub fn statistic(&self, quantity: Quantity, value: f64, task: &Task) -> Result<f64, Error> {
         let (known, rows) = (self.known_of(quantity)?, self.rows as f64);
+        if self.is_of_plant {
+            return Ok(((value - known.value) / known.error()).powi(2));
+        }
         let value = value - self.outside(quantity);
         let held = self.fit.model().held(&self.centre, quantity, value, task)?;
         let rise = (held.objective - self.centre.objective).max(0.0);
-        Ok(rows * (rise / rows).exp_m1() / known.unseen)
+        let share = if known.added > 0.0 {
+            known.own_error() / known.error()
+        } else {
+            1.0
+        };
+        Ok(rows * (rise / rows).exp_m1() / known.unseen * share * share)
     }
 
     /// Ends of an interval; of a long recording from the curvature.
@@ -220,17 +314,97 @@ impl FlightProfile {
         level: f64,
         task: &Task,
     ) -> Result<(f64, f64), Error> {
-        if is_long(&self.fit.runs) {
+        let (low, high) = self.with_numbers_known(quantity, level, task)?;
+        let known = self.known_of(quantity)?;
+        if known.added == 0.0 {
+            return Ok((low, high));
+        }
+        let added = student_reach(level, known.freedom) * known.added;
+        let floor = if quantity == Quantity::Gain {
+            f64::NEG_INFINITY
+        } else {
+            0.0
+        };
+        let low = known.value - (known.value - low).hypot(added);
+        Ok((
+            low.max(floor),
+            known.value + (high - known.value).hypot(added),
+        ))
+    }
+
+    fn with_numbers_known(
+        &self,
+        quantity: Quantity,
+        level: f64,
+        task: &Task,
+    ) -> Result<(f64, f64), Error> {
+        if is_long(&self.fit.runs) || self.is_of_plant {
             return self.from_curvature(quantity, level);
         }
-        let mut found = self.ends.iter();
-        let found = found.find(|(own, at, _)| *own == quantity && *at == level);
-        let (low, high) = match found {
-            Some((_, _, ends)) => *ends,
-            None => self.ends(quantity, level, f64::INFINITY, task)?.0,
+        let found = self.found().into_iter();
+        let mut found = found.filter(|(own, at, _)| *own == quantity && *at == level);
+        let (low, high) = if let Some((_, _, ends)) = found.next() {
+            ends
+        } else {
+            let ends = self.ends(quantity, level, f64::INFINITY, task)?.0;
+            self.keep(quantity, level, ends);
+            ends
         };
         let outside = self.outside(quantity);
         Ok((low + outside, high + outside))
+    }
+
+    /// Standard error of a number that was searched around the likelihood.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such number; so for the next two.
+    pub fn error_of_number(&self, place: usize) -> Result<f64, Error> {
+        let (value, deviation) = self.number(place)?;
+        Ok(value.abs() * deviation)
+    }
+
+    /// The squared t for which a value of such a number is the end of an interval.
+    ///
+    /// # Errors
+    ///
+    /// See above.
+    pub fn statistic_of_number(&self, place: usize, value: f64) -> Result<f64, Error> {
+        let (own, deviation) = self.number(place)?;
+        let log = (value / own).ln();
+        Ok(if log.is_nan() {
+            f64::INFINITY
+        } else {
+            (log / deviation).powi(2)
+        })
+    }
+
+    /// The ends of the interval of such a number.
+    ///
+    /// # Errors
+    ///
+    /// See above.
+    pub fn interval_of_number(&self, place: usize, level: f64) -> Result<(f64, f64), Error> {
+        let (value, deviation) = self.number(place)?;
+        let reach = student_reach(level, self.least_freedom()) * deviation;
+        let (one, other) = (value / reach.exp(), value * reach.exp());
+        Ok((one.min(other), one.max(other)))
+    }
+
+    /// The least degrees of freedom of the quantities.
+    pub fn least_freedom(&self) -> f64 {
+        let freedoms = self.known.iter().map(|known| known.freedom);
+        freedoms.fold(f64::INFINITY, f64::min)
+    }
+
+    /// A number and the standard deviation of its logarithm.
+    fn number(&self, place: usize) -> Result<(f64, f64), Error> {
+        let numbers = self.numbers.as_ref();
+        let found = numbers.and_then(|own| Some((*own.values.get(place)?, own.deviation(place))));
+        match found {
+            Some(found) => Ok(found),
+            None => refuse!("number {place} was not fitted: ask for one of those that were"),
+        }
     }
 
     /// The interval that standard errors give.
@@ -240,7 +414,7 @@ impl FlightProfile {
     /// As for `known_of`.
     pub fn from_curvature(&self, quantity: Quantity, level: f64) -> Result<(f64, f64), Error> {
         let known = self.known_of(quantity)?;
-        let reach = student_reach(level, known.freedom) * known.error();
+        let reach = student_reach(level, known.freedom) * known.own_error();
         let low = known.value - reach;
         let low = if quantity == Quantity::Gain {
             low
@@ -278,7 +452,7 @@ impl FlightProfile {
             _ => 0.0,
         };
         let rise = self.rise(quantity, level)?;
-        let reach = (self.known_of(quantity)?.error() * rise.sqrt()).max(INTERVALS.reach);
+        let reach = (self.known_of(quantity)?.own_error() * rise.sqrt()).max(INTERVALS.reach);
         let limits = Limits { floor, lower };
         let (mut lowest, mut seen) = (self.centre.clone(), Seen::default());
         let mut found = Vec::new();

@@ -6,6 +6,7 @@
 //! kept where Akaike's criterion asks for them, outliers are left out (`rounds`), and intervals are
 //! those of the profile (`intervals`). Tests say whether the fit holds (`judge`).
 
+mod between;
 mod covariance;
 mod fit;
 mod grid;
@@ -13,8 +14,10 @@ mod intervals;
 mod judge;
 mod median;
 mod noise_known;
+mod numbers;
 mod outliers;
 mod plant;
+mod rounded_rows;
 mod rounds;
 mod search;
 mod start;
@@ -22,14 +25,16 @@ mod start;
 mod tests;
 mod tolerances;
 
-pub use fit::{FlightFit, FlightRun};
-pub use intervals::{FlightProfile, Known as KnownQuantity};
+pub use between::{BetweenRows, Controlled, RunCommands, Sent, between_rows};
+pub use fit::{FlightFit, FlightRun, LoopNumbers};
+pub use intervals::{Ends, FlightProfile, Known as KnownQuantity};
 pub use judge::{
-    Asked, Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge, unseen_lag,
-    whiteness,
+    Cause, Finding, Judgement, LEVEL_OF_TESTS, Whiteness, colour_factors, judge_profile,
+    unseen_lag, whiteness,
 };
+pub use numbers::{FreeNumbers, WithNumbers, first_numbers, fit_numbers};
 pub use plant::FlightPlant;
 pub use rounds::{beside_noise, fit_flight};
 pub use search::{Scatter, scatter_of};
-pub use start::{excited_part, least_squares};
-pub use tolerances::{LAG_FACTORS, LONGEST_DELAY, SEARCHED_ROWS, SHORTEST_LAG};
+pub use start::{is_long, least_squares};
+pub use tolerances::{LONGEST_DELAY, MOST_NUMBERS, SHORTEST_LAG};

@@ -21,7 +21,7 @@ use super::tolerances::{LONG, SEARCH};
 use crate::{Error, Task};
 
 /// Would a search on all rows take too long?
-pub(super) fn is_long(runs: &[FlightRun]) -> bool {
+pub fn is_long(runs: &[FlightRun]) -> bool {
     runs.iter().any(|run| run.rows.time.len() > LONG.part)
 }
 
@@ -30,7 +30,7 @@ pub(super) fn is_long(runs: &[FlightRun]) -> bool {
 ///
 /// It keeps the commands of as long a time before it. What those before have left is a part of the
 /// offset.
-pub fn excited_part(
+pub(super) fn excited_part(
     time: &[f64],
     sent: &[f64],
     commands: &[f64],

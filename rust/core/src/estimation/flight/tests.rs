@@ -1,8 +1,12 @@
 //! Whole fits, held against the numbers that made the recordings.
 
+use std::sync::Arc;
+
 use super::super::point::Quantity;
 use super::super::rows::{Commands, Rows};
 use super::super::tests::{gaussian, recorded};
+use super::start::{excited_part, least_squares, parts_of};
+use super::tolerances::LONG;
 use super::*;
 use crate::{Error, Task};
 
@@ -23,7 +27,7 @@ fn profiled(plant: &FlightPlant, rows: Vec<Rows>) -> Result<FlightProfile, Error
     let fit = beside_noise(&white, &task)?;
     let mut quantities = plant.common();
     quantities.push(Quantity::Total);
-    FlightProfile::best(fit, &quantities, &quantities, 0.95, &task)
+    FlightProfile::best(fit, &quantities, &quantities, &task)
 }
 
 #[test]
@@ -52,6 +56,57 @@ fn the_numbers_that_made_a_recording_are_within_their_intervals() {
         );
     }
     assert!(found.known_of(Quantity::Zero).is_err());
+}
+
+/// A lag of the known part, searched around the likelihood, is what it is as one of the numbers of the
+/// likelihood.
+#[test]
+fn a_number_around_the_likelihood_has_the_errors_that_it_has_within() {
+    let task = Task::new();
+    let rows = recorded((&[1.0], &[1.0, 0.0]), (0.31, 0.85, 0.17), 0.01, 8);
+    let runs: Arc<[FlightRun]> = vec![FlightRun::new(rows.clone(), 0.0)].into();
+    let given = |numbers: &[f64]| {
+        let mut plant = FlightPlant::new(vec![1.0], vec![numbers[0], 1.0, 0.0], 0);
+        plant.own_lag = numbers[0];
+        Ok((plant, Arc::clone(&runs)))
+    };
+    let (white, first) = first_numbers(&given, &[0.1], (0.0, 1.0), &task).unwrap();
+    let fit = beside_noise(&white, &task).unwrap();
+    let (fit, numbers) = fit_numbers(&fit, &given, &first, &task).unwrap();
+    let quantities = [Quantity::Gain, Quantity::Delay, Quantity::Total];
+    let profile = FlightProfile::best(fit, &quantities, &quantities, &task).unwrap();
+    let around = profile.beside(numbers.unwrap());
+    let within = profiled(&plant(1), vec![rows]).unwrap();
+    let lag = within.known_of(Quantity::Lag(0)).unwrap();
+    let value = around.numbers.as_ref().unwrap().values[0];
+    assert!((value - lag.value).abs() < 0.05 * lag.error(), "{value}");
+    let error = around.error_of_number(0).unwrap();
+    assert!((error / lag.error() - 1.0).abs() < 0.1, "{error}");
+    for quantity in quantities {
+        let [one, other] = [&around, &within].map(|own| own.known_of(quantity).unwrap().error());
+        assert!(
+            (one / other - 1.0).abs() < 0.1,
+            "{quantity:?} {one} {other}"
+        );
+        let [one, other] =
+            [&around, &within].map(|own| own.interval(quantity, 0.95, &task).unwrap());
+        let size = 0.15 * (other.1 - other.0);
+        assert!((one.0 - other.0).abs() < size && (one.1 - other.1).abs() < size);
+    }
+    let (low, high) = around.interval_of_number(0, 0.95).unwrap();
+    assert!(low < 0.17 && 0.17 < high);
+    let at_end = around.statistic_of_number(0, high).unwrap().sqrt();
+    assert!((at_end - 2.0).abs() < 0.1, "{at_end}");
+    assert_eq!(
+        around.statistic_of_number(0, -value).unwrap(),
+        f64::INFINITY
+    );
+    // Their joint covariance has these errors.
+    let cov = around.covariance_of(&quantities[..2]);
+    assert!((cov[8].sqrt() / error - 1.0).abs() < 1e-9);
+    let delay = around.known_of(Quantity::Delay).unwrap();
+    let own = delay.bound.hypot(delay.added);
+    assert!((cov[4].sqrt() / own - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -101,21 +156,26 @@ fn a_command_without_effect_tells_nothing() {
 
 #[test]
 fn the_part_of_a_long_recording_is_that_in_which_the_command_changes() {
-    let count = 3 * SEARCHED_ROWS;
+    let count = 3 * LONG.part;
     let time: Vec<f64> = (0..count).map(|row| 0.05 * row as f64).collect();
     let noise = gaussian(4, count);
     let command = |row: usize| {
-        if row < 2 * SEARCHED_ROWS {
-            0.0
-        } else {
-            noise[row]
-        }
+        if row < 2 * LONG.part { 0.0 } else { noise[row] }
     };
     let commands: Vec<f64> = (0..count).map(command).collect();
     let (rows, sent) = excited_part(&time, &time, &commands).unwrap();
-    assert_eq!(rows, 2 * SEARCHED_ROWS..count);
+    assert_eq!(rows, 2 * LONG.part..count);
     // Commands of as long a time before it act on it.
     assert_eq!(sent.end, count);
-    assert!(sent.start.abs_diff(SEARCHED_ROWS) <= 1, "{sent:?}");
-    assert_eq!(excited_part(&time[..SEARCHED_ROWS], &time, &commands), None);
+    assert!(sent.start.abs_diff(LONG.part) <= 1, "{sent:?}");
+    assert_eq!(excited_part(&time[..LONG.part], &time, &commands), None);
+    let last = time[count - 10];
+    let mut rows = Rows::new((time.clone(), vec![0.0; count]), (time, commands)).unwrap();
+    rows.offset = false;
+    rows.commands.unknown = vec![(10.0, 11.0), (last, last + 0.1)];
+    let part = &parts_of(&vec![FlightRun::new(rows, 0.0)].into())[0].rows;
+    assert_eq!(part.time.len(), LONG.part);
+    // What those before have left is in the output at the start.
+    assert!(part.offset);
+    assert_eq!(part.commands.unknown, [(last, last + 0.1)]);
 }

@@ -160,6 +160,8 @@ pub(super) const LONG: Long = Long {
 
 /// Intervals.
 pub(super) struct Intervals {
+    /// Level of the intervals with which a search for likelier fits goes.
+    pub(super) level: f64,
     /// Step of difference quotients in the logarithms of the numbers of the noise.
     pub(super) step: f64,
     /// Least curvature of the likelihood in them: their range is bounded, whatever the recording
@@ -187,6 +189,7 @@ pub(super) struct Intervals {
 
 /// See `Intervals`.
 pub(super) const INTERVALS: Intervals = Intervals {
+    level: 0.95,
     step: 0.1,
     least_curvature: 0.25,
     least_freedom: 4.0,
@@ -204,10 +207,67 @@ pub(super) const INTERVALS: Intervals = Intervals {
 pub const LONGEST_DELAY: f64 = START.longest;
 
 /// Factors of a time constant at which searches start.
-pub const LAG_FACTORS: [f64; 3] = START.factors;
+pub(super) const LAG_FACTORS: [f64; 3] = START.factors;
 
 /// The shortest lag of a search, in rows.
 pub const SHORTEST_LAG: f64 = SEARCH.shortest;
 
-/// Most rows of a search.
-pub const SEARCHED_ROWS: usize = LONG.part;
+/// A fitted lag below so many times its lower bound is none: more takes short lags for delay.
+pub(super) const NO_LAG: f64 = 2.0;
+
+/// Rounded outputs.
+pub(super) struct Rounded {
+    /// Steps are multiples of the least, within this share of it.
+    pub(super) alike: f64,
+    /// Least share of the rows that are equal to the row before: fewer take any decimal log for rounded.
+    pub(super) still: f64,
+    /// Share of the rows at which a rounded output turns back from which its noise is about half a step.
+    pub(super) dithered: f64,
+}
+
+/// See `Rounded`.
+pub(super) const ROUNDED: Rounded = Rounded {
+    alike: 1e-6,
+    still: 0.2,
+    dithered: 0.18,
+};
+
+/// Numbers that are searched around the likelihood.
+pub(super) struct Around {
+    /// Distance of the points around the start of the search, in the logarithm of a number; its first
+    /// step, its accuracy in it and in −2 ln L, and the most evaluations for each number.
+    pub(super) away: f64,
+    pub(super) step: f64,
+    pub(super) accuracy: (f64, f64),
+    pub(super) most: usize,
+    /// Searches: one that ended in a valley is begun again.
+    pub(super) searches: usize,
+    /// Accuracy of −2 ln L in that search, and at its end.
+    pub(super) close: f64,
+    pub(super) exact: f64,
+    /// Curvature in the logarithm of a number from which it is known: one that may be e times as large
+    /// is not.
+    pub(super) least_curvature: f64,
+    /// Steps of difference quotients: the first, by which −2 ln L has to rise at least, and the longest.
+    pub(super) quotient: f64,
+    pub(super) least_rise: f64,
+    pub(super) longest: f64,
+}
+
+/// See `Around`.
+pub(super) const AROUND: Around = Around {
+    away: 0.25,
+    step: 0.05,
+    accuracy: (1e-3, 1e-4),
+    most: 40,
+    searches: 2,
+    close: 1e-3,
+    exact: 1e-6,
+    least_curvature: 1.0,
+    quotient: 0.01,
+    least_rise: 2.0,
+    longest: 0.32,
+};
+
+/// Most numbers that are searched so: the points around the start are three to the power of them.
+pub const MOST_NUMBERS: usize = 4;

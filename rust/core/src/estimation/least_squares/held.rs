@@ -10,8 +10,8 @@ use crate::{Error, Task};
 /// Added to the diagonal of the normal equations of the linearised model, as a share of it.
 const RIDGE: f64 = 1e-14;
 
-/// Least sum of squares over the points base + free q, from the minimum of the model linearised at
-/// `best`.
+/// Least sum of squares with the sum of the parameters at these places held, from the minimum of the model
+/// linearised at `best`.
 ///
 /// A parameter that is below its bound in the best fit, at zero, is tried there too.
 ///
@@ -20,23 +20,23 @@ const RIDGE: f64 = 1e-14;
 pub fn least_held(
     joint: &Joint<'_>,
     best: &Minimum,
-    base: &[f64],
-    free: &[Vec<f64>],
+    places: &[usize],
+    value: f64,
     task: &Task,
 ) -> Result<f64, Error> {
+    let (mut base, free) = joint.held(&best.point, places, value);
     let search = |base: &[f64], free: &[Vec<f64>]| {
         let start = linear(best, base, free);
         let space = Space::new(joint, base.to_vec(), free.to_vec());
         Ok::<_, Error>(along_trade(joint, &start, &space, SEARCH.to_hold, task)?.cost())
     };
-    let mut least = search(base, free)?;
-    let mut base = base.to_vec();
+    let mut least = search(&base, &free)?;
     for place in (0..joint.count()).filter(|place| best.point[*place] < joint.low[*place]) {
         let Some(column) = free.iter().position(|direction| direction[place] == 1.0) else {
             continue;
         };
         base[place] = best.point[place];
-        let mut without = free.to_vec();
+        let mut without = free.clone();
         without.remove(column);
         least = least.min(search(&base, &without)?);
     }

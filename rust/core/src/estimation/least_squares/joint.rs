@@ -148,6 +148,32 @@ impl<'a> Joint<'a> {
         })
     }
 
+    /// Base and directions in which the sum of the parameters at these places is `value`, near a point.
+    pub(super) fn held(
+        &self,
+        point: &[f64],
+        places: &[usize],
+        mut value: f64,
+    ) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let (count, fixed) = (self.count(), places.first().copied().unwrap_or(0));
+        if places.len() == 1 && value != point[fixed] {
+            // Values between zero and the lower bound of the search are not simulated.
+            value = value.max(self.low[fixed]);
+        }
+        let mut base = vec![0.0; count];
+        base[fixed] = value;
+        let direction = |place: usize| {
+            let mut one = vec![0.0; count];
+            one[place] = 1.0;
+            if places.contains(&place) {
+                one[fixed] = -1.0;
+            }
+            one
+        };
+        let free = (0..count).filter(|place| *place != fixed);
+        (base, free.map(direction).collect())
+    }
+
     /// Starting points of every recording, the best first; of several, completed by the best ones of
     /// the others.
     pub(super) fn starts(&self, most: usize, task: &Task) -> Result<Vec<Vec<f64>>, Error> {

@@ -101,3 +101,33 @@ pub(super) const MEMORY: Memory = Memory {
 
 /// Bound of the exponents of the approximated loop, so that unstable ones do not overflow.
 pub(super) const LARGEST_EXPONENT: f64 = 50.0;
+
+/// Rows that are read as intervals.
+pub(super) struct Rounded {
+    /// The noise at which searches begin, in steps: with the first the likelihood is smooth.
+    pub(super) noises: [f64; 2],
+    /// Least and largest noise, in steps: below the least, rows are intervals with hard ends.
+    pub(super) least: f64,
+    pub(super) most: f64,
+    /// Most steps of a search, and the fall of −2 ln L that a step has to promise and bring.
+    pub(super) iterations: usize,
+    pub(super) promised: f64,
+    /// Readings to either side of the most probable one over which the information of a row is summed.
+    pub(super) readings: i32,
+    /// Probability of a reading below which it tells nothing.
+    pub(super) impossible: f64,
+    /// Distance of a reading from the output, in deviations, from which the slope no longer grows.
+    pub(super) farthest: f64,
+}
+
+/// See `Rounded`.
+pub(super) const ROUNDED: Rounded = Rounded {
+    noises: [0.5, 0.15],
+    least: 0.02,
+    most: 3.0,
+    iterations: 300,
+    promised: 1e-9,
+    readings: 12,
+    impossible: 1e-30,
+    farthest: 1e4,
+};

@@ -1,6 +1,8 @@
 //! All tests of a fit, in the order in which they are told.
 
 use super::super::fit::{FlightFit, FlightRun};
+use super::super::intervals::FlightProfile;
+use super::super::tolerances::INTERVALS;
 use super::agreement::contradictions;
 use super::air::{air_at_rest, restless_air};
 use super::change::delay_change;
@@ -16,7 +18,7 @@ use crate::{Error, Task};
 
 /// What is asked about a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asked<'a> {
+pub(super) struct Asked<'a> {
     /// Are the commands given, not functions of the plant that is fitted?
     pub commands_given: bool,
     /// Can intervals be made valid for residuals that are coloured at rest, too?
@@ -39,12 +41,40 @@ pub struct Judgement {
     pub findings: Vec<Finding>,
 }
 
+/// Test the fit of a profile; whether its intervals can be made valid for residuals that are coloured at
+/// rest, too, depends on who asks.
+///
+/// # Errors
+///
+/// As for `judge`.
+pub fn judge_profile(
+    profile: &FlightProfile,
+    widens: bool,
+    task: &Task,
+) -> Result<Judgement, Error> {
+    let quantities: Vec<Quantity> = profile.known.iter().map(|known| known.quantity).collect();
+    let commands_given = !profile.is_of_plant;
+    let has_total = commands_given && !profile.is_long() && quantities.contains(&Quantity::Total);
+    let total = if has_total {
+        Some(profile.interval(Quantity::Total, INTERVALS.level, task)?)
+    } else {
+        None
+    };
+    let asked = Asked {
+        commands_given,
+        widens: widens && commands_given && profile.numbers.is_none(),
+        total,
+        quantities: &quantities,
+    };
+    judge(&profile.fit, &asked, task)
+}
+
 /// Test a fit.
 ///
 /// # Errors
 ///
 /// As for `Model::at`.
-pub fn judge(fit: &FlightFit, asked: &Asked<'_>, task: &Task) -> Result<Judgement, Error> {
+fn judge(fit: &FlightFit, asked: &Asked<'_>, task: &Task) -> Result<Judgement, Error> {
     let parts = fit.parts(task)?;
     let pieces = fit.runs.iter().zip(parts);
     let pieces: Vec<Vec<f64>> = pieces

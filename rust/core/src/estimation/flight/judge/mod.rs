@@ -28,7 +28,7 @@ mod whiteness;
 
 pub use colour::colour_factors;
 pub use finding::{Cause, Finding};
-pub use judgement::{Asked, Judgement, judge};
+pub use judgement::{Judgement, judge_profile};
 pub use power::unseen_lag;
 pub use tolerances::LEVEL_OF_TESTS;
 pub use whiteness::{Whiteness, whiteness};

@@ -1,1 +1,0 @@
-"""Models of the output of a vehicle under recorded commands."""
