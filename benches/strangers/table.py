@@ -10,6 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,9 @@ ALIKE = {"play", "stiction"}
 #: Names of the one limit that is nearer.
 LIMITS = {"unequal limits", "lower limit"}
 
+#: Names of a limit of the acceleration.
+SLOPES = {"slope limit", "rate limit"}
+
 #: Faults that are none of the plant, in which a name is a false one.
 DISTURBANCES = ("wind", "wave", "drift")
 
@@ -53,6 +57,12 @@ def summary(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
 
 def names(row: Row, found: Sequence[Estimate]) -> dict[str, Any]:
     """Runs that name a cause, those that name the right one, and those whose size is right too."""
+    # A limit that the plant has is no fault.
+    own = SLOPES if "acceleration" in row.kind.numbers else set()
+    found = [
+        replace(one, causes=[cause for cause in one.causes if cause["name"] not in own])
+        for one in found
+    ]
     naming = [one for one in found if one.causes]
     out = {"named": len(naming), "right": 0, "size right": 0, "false": 0}
     if row.fault is None or row.fault.name in DISTURBANCES:

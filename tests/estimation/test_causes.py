@@ -6,10 +6,9 @@ import math
 from collections import deque
 from typing import Any
 
+import deadtime as dtm
 import numpy as np
 import pytest
-
-import deadtime as dtm
 
 ROW, PARTS, ROWS = 0.065, 5, 460
 
@@ -148,7 +147,5 @@ def test_equal_readings_of_a_coarse_sensor_are_readings() -> None:
     clean = flown()
     for step in (0.001, 0.01):
         rounded = np.round(clean.output / step) * step
-        fit = dtm.estimate_delay(
-            dtm.Recording(clean.time, clean.reference, rounded, clean.command)
-        )
+        fit = dtm.estimate_delay(dtm.Recording(clean.time, clean.reference, rounded, clean.command))
         assert fit.sensor_faults == ()

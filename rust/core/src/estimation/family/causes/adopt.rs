@@ -212,14 +212,8 @@ pub(in super::super) fn with_causes(
     answer: &Answer<'_>,
     task: &Task,
 ) -> Result<Family, Error> {
-    if plan
-        .rows
-        .causes
-        .iter()
-        .map(|kind| kind.parameters())
-        .sum::<usize>()
-        >= CAUSES.most
-    {
+    let known = plan.rows.causes.iter().map(|kind| kind.parameters());
+    if known.sum::<usize>() >= CAUSES.most {
         return Ok(own);
     }
     let Some(best) = found.first() else {
@@ -231,13 +225,10 @@ pub(in super::super) fn with_causes(
         tried.push((suspect, rows, size));
     }
     let seeds = seeds_of(found);
-    let thin: Vec<Rows> = tried
-        .iter()
-        .map(|(_, rows, _)| rows.thinned(STARTS.thin))
-        .collect();
-    let plans: Vec<Plan<'_>> = tried
-        .iter()
-        .zip(&thin)
+    let thinned = tried.iter().map(|(_, rows, _)| rows.thinned(STARTS.thin));
+    let thin: Vec<Rows> = thinned.collect();
+    let pairs = tried.iter().zip(&thin);
+    let plans: Vec<Plan<'_>> = pairs
         .map(|((_, rows, _), thin)| Plan {
             rows,
             thin,
@@ -246,19 +237,21 @@ pub(in super::super) fn with_causes(
             ..*plan
         })
         .collect();
-    let mut fits: Vec<Vec<Minimum<'_>>> = Vec::with_capacity(tried.len());
-    for plan in &plans {
-        fits.push(minima(plan, task)?);
-    }
-    let mut families: Vec<Family> = Vec::with_capacity(fits.len());
-    for ((suspect, _, size), fit) in tried.iter().zip(&fits) {
-        let mut family = answer(fit)?;
+    let (mut fits, mut families) = (Vec::new(), Vec::new());
+    for (plan, (suspect, _, size)) in plans.iter().zip(&tried) {
+        let fit = minima(plan, task)?;
+        let mut family = answer(&fit)?;
         if let Some(first) = fit.first() {
             family.causes = causes_of(&own.causes, suspect, *size, first, best.bic - first.bic);
         }
         families.push(family);
+        fits.push(fit);
     }
-    let bic = |at: usize| fits[at].first().map_or(f64::INFINITY, |one| one.bic);
+    let bic = |at: usize| {
+        fits[at]
+            .first()
+            .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic)
+    };
     let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
     // Plants whose class is in error explain what a cause would.
     let near = found
@@ -286,9 +279,8 @@ pub(in super::super) fn with_causes(
         if Some(at) != adopted {
             out.add_within(family, floor);
             let is_rival = adopted.is_some_and(|own| bic(at) < bic(own) + EVIDENCE.likely);
-            if is_rival && let Some(cause) = family.causes.last() {
-                out.rivals.push(cause.kind);
-            }
+            let last = family.causes.last().filter(|_| is_rival);
+            out.rivals.extend(last.map(|cause| cause.kind));
         }
     }
     out.rehull(task)?;
