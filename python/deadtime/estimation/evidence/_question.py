@@ -138,8 +138,6 @@ class Question(ReadOnlyArrays):
             found[name] = getattr(self, name)
         if self.hold:
             found["hold"] = self.hold
-        if not self.causes:
-            found["causes"] = False
         if self.between != "undecided":
             found["between"] = self.between
         if self.controller is None and self.closed_loop != shows_controller(self.recording):

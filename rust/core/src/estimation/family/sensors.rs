@@ -48,14 +48,18 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
     let mut out = record.clone();
     let mut faults = Vec::new();
     let known: Vec<usize> = (0..out.output.len())
-        .filter(|row| *row >= out.earlier && out.output[*row].is_finite())
+        .filter(|row| out.output[*row].is_finite())
         .collect();
     if known.len() < SENSORS.fewest {
         return (out, faults);
     }
     let values: Vec<f64> = known.iter().map(|row| record.output[*row]).collect();
+    // How a sensor reads is seen in all rows; what it did counts in those that are fitted.
+    let first = known.partition_point(|row| *row < out.earlier);
     let mut leave = |kind: SensorKind, runs: &[std::ops::Range<usize>]| {
-        let rows: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        let fitted = runs.iter().map(|run| run.start.max(first)..run.end);
+        let runs: Vec<_> = fitted.filter(|run| !run.is_empty()).collect();
+        let rows = runs.iter().map(ExactSizeIterator::len).sum();
         if let (Some(first), Some(last)) = (runs.first(), runs.last()) {
             faults.push(SensorFault {
                 kind,
@@ -65,7 +69,7 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
                 to: record.time[known[last.end - 1]],
             });
         }
-        for at in runs.iter().cloned().flatten() {
+        for at in runs.into_iter().flatten() {
             out.output[known[at]] = f64::NAN;
         }
     };
