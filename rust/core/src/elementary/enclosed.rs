@@ -197,6 +197,10 @@ impl Mul for Enclosed {
 impl Div for Enclosed {
     type Output = Self;
 
+    #[expect(
+        clippy::suspicious_arithmetic_impl,
+        reason = "a quotient is a product with 1/x"
+    )]
     fn div(self, other: Self) -> Self {
         self * other.inverse()
     }

@@ -28,6 +28,11 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Relative distance within which rounding may hide the loss from counts, but not from the turn.
 const BESIDE: f64 = 1e-3;
 
+/// Samples in the delay from which rounding in a part of a sample may end the proof before the loss, and
+/// how much before: what remains is the way of the turn of the crossover, which whole samples turn exactly.
+const MANY: f64 = 1e5;
+const LATE: f64 = 1.0;
+
 /// Shortest part of a sample over which the gain is shown to be nowhere one.
 const SHORTEST: f64 = 1e-4;
 
@@ -45,7 +50,7 @@ pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Erro
     let Some(end) = Search::new(held, task)?.later()? else {
         return Ok((f64::INFINITY, f64::NAN));
     };
-    let (found, omega) = turned(held, end, task)?;
+    let (found, omega) = turned(held, end, BESIDE, task)?;
     let (delay, omega) = found.unwrap_or((end, omega));
     Ok((delay - start, omega))
 }
@@ -55,14 +60,19 @@ type Loss = (f64, f64);
 
 /// The loss of stability next to a delay by the turn of the crossover closest to −1, if there is one, and the
 /// frequency of this crossover.
-fn turned(held: HeldLoop<'_>, near: f64, task: &Task) -> Result<(Option<Loss>, f64), Error> {
+fn turned(
+    held: HeldLoop<'_>,
+    near: f64,
+    share: f64,
+    task: &Task,
+) -> Result<(Option<Loss>, f64), Error> {
     let found = crossovers(&held.at(near)?, task)?;
     let closest = found
         .into_iter()
         .min_by(|p, q| p.distance().total_cmp(&q.distance()));
     let omega = closest.map_or(f64::NAN, |at| at.omega);
     let found = newton(held, near, omega, task)?;
-    let is_beside = |found: &Loss| (found.0 - near).abs() <= BESIDE * near;
+    let is_beside = |found: &Loss| (found.0 - near).abs() <= share * near;
     Ok((found.filter(is_beside), omega))
 }
 
@@ -216,9 +226,12 @@ impl<'a> Search<'a> {
                 (beyond, BESIDE),
             )?;
             let found = match found {
-                None => turned(self.held, stable, self.task)?
-                    .0
-                    .map(|(delay, _)| delay),
+                None => {
+                    let share = if samples > MANY { LATE } else { BESIDE };
+                    turned(self.held, stable, share, self.task)?
+                        .0
+                        .map(|(delay, _)| delay)
+                }
                 found => found,
             };
             refuse_if!(
