@@ -123,26 +123,34 @@ impl<'a> Search<'a> {
         }
         samples += 1.0;
         parts = vec![(0.0, 1.0)];
-        let (mut count, mut is_new) = (1.0, true);
+        let (mut count, mut is_new, mut is_joined) = (1.0, true, false);
         while samples < MOST {
             let delay = samples * self.held.sample_time();
-            if self.held.is_direct() && self.loses(delay)? {
+            if is_new {
+                if self.never(delay, &mut parts)? {
+                    return Ok(None);
+                }
+                is_joined = !self.held.is_direct() || self.lead(&parts);
+                is_new = false;
+            }
+            if !is_joined && self.loses(delay)? {
                 return Ok(Some(delay));
             }
-            if is_new && self.never(delay, &mut parts)? {
-                return Ok(None);
-            }
-            is_new = false;
-            if self.avoid(&parts, (samples, samples + count - 1.0))? {
+            // Where L jumps, the way from one m to the next is looked at too.
+            let least = if is_joined && self.held.is_direct() {
+                samples - 1.0
+            } else {
+                samples
+            };
+            if self.avoid(&parts, (least, samples + count - 1.0))? {
                 samples += count;
-                count = if self.held.is_direct() {
-                    1.0
-                } else {
-                    2.0 * count
-                };
+                count = if is_joined { 2.0 * count } else { 1.0 };
             } else if count > 1.0 {
                 count = (0.25 * count).floor().max(1.0);
             } else {
+                if self.held.is_direct() && self.loses(delay)? {
+                    return Ok(Some(delay));
+                }
                 parts.clear();
                 if let Some(lost) = self.lost_in(samples, (0.0, 1.0), &mut parts)? {
                     return Ok(Some(lost));
@@ -247,10 +255,8 @@ impl<'a> Search<'a> {
 
     /// Is no pole on the circle, in any of these parts of a sample, with any m between these?
     fn avoid(&mut self, parts: &[Part], (least, most): (f64, f64)) -> Result<bool, Error> {
-        for (from, to) in parts {
-            let ends = (from.min(*to), from.max(*to));
-            let known = self.known.entry((ends.0.to_bits(), ends.1.to_bits()));
-            let interval = known.or_insert_with(|| self.held.within_sample(ends));
+        for part in parts {
+            let interval = self.interval(*part);
             if !interval.avoids_circle((least + 1.0, most + 1.0)) {
                 return Ok(false);
             }
@@ -279,6 +285,20 @@ impl<'a> Search<'a> {
         }
         *parts = found;
         Ok(true)
+    }
+
+    /// Do these parts of a sample need no count where the samples become one more?
+    fn lead(&mut self, parts: &[Part]) -> bool {
+        parts
+            .iter()
+            .all(|part| self.interval(*part).leads_at_minus_one())
+    }
+
+    /// The loop over a part of a sample.
+    fn interval(&mut self, (from, to): Part) -> &HeldInterval {
+        let ends = (from.min(to), from.max(to));
+        let known = self.known.entry((ends.0.to_bits(), ends.1.to_bits()));
+        known.or_insert_with(|| self.held.within_sample(ends))
     }
 
     /// Is the loop not stable at a delay?

@@ -107,6 +107,13 @@ impl HeldInterval {
         false
     }
 
+    /// Is |P| > |Q| at z = −1 over the interval? Then the argument of P − z^(−M) Q returns there where M grows
+    /// by one, and without a pole on the circle for all real M between, as many are outside before and after.
+    pub fn leads_at_minus_one(&self) -> bool {
+        let [p, q] = [&self.p, &self.q].map(|row| row.around(Complex64::new(-2.0, 0.0), 0.0));
+        modulus(p.value) - p.reach > (modulus(q.value) + q.reach) * ROOM
+    }
+
     /// Is no pole on this arc?
     fn is_free(&self, theta: f64, half: f64, (least, most): (f64, f64)) -> bool {
         let (sine, cosine) = sin_cos(0.5 * theta);
