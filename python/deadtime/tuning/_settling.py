@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,24 +36,43 @@ class ProvedStep(NamedTuple):
     """%, to 0.05."""
 
 
-def proved_step(loop: ControlLoop, amplitude: float) -> ProvedStep | None:
-    """Simulate a step until its tail is proved to stay at rest; None where that fails."""
+def proved_steps(
+    loop: ControlLoop, sets: Sequence[Mapping[str, float]], amplitude: float
+) -> list[ProvedStep | None]:
+    """Simulate steps until their tails are proved to stay at rest; None where that fails.
+
+    `sets` are numbers of the loop that differ from step to step.
+    """
     if not loop.plant.is_rational:
-        return None
-    late = {"delay": loop.specification.known_delay}
-    found = sweep(loop, late, amplitude=amplitude, settling=BAND)
-    rest, end = loop.specification.steady_state(amplitude), float(found.time[-1])
-    if rest is None or not np.isfinite(found["settling_time"]):
-        return None
-    for _ in range(_DOUBLINGS):
+        return [None] * len(sets)
+    late = loop.specification.known_delay
+    names = {"delay": late}.keys() | sets[0].keys()
+    values = {name: np.array([{"delay": late, **one}[name] for one in sets]) for name in names}
+    found = sweep(loop, values, amplitude=amplitude, settling=BAND)
+    settles = np.isfinite(found["settling_time"])
+    ends = [
+        _still_from(loop.replace(**one), amplitude, float(found.time[-1])) if known else None
+        for one, known in zip(sets, settles, strict=True)
+    ]
+    longest = max((end for end in ends if end is not None), default=None)
+    if longest is None:
+        return [None] * len(sets)
+    found = sweep(loop, values, longest, amplitude=amplitude, settling=BAND)
+    figures = zip(ends, found["settling_time"], found["overshoot"], strict=True)
+    return [
+        ProvedStep(float(settled), float(over)) if end and np.isfinite(settled) else None
+        for end, settled, over in figures
+    ]
+
+
+def _still_from(loop: ControlLoop, amplitude: float, end: float) -> float | None:
+    """A time from `end` on after which a step is proved to stay at rest."""
+    rest = loop.specification.steady_state(amplitude)
+    for _ in range(0 if rest is None else _DOUBLINGS):
         if tail_bound(loop, amplitude, end) <= _STILL * abs(rest):
-            break
+            return end
         end *= 2.0
-    else:
-        return None
-    found = sweep(loop, late, end, amplitude=amplitude, settling=BAND)
-    settled = float(found["settling_time"])
-    return ProvedStep(settled, float(found["overshoot"])) if np.isfinite(settled) else None
+    return None
 
 
 def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
@@ -61,7 +81,7 @@ def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
     The settling time is NaN where it is not proved that the output stays in the band.
     """
     response = loop.step_response(amplitude=amplitude)
-    proved = proved_step(loop, amplitude)
+    (proved,) = proved_steps(loop, [{}], amplitude)
     known = {"settling_time": float("nan")} if proved is None else proved._asdict()
     info = response.info() | known
     time = np.linspace(0.0, response.time[-1], _POINTS)
