@@ -318,7 +318,7 @@ pub(super) const SERIES: Flexible = Flexible {
     pole: 2.0,
     highest: 1.5,
     least: 1e-3,
-    most: 0.3,
-    sizes: 20,
+    most: 1.0,
+    sizes: 25,
     fall: 0.0,
 };
