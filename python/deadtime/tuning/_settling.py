@@ -39,40 +39,36 @@ class ProvedStep(NamedTuple):
 def proved_steps(
     loop: ControlLoop, sets: Sequence[Mapping[str, float]], amplitude: float
 ) -> list[ProvedStep | None]:
-    """Simulate steps until their tails are proved to stay at rest; None where that fails.
-
-    `sets` are numbers of the loop that differ from step to step.
-    """
+    """Simulate steps, each with other numbers, until proved to rest; None where that fails."""
     if not loop.plant.is_rational:
         return [None] * len(sets)
-    late = loop.specification.known_delay
-    names = {"delay": late}.keys() | sets[0].keys()
-    values = {name: np.array([{"delay": late, **one}[name] for one in sets]) for name in names}
+    late = {"delay": loop.specification.known_delay}
+    values = {
+        name: np.array([(late | dict(one))[name] for one in sets]) for name in late | dict(sets[0])
+    }
     found = sweep(loop, values, amplitude=amplitude, settling=BAND)
-    settles = np.isfinite(found["settling_time"])
+    end, settles = float(found.time[-1]), np.isfinite(found["settling_time"])
     ends = [
-        _still_from(loop.replace(**one), amplitude, float(found.time[-1])) if known else None
+        _still_from(loop.replace(**one), amplitude, end) if known else 0.0
         for one, known in zip(sets, settles, strict=True)
     ]
-    longest = max((end for end in ends if end is not None), default=None)
-    if longest is None:
-        return [None] * len(sets)
-    found = sweep(loop, values, longest, amplitude=amplitude, settling=BAND)
+    if any(ends):
+        found = sweep(loop, values, max(ends), amplitude=amplitude, settling=BAND)
     figures = zip(ends, found["settling_time"], found["overshoot"], strict=True)
     return [
-        ProvedStep(float(settled), float(over)) if end and np.isfinite(settled) else None
-        for end, settled, over in figures
+        ProvedStep(*map(float, step)) if end and np.isfinite(step[0]) else None
+        for end, *step in figures
     ]
 
 
-def _still_from(loop: ControlLoop, amplitude: float, end: float) -> float | None:
-    """A time from `end` on after which a step is proved to stay at rest."""
+def _still_from(loop: ControlLoop, amplitude: float, end: float) -> float:
+    """A time from `end` on after which a step is proved to stay at rest; 0 if there is none."""
     rest = loop.specification.steady_state(amplitude)
-    for _ in range(0 if rest is None else _DOUBLINGS):
-        if tail_bound(loop, amplitude, end) <= _STILL * abs(rest):
-            return end
-        end *= 2.0
-    return None
+    if rest is not None:
+        for later in end * 2.0 ** np.arange(_DOUBLINGS):
+            if tail_bound(loop, amplitude, float(later)) <= _STILL * abs(rest):
+                return float(later)
+    return 0.0
 
 
 def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
