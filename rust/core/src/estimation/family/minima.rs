@@ -341,3 +341,9 @@ pub(super) fn without_plant<'a>(plan: &Plan<'a>, task: &Task) -> Result<f64, Err
     }
     Ok(least)
 }
+
+/// Classes and numbers of minima.
+pub(super) fn seeds_of(found: &[Minimum<'_>]) -> Vec<(Class, Numbers)> {
+    let numbers = |one: &Minimum<'_>| (one.model.class, one.model.numbers(&one.point.x));
+    found.iter().map(numbers).collect()
+}

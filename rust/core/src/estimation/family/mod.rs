@@ -12,8 +12,11 @@
 //! leave open, `causes` what a linear plant lacks,
 //! `sensors` which readings are none, `series` the error of a class, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
+mod answer;
+mod aside;
 mod between;
 mod candidate;
+mod cause;
 mod causes;
 mod class;
 mod dispersion;
@@ -35,10 +38,11 @@ mod starts;
 mod tolerances;
 mod verdict;
 
+pub use answer::Family;
 pub use candidate::Candidate;
-pub use causes::{Cause, CauseKind};
+pub use cause::{Cause, CauseKind};
 pub use class::{Class, Numbers};
-pub use fit::{Between, Family, Question, fit_family, refine_family};
+pub use fit::{Between, Question, fit_family, refine_family};
 pub use hull::{Named, Triple};
 pub use noise::{Coefficients, Noise};
 pub use rows::Record;

@@ -6,6 +6,7 @@
 //!     ∫ v = ∫ u − q Δv′ − p Δv.
 //! Both hold for one lag with q = 0. Values at a row are those just before it.
 
+use super::aside::{Aside, Signal};
 use super::class::{Class, Numbers};
 use super::rows::Part;
 use crate::elementary::{exp, sin_cos};
@@ -206,7 +207,7 @@ pub(super) fn pulse(
     response_to(&[start, end], &command, false, rows, class, numbers).value
 }
 
-pub(super) fn response_to(
+fn response_to(
     sent: &[f64],
     command: &[f64],
     straight: bool,
@@ -254,6 +255,51 @@ pub(super) fn response_to(
         state.record(&mut out);
     }
     out
+}
+
+impl Signal {
+    fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
+        let first = self.value.first().copied().unwrap_or(0.0);
+        let value: Vec<f64> = self.value.iter().map(|own| own - first).collect();
+        response_to(&self.sent, &value, self.straight, part, class, numbers)
+    }
+}
+
+impl Aside {
+    /// What it adds to the output, times one.
+    pub(super) fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
+        match self {
+            Self::Input {
+                sent,
+                value,
+                straight,
+            } => response_to(sent, value, *straight, part, class, numbers),
+            Self::Difference(one, other, factor) => {
+                let mut out = Response::zero(part.used.len());
+                for (signal, factor) in [(one, *factor), (other, -factor)] {
+                    out.add(factor, &signal.response(part, class, numbers));
+                }
+                out
+            }
+            Self::Step(from) => {
+                let mut out = Response::zero(part.used.len());
+                for (value, row) in out.value.iter_mut().zip(&part.used) {
+                    *value = f64::from(u8::from(part.time[*row] >= *from));
+                }
+                out
+            }
+            Self::Later(from) => {
+                let mut out = response(part, class, numbers);
+                for (value, row) in out.by_delay.iter_mut().zip(&part.used) {
+                    *value *= if part.time[*row] >= *from { 0.5 } else { -0.5 };
+                }
+                out.value = out.by_delay;
+                let none = Response::zero(out.value.len());
+                (out.by_delay, out.by_zero) = (none.by_delay, none.by_zero);
+                out
+            }
+        }
+    }
 }
 
 /// The free responses of the lags from the first row that is used on, one column a state.

@@ -1,6 +1,7 @@
 //! The rows of a record as the family uses them: which count, and where the command is known.
 
-use super::causes::{Aside, CauseKind};
+use super::aside::Aside;
+use super::cause::CauseKind;
 use super::tolerances::{REST, SEARCH};
 use crate::Error;
 

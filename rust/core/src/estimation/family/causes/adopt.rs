@@ -1,8 +1,8 @@
 //! Causes fitted with the whole family of plants, and adopted where they explain the record clearly better.
 
-use super::super::fit::Family;
-use super::super::fit::seeds_of;
-use super::super::minima::{Minimum, Plan, minima};
+use super::super::answer::Family;
+use super::super::cause::{Cause, CauseKind};
+use super::super::minima::{Minimum, Plan, minima, seeds_of};
 use super::super::model::Model;
 use super::super::noise::Noise;
 use super::super::rows::Rows;
@@ -12,12 +12,11 @@ use super::super::tolerances::{CAUSES, EVIDENCE, STARTS};
 use super::asides::{columns_from, moving};
 use super::commands::Shape;
 use super::screen::{Suspect, begins_again, suspects};
-use super::{Cause, CauseKind};
 use crate::elementary::log;
 use crate::{Error, Task};
 
 /// Makes an answer of minima.
-pub(in super::super) type Answer<'f> = dyn Fn(&[Minimum<'_>]) -> Result<Family, Error> + 'f;
+pub(crate) type Answer<'f> = dyn Fn(&[Minimum<'_>]) -> Result<Family, Error> + 'f;
 
 /// The rows with a suspect, and its size where the command passes it.
 fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
@@ -205,7 +204,7 @@ fn causes_of(
 
 /// The answer with what the plant lacks: a cause that is clearly better is adopted, and then a second one is
 /// looked for; those that the record does not rule out widen the intervals.
-pub(in super::super) fn with_causes(
+pub(crate) fn with_causes(
     own: Family,
     plan: &Plan<'_>,
     found: &[Minimum<'_>],

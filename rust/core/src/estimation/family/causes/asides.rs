@@ -1,115 +1,12 @@
-//! Inputs beside the command, and steps of the output, each times one number.
+//! What a cause puts beside the command.
 
-use super::super::class::{Class, Numbers};
+use super::super::aside::Aside;
+use super::super::cause::CauseKind;
 use super::super::model::{Model, Point};
-use super::super::response::{Response, response, response_to};
 use super::super::rows::{Part, Rows};
-use super::CauseKind;
 
 /// The length of an impulse, in rows.
 const SHORT: f64 = 0.05;
-
-/// Something that adds to the output of one record.
-#[derive(Debug, Clone)]
-pub(in super::super) enum Aside {
-    /// A signal at the input of the plant: its times, its values less the first one.
-    Input {
-        /// Times, s.
-        sent: Vec<f64>,
-        /// Values less the first one.
-        value: Vec<f64>,
-        /// Is it straight between them, or held?
-        straight: bool,
-    },
-    /// The difference of two signals at the input of the plant, times a factor.
-    Difference(Signal, Signal, f64),
-    /// A step of the output from this time on.
-    Step(f64),
-    /// A delay that is longer by a half after this time, and shorter before it.
-    Later(f64),
-}
-
-/// A signal at the input of the plant.
-#[derive(Debug, Clone)]
-pub(in super::super) struct Signal {
-    /// Times, s.
-    pub(super) sent: Vec<f64>,
-    /// Values.
-    pub(super) value: Vec<f64>,
-    /// Is it straight between them, or held?
-    pub(super) straight: bool,
-}
-
-impl Signal {
-    fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
-        let first = self.value.first().copied().unwrap_or(0.0);
-        let value: Vec<f64> = self.value.iter().map(|own| own - first).collect();
-        response_to(&self.sent, &value, self.straight, part, class, numbers)
-    }
-
-    /// What it has more than another one, times a factor.
-    pub(super) fn less(self, other: Self, factor: f64) -> Aside {
-        if self.sent != other.sent || self.straight != other.straight {
-            return Aside::Difference(self, other, factor);
-        }
-        let pairs = self.value.iter().zip(&other.value);
-        let value = pairs.map(|(one, other)| factor * (one - other)).collect();
-        Aside::input(self.sent, value, self.straight)
-    }
-}
-
-impl Aside {
-    /// A signal at the input of the plant.
-    pub(super) fn input(sent: Vec<f64>, mut value: Vec<f64>, straight: bool) -> Self {
-        let first = value.first().copied().unwrap_or(0.0);
-        value.iter_mut().for_each(|entry| *entry -= first);
-        Self::Input {
-            sent,
-            value,
-            straight,
-        }
-    }
-
-    /// What it adds to the output, times one.
-    pub(in super::super) fn response(
-        &self,
-        part: &Part,
-        class: Class,
-        numbers: &Numbers,
-    ) -> Response {
-        match self {
-            Self::Input {
-                sent,
-                value,
-                straight,
-            } => response_to(sent, value, *straight, part, class, numbers),
-            Self::Difference(one, other, factor) => {
-                let mut out = Response::zero(part.used.len());
-                for (signal, factor) in [(one, *factor), (other, -factor)] {
-                    out.add(factor, &signal.response(part, class, numbers));
-                }
-                out
-            }
-            Self::Step(from) => {
-                let mut out = Response::zero(part.used.len());
-                for (value, row) in out.value.iter_mut().zip(&part.used) {
-                    *value = f64::from(u8::from(part.time[*row] >= *from));
-                }
-                out
-            }
-            Self::Later(from) => {
-                let mut out = response(part, class, numbers);
-                for (value, row) in out.by_delay.iter_mut().zip(&part.used) {
-                    *value *= if part.time[*row] >= *from { 0.5 } else { -0.5 };
-                }
-                out.value = out.by_delay;
-                let none = Response::zero(out.value.len());
-                (out.by_delay, out.by_zero) = (none.by_delay, none.by_zero);
-                out
-            }
-        }
-    }
-}
 
 /// What begins at a time.
 pub(super) fn from_time(kind: CauseKind, part: &Part, time: f64) -> Aside {

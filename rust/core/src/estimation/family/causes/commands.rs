@@ -1,8 +1,8 @@
 //! What reaches the plant of a command, behind an actuator that is not linear.
 
+use super::super::aside::{Aside, Signal};
+use super::super::cause::CauseKind;
 use super::super::rows::{Part, Rows};
-use super::CauseKind;
-use super::asides::{Aside, Signal};
 use crate::elementary::exp;
 
 /// Sizes of play and dead zone that are tried: the least and the largest, as shares of what the

@@ -3,6 +3,8 @@
 //! The score is that of a further column times a free number, beside the numbers of the plant to first
 //! order. It asks little, so that what is large and no small change is found too.
 
+use super::super::aside::Aside;
+use super::super::cause::CauseKind;
 use super::super::class::Class;
 use super::super::minima::Minimum;
 use super::super::model::{Model, Point};
@@ -10,8 +12,7 @@ use super::super::noise::Noise;
 use super::super::projection::Projection;
 use super::super::rows::{Part, Rows};
 use super::super::tolerances::{CAUSES, EVIDENCE};
-use super::CauseKind;
-use super::asides::{Aside, from_time, moving};
+use super::asides::{from_time, moving};
 use super::commands::{Shape, neighbours, sizes};
 use crate::elementary::log;
 use crate::linear_algebra::vectors::dot;
