@@ -70,8 +70,8 @@ class Cause:
         for its step; a share for a gain that changes; s for a change of delay.
     ci : (float, float)
         Its 95 % interval.
-    time : float
-        When it began, s; NaN where it was there all the time.
+    time : float or None
+        When it began, s; None where it was there all the time.
     lead : float
         BIC by which the recording is explained better with it.
     others : tuple of str
@@ -81,7 +81,7 @@ class Cause:
     name: str
     size: float
     ci: tuple[float, float]
-    time: float
+    time: float | None
     lead: float
     others: tuple[str, ...] = ()
     _kind: str = ""
@@ -92,7 +92,7 @@ class Cause:
         words = WORDS[self._kind].format(
             size=shown(self.size, error),
             share=f"{shown(100.0 * self.size, 100.0 * error)} %",
-            time=f"{self.time:.4g} s",
+            time="" if self.time is None else f"{self.time:.4g} s",
         )
         if not self.others:
             return words
@@ -138,7 +138,8 @@ def causes_of(found: native.FamilyFit) -> tuple[Cause, ...]:
     for kind, size, error, time, _, lead in found.causes:
         reach = REACH * error if math.isfinite(error) else math.inf
         ends = (size - reach, size + reach)
-        named.append(Cause(NAMES.get(kind, kind), size, ends, time, lead, (), kind))
+        began = None if math.isnan(time) else time
+        named.append(Cause(NAMES.get(kind, kind), size, ends, began, lead, (), kind))
     if named and found.rival_causes:
         last = named.pop()
         others = dict.fromkeys(NAMES.get(kind, kind) for kind in found.rival_causes)
