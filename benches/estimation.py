@@ -41,6 +41,11 @@ Run ``python benches/estimation.py --rates [--runs N] [--method TEXT] [--quick]`
 simulated rate loops of multirotors at 1 kHz, beside the deconvolved step response and the masked
 cross-correlation of the field's tools (`rate_loops`).
 
+Run ``python benches/estimation.py --strangers [--runs N] [--rows TEXT,TEXT] [--seed S]
+[--json FILE] [--quick]`` to estimate on plants and faults that the estimator does not know. Faults
+are in two sizes, which move an answer by 1 and 5 standard errors, and the truth is a range
+(`strangers`). The lot that chose the faults has the seed 20261203.
+
 The other tables are in folders of their own; the first ones are one file, because cases, methods
 and what each method is given are read together, and the command line that chooses between all.
 """
@@ -70,6 +75,8 @@ from reality.designs import print_designs
 from reality.detection import print_powers
 from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
+from strangers import rows as strangers
+from strangers.table import print_strangers
 
 SAMPLE = 0.065
 REST = 16 * SAMPLE
@@ -499,6 +506,8 @@ def main() -> None:
     reality.add_argument("--designs", action="store_true", help="print gains designed from them")
     rates = parser.add_argument_group("rate loops of multirotors")
     rates.add_argument("--rates", action="store_true", help="print their table alone")
+    strange = parser.add_argument_group("plants and faults that the estimator does not know")
+    strange.add_argument("--strangers", action="store_true", help="print their table alone")
     flown = parser.add_argument_group("flights against ArduPilot's Copter")
     flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
     flown.add_argument(
@@ -507,7 +516,11 @@ def main() -> None:
         metavar="N",
         help="N flights of each kind, whose commands wait for drawn times",
     )
-    flown.add_argument("--seed", type=int, help="of the drawn times; by default of the clock")
+    flown.add_argument(
+        "--seed",
+        type=int,
+        help="of the drawn times, by default of the clock; of the runs of strangers, 0",
+    )
     flown.add_argument("--keep", type=Path, metavar="DIR", help="keep the recordings in a folder")
     flown.add_argument("--read", type=Path, metavar="DIR", help="read the recordings, do not fly")
     given = parser.parse_args()
@@ -526,6 +539,14 @@ def main() -> None:
         return
     if given.rates:
         print_rates(given.runs or (2 if given.quick else 1000), given.processes, given.method)
+        return
+    if given.strangers:
+        try:
+            rows = strangers.chosen(given.rows.split(",") if given.rows else [])
+        except ValueError as error:
+            parser.error(str(error))
+        runs = given.runs or (2 if given.quick else None)
+        print_strangers(rows, runs, given.seed or 0, given.processes, given.json)
         return
     if given.reality:
         runs = given.runs or (2 if given.quick else 300 if given.oracle else 1000)

@@ -415,12 +415,6 @@ class LinearLoop:
     def abscissa(self) -> float: ...
     def held_margins(self, delay_margin: bool) -> Margins: ...
     def further_delay(self) -> _Pair: ...
-    def held_delay_range(self) -> _Pair: ...
-    def held_gain_range(self, slope: LinearLoop, value: float, bounds: _Pair) -> _Pair: ...
-    @staticmethod
-    def held_range(
-        build: Callable[[float], LinearLoop], name: str, value: float, bounds: _Pair
-    ) -> _Pair: ...
 
 def on_samples(since: _Reals, start: float, sample_time: float, sample_phase: float) -> _Reals: ...
 def rate_limited(
@@ -875,6 +869,9 @@ class FamilyFit:
     kind_decided: Final[bool]
     rows: Final[int]
     first_rows: Final[list[int]]
+    causes: Final[list[tuple[str, float, float, float, int, float]]]
+    rival_causes: Final[list[str]]
+    sensor_faults: Final[list[tuple[str, int, int, float, float]]]
     at_rest: Final[bool]
     told: Final[int]
     asked: Final[int]
@@ -906,6 +903,7 @@ def fit_family(
     integrating: bool | None = None,
     noise: str | None = None,
     level: float = 0.95,
+    causes: bool = False,
     omega: Sequence[float] | None = None,
     progress: _Progress = None,
     known: FamilyFit | None = None,

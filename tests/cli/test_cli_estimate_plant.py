@@ -175,14 +175,14 @@ def test_a_record_that_begins_with_its_step_is_told_to_say_rest(tmp_path):
         assert verdict_of(pasted(result, tmp_path)) != "none"
 
 
-def test_a_step_of_the_load_is_left_out_by_the_command_that_is_advised(tmp_path):
+def test_a_step_of_the_load_is_named(tmp_path):
     time, reference, output, command = loop_with_load()
     write(tmp_path / "loop.csv", {"t": time, "SP": reference, "PV": output, "OP": command})
     result = run("estimate", "loop.csv", cwd=tmp_path)
-    assert verdict_of(result) == "indication"
-    assert "the recording is explained: use that part" in result.stdout
-    assert verdict_of(pasted(result, tmp_path)) == "reliable"
-    told = found(*shlex.split(result.stdout.rstrip().splitlines()[-1])[1:], cwd=tmp_path)
+    assert verdict_of(result) == "reliable"
+    assert "found: a load of" in result.stdout
+    told = found("estimate", "loop.csv", cwd=tmp_path)
+    assert [cause["name"] for cause in told["causes"]] == ["load"]
     low, high = told["interval_95"]["delay"]
     assert low < DEAD < high < low + 4.0
 

@@ -24,7 +24,7 @@ CORE_ARROWS = {
     "frequency": {"elementary", "quasipoly", "roots", "dde", "stability"},
     "tuning": {"quasipoly", "roots", "dde", "stability", "frequency"},
     "dde": {"linear_algebra", "elementary"},
-    "loops": {"linear_algebra", "quasipoly", "dde", "stability", "frequency"},
+    "loops": {"elementary", "linear_algebra", "quasipoly", "dde", "stability", "frequency"},
     "estimation": {"linear_algebra", "elementary", "quasipoly", "frequency", "dde", "loops"},
 }
 

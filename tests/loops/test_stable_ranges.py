@@ -121,6 +121,26 @@ def test_sample_times_of_an_ideal_derivative_without_delay():
     assert radius(loop, sample_time=high * (1.0 + 1e-9)) > 1.0
 
 
+def test_ranges_of_times_end_where_jury_says():
+    """z^2 + (K (Ts - d) - 1) z + K d for an integrator with a delay d within a sample."""
+    gain, period, delay = 2.5, 1.0, 0.2
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(gain), delay=delay, sample_time=period)
+    ends = (0.5 * period - 1.0 / gain, 1.0 / gain)
+    assert loop.stable_range("delay") == pytest.approx(ends, rel=1e-12)
+    low, high = loop.stable_range("sample_time")
+    assert low == 0.0
+    assert high == pytest.approx(2.0 / gain + 2.0 * delay, rel=1e-12)
+
+
+def test_a_range_needs_polynomials_in_the_number():
+    """The range of such a number was searched in steps, with no proof."""
+    plant = dtm.ParametricPlant(lambda m: ([1.0], [math.sqrt(m), 1.0, 0.0]), {"m": 0.5})
+    loop = dtm.ControlLoop(plant, dtm.P(0.5), delay=0.1, sample_time=0.05)
+    assert loop.stable_range("delay")[0] == 0.0
+    with pytest.raises(TypeError, match="add, subtract and multiply"):
+        loop.stable_range("m")
+
+
 @pytest.mark.parametrize("name", ["time_constant", "sample_time"])
 def test_a_loop_gain_below_one_is_stable_for_all_values(name):
     """Both were refused: nothing beyond a million times the value was ruled out."""

@@ -40,6 +40,7 @@ from deadtime.estimation._plots import (
 from deadtime.estimation._result import CramerRaoBound, DelayEstimate, FittedRun
 from deadtime.estimation._shared import SharedNumber, shared_number
 from deadtime.estimation.evidence._candidate import PlantCandidate
+from deadtime.estimation.evidence._causes import Cause, SensorFault
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._find import refit as refit
 from deadtime.estimation.evidence._numbers import FittedRecording, LoopView
@@ -78,6 +79,7 @@ __all__ = [
     "GCC",
     "ARXScan",
     "Advice",
+    "Cause",
     "Comparison",
     "CramerRaoBound",
     "Decay",
@@ -103,6 +105,7 @@ __all__ = [
     "PlantChoice",
     "PlantEstimate",
     "Relay",
+    "SensorFault",
     "SharedNumber",
     "Waveform",
     "Whiteness",

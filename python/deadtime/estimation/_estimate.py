@@ -80,6 +80,7 @@ def estimate_delay(
     integrates: bool | None = None,
     between: Between = "undecided",
     hold: float | None = None,
+    causes: bool | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate: ...
 
@@ -100,6 +101,7 @@ def estimate_delay(
     integrates: bool | None = None,
     between: Between = "undecided",
     hold: float | None = None,
+    causes: bool | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> DelayEstimate | PlantEstimate:
     """Estimate the delay of a plant, or that of a closed loop, from a recording.
@@ -180,6 +182,9 @@ def estimate_delay(
     hold : float, optional
         Without `loop`: for how long the controller holds each command, s, where it is logged less
         often than it is computed. Straight commands are half of that later.
+    causes : bool, optional
+        Without `loop`: whether what a linear plant lacks is looked for too, such as play of the
+        actuator or a load, and readings that a sensor did not take. By default it is.
     progress : callable, optional
         Without `loop`: called with a number that grows while plants are compared.
 
@@ -263,6 +268,7 @@ def estimate_delay(
         "largest_delay": largest_delay,
         "integrates": integrates,
         "hold": hold,
+        "causes": causes,
     }
     if loop is None:
         if method != "auto" or free is not FREE:

@@ -271,9 +271,8 @@ class LoopPoles:
         """Interval of one named number, around its present value, on which the loop is stable.
 
         The ends are the nearest values on either side at which a pole reaches the edge of
-        stability, or a neutral loop loses strong stability. Of a continuous loop, and of the gains
-        of a sampled one, they are the next of all crossings, so that none is passed over. Other
-        numbers of a sampled loop are followed in steps bounded by its fastest mode.
+        stability, or a neutral loop loses strong stability. They are the next of all crossings, or
+        no pole is on the edge before them, proved, so that none is passed over.
 
         Parameters
         ----------
@@ -295,10 +294,9 @@ class LoopPoles:
 
         Notes
         -----
-        What is not looked at: of a sampled loop, for numbers other than gains, what happens within
-        a step, between two values at which all crossovers and poles are known. A step is a share
-        of the distance to a loss of stability. An infinite end of such a number is a limit that
-        this distance reaches over decades, and no proof.
+        Not proved are limits of a sampled loop: an infinite end of a number that is neither a gain
+        nor the delay, below a millionth of a value, and short samples of which the hold matters no
+        more. A `ParametricPlant` needs polynomials that add, subtract and multiply its numbers.
 
         Of a neutral loop the last hundredth of the way to where it loses strong stability is
         halved, not searched for all crossings.

@@ -183,8 +183,7 @@ class LoopSpecification(PickledByFields):
 
     def stable_range(self, name: str) -> tuple[float, float]:
         """Stable values of one number of a stable loop, around its present one."""
-        free = None if self.sample_time is not None else self._symbols((name,))
-        return self.kernel.stable_range(name, free, self.polynomials_of)
+        return self.kernel.stable_range(name, self._symbols((name,)), self.polynomials_of)
 
     @cached_property
     def native(self) -> LinearLoop:

@@ -26,7 +26,7 @@ from deadtime._base.arrays import Array
 from deadtime.loops import commands_at_rest, sweep
 from deadtime.tuning._candidates import Scenario
 from deadtime.tuning._problem import ObjectiveName, Problem
-from deadtime.tuning._settling import BAND, proved_step
+from deadtime.tuning._settling import BAND, proved_steps
 
 #: Cost of a loop that does not settle: above every other cost.
 NEVER = 1e6
@@ -118,8 +118,8 @@ class _SettlingTime(Objective):
 
     def proved(self, problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> float:
         worst = self.value(problem, gains, scenarios)
-        for one in scenarios:
-            step = proved_step(problem.at(gains, one), problem.amplitude)
+        steps = proved_steps(problem.at(gains), scenarios, problem.amplitude)
+        for one, step in zip(scenarios, steps, strict=True):
             if step is None:
                 told = ", ".join(f"{name} = {number:.6g}" for name, number in one.items())
                 raise ValueError(

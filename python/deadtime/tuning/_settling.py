@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,24 +36,39 @@ class ProvedStep(NamedTuple):
     """%, to 0.05."""
 
 
-def proved_step(loop: ControlLoop, amplitude: float) -> ProvedStep | None:
-    """Simulate a step until its tail is proved to stay at rest; None where that fails."""
+def proved_steps(
+    loop: ControlLoop, sets: Sequence[Mapping[str, float]], amplitude: float
+) -> list[ProvedStep | None]:
+    """Simulate steps, each with other numbers, until proved to rest; None where that fails."""
     if not loop.plant.is_rational:
-        return None
+        return [None] * len(sets)
     late = {"delay": loop.specification.known_delay}
-    found = sweep(loop, late, amplitude=amplitude, settling=BAND)
-    rest, end = loop.specification.steady_state(amplitude), float(found.time[-1])
-    if rest is None or not np.isfinite(found["settling_time"]):
-        return None
-    for _ in range(_DOUBLINGS):
-        if tail_bound(loop, amplitude, end) <= _STILL * abs(rest):
-            break
-        end *= 2.0
-    else:
-        return None
-    found = sweep(loop, late, end, amplitude=amplitude, settling=BAND)
-    settled = float(found["settling_time"])
-    return ProvedStep(settled, float(found["overshoot"])) if np.isfinite(settled) else None
+    values = {
+        name: np.array([(late | dict(one))[name] for one in sets]) for name in late | dict(sets[0])
+    }
+    found = sweep(loop, values, amplitude=amplitude, settling=BAND)
+    end, settles = float(found.time[-1]), np.isfinite(found["settling_time"])
+    ends = [
+        _still_from(loop.replace(**one), amplitude, end) if known else 0.0
+        for one, known in zip(sets, settles, strict=True)
+    ]
+    if any(ends):
+        found = sweep(loop, values, max(ends), amplitude=amplitude, settling=BAND)
+    figures = zip(ends, found["settling_time"], found["overshoot"], strict=True)
+    return [
+        ProvedStep(*map(float, step)) if end and np.isfinite(step[0]) else None
+        for end, *step in figures
+    ]
+
+
+def _still_from(loop: ControlLoop, amplitude: float, end: float) -> float:
+    """A time from `end` on after which a step is proved to stay at rest; 0 if there is none."""
+    rest = loop.specification.steady_state(amplitude)
+    if rest is not None:
+        for later in end * 2.0 ** np.arange(_DOUBLINGS):
+            if tail_bound(loop, amplitude, float(later)) <= _STILL * abs(rest):
+                return float(later)
+    return 0.0
 
 
 def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
@@ -61,7 +77,7 @@ def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
     The settling time is NaN where it is not proved that the output stays in the band.
     """
     response = loop.step_response(amplitude=amplitude)
-    proved = proved_step(loop, amplitude)
+    (proved,) = proved_steps(loop, [{}], amplitude)
     known = {"settling_time": float("nan")} if proved is None else proved._asdict()
     info = response.info() | known
     time = np.linspace(0.0, response.time[-1], _POINTS)

@@ -128,7 +128,7 @@ def _sampled(
     command, state = rest[n], -rest.copy()
     under_way = [-command] * whole
     for _ in range(int(np.ceil(end / period))):
-        under_way.append(float(np.clip(c @ state + command, -limit, limit) - command))
+        under_way.append(max(-limit, min(limit, float(c @ state + command))) - command)
         state = T @ state + b * under_way.pop(0)
 
     # One sample: the oldest command acts, the newest one goes to the end.

@@ -2,12 +2,11 @@
 
 use std::slice;
 
-use deadtime::Error;
 use deadtime::dde::sampled;
 use deadtime::dde::{
     Equations, LinearLoop, RateLimits, Reference, Request, Response, Start, Update, on_sample,
 };
-use deadtime::frequency::{self, Number};
+use deadtime::frequency;
 use deadtime::roots::Region;
 use deadtime::stability::HeldLoop;
 use num_complex::Complex64;
@@ -18,7 +17,7 @@ use pyo3::types::PyFloat;
 use crate::arrays::{column, converted, frozen, in_order, owned, part_of};
 use crate::frequency::PyMargins;
 use crate::quasipoly::{Range, RootSet};
-use crate::runtime::{run_attached, run_here};
+use crate::runtime::run_here;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -349,62 +348,6 @@ impl PyLinearLoop {
             frequency::held_margins(HeldLoop::new(&self.inner)?, delay_margin, task)
         })?;
         Ok(PyMargins::new(py, found))
-    }
-
-    /// The stable range of a number around its present value, between bounds; `build` gives the loop
-    /// for a value, and `name` says whether it is the sample time.
-    #[staticmethod]
-    fn held_range(
-        py: Python<'_>,
-        build: &Bound<'_, PyAny>,
-        name: &str,
-        value: f64,
-        bounds: (f64, f64),
-    ) -> PyResult<(f64, f64)> {
-        let number = if name == "sample_time" {
-            Number::SampleTime
-        } else {
-            Number::Other
-        };
-        let mut failure = None;
-        let mut at = |value: f64| {
-            let built = build.call1((value,)).and_then(|made| {
-                let made = made.cast::<PyLinearLoop>()?;
-                Ok(made.get().inner.clone())
-            });
-            built.map_err(|error| {
-                failure = Some(error);
-                Error::Caller
-            })
-        };
-        let found = run_attached(py, |task| {
-            frequency::held_range(&mut at, number, value, bounds, task)
-        });
-        match failure {
-            Some(error) => Err(error),
-            None => found,
-        }
-    }
-
-    /// The stable range of a gain around its present value, between bounds: this is the loop without
-    /// it, and the feedback of `slope` is its factor.
-    fn held_gain_range(
-        &self,
-        py: Python<'_>,
-        slope: &Self,
-        value: f64,
-        bounds: (f64, f64),
-    ) -> PyResult<(f64, f64)> {
-        run_here(py, |task| {
-            frequency::gain_range_held(&self.inner, &slope.inner, value, bounds, task)
-        })
-    }
-
-    /// The stable range of the delay of a sampled loop, s.
-    fn held_delay_range(&self, py: Python<'_>) -> PyResult<(f64, f64)> {
-        run_here(py, |task| {
-            frequency::held_delay_range(HeldLoop::new(&self.inner)?, task)
-        })
     }
 
     /// The further delay in s with which a stable sampled loop loses stability, and the frequency.

@@ -140,6 +140,40 @@ impl FamilyFit {
         self.core.decided
     }
 
+    /// What the plant lacks: name, size, its standard error, when it began (NaN: all the time), in which
+    /// record, and the BIC by which the records are explained better with it.
+    #[getter]
+    fn causes(&self) -> Vec<(&'static str, f64, f64, f64, usize, f64)> {
+        let causes = self.core.causes.iter();
+        causes
+            .map(|one| {
+                (
+                    one.kind.name(),
+                    one.size,
+                    one.error,
+                    one.time,
+                    one.record,
+                    one.lead,
+                )
+            })
+            .collect()
+    }
+
+    /// Causes that explain the records about as well as the last one.
+    #[getter]
+    fn rival_causes(&self) -> Vec<&'static str> {
+        self.core.rivals.iter().map(|kind| kind.name()).collect()
+    }
+
+    /// Rows that are no readings of the sensor: why, in which record, how many, from and to which time.
+    #[getter]
+    fn sensor_faults(&self) -> Vec<(&'static str, usize, usize, f64, f64)> {
+        let faults = self.core.sensor.iter();
+        faults
+            .map(|one| (one.kind.name(), one.record, one.rows, one.from, one.to))
+            .collect()
+    }
+
     #[getter]
     fn rows(&self) -> usize {
         self.core.rows
@@ -316,7 +350,8 @@ type Columns<'py> = (
 /// Fit the family of plants to records of one plant; with what some of them show, only beside that.
 #[pyfunction]
 #[pyo3(signature = (records, *, kind="held", controller=false, at_rest=None, largest_delay=None,
-    plant=None, integrating=None, noise=None, level=0.95, omega=None, progress=None, known=None))]
+    plant=None, integrating=None, noise=None, level=0.95, causes=false, omega=None, progress=None,
+    known=None))]
 #[expect(clippy::too_many_arguments, reason = "given by name")]
 pub(crate) fn fit_family(
     py: Python<'_>,
@@ -329,6 +364,7 @@ pub(crate) fn fit_family(
     integrating: Option<bool>,
     noise: Option<&str>,
     level: f64,
+    causes: bool,
     omega: Option<Vec<f64>>,
     progress: Option<Py<PyAny>>,
     known: Option<Py<FamilyFit>>,
@@ -355,6 +391,7 @@ pub(crate) fn fit_family(
         integrating,
         noise: noise.transpose()?,
         level,
+        causes,
     };
     let core = run(py, Some(1), progress.as_ref(), |task| {
         let records = records.into_iter().map(Record::checked);

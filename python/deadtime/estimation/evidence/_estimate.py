@@ -10,6 +10,7 @@ from typing import Any
 from deadtime._base.drawing import Axes, Figure, new_figure
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
+from deadtime.estimation.evidence._causes import Cause, SensorFault
 from deadtime.estimation.evidence._numbers import FoundPlant
 from deadtime.estimation.evidence._words import Advice, advice_on, headline_of, lines_of, summary_of
 
@@ -54,6 +55,11 @@ class PlantEstimate(FoundPlant, Pictured):
         The rows that were used, and those before them.
     fitted, residuals : ndarray, shape (n,)
         Output of the likeliest plant, and measured less fitted output; NaN in rows not used.
+    causes : tuple of Cause
+        What a linear plant lacks, such as play of the actuator or a load, with sizes. The numbers
+        are those of the plant without it.
+    sensor_faults : tuple of SensorFault
+        Rows that are no readings of the sensor, such as frozen ones. They were left out.
     others : tuple of FittedRecording
         The further recordings of a joint estimate; `recording`, `fitted` and `residuals` are those
         of the first, `runs` has all.
@@ -117,6 +123,8 @@ class PlantEstimate(FoundPlant, Pictured):
             "asked": self.asked,
             "shift": self.shift,
             "at_rest": self.at_rest,
+            "causes": [_plain(cause) for cause in self.causes],
+            "sensor_faults": [_plain(fault) for fault in self.sensor_faults],
             "noise_std": self.noise_std,
             "recordings": [{"noise_std": run.noise_std} for run in self.runs],
         }
@@ -157,3 +165,9 @@ class PlantEstimate(FoundPlant, Pictured):
 
     def __repr__(self) -> str:
         return f"<PlantEstimate {self.headline()}>"
+
+
+def _plain(found: Cause | SensorFault) -> dict[str, Any]:
+    """A finding as plain values, with its words."""
+    own = {name: value for name, value in vars(found).items() if not name.startswith("_")}
+    return own | {"words": found.in_words()}

@@ -14,6 +14,7 @@ import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Between, Question, questions_of
@@ -38,6 +39,7 @@ def estimate_by_evidence(
     plant: str | None = None,
     controller: Controller | Sequence[Controller] | None = None,
     limit: float | None = None,
+    causes: bool | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PlantEstimate:
     """The plant that recordings show; what is not given is taken from them."""
@@ -48,6 +50,7 @@ def estimate_by_evidence(
         "between": between,
         "hold": hold or 0.0,
         "plant": plant,
+        "causes": causes is not False,
     }
     question = questions_of(recording, window, controller, limit, closed_loop, known)
     found = question.answer(progress=progress)
@@ -138,6 +141,8 @@ def estimate_of(
         fitted=runs[0].fitted,
         residuals=runs[0].residuals,
         others=tuple(runs[1:]),
+        causes=causes_of(found),
+        sensor_faults=sensor_faults_of(found),
         _own_noise=runs[0].noise_std,
         _code=found.reason,
         _question=question,

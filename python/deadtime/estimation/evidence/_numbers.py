@@ -15,6 +15,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import one_dimensional
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation.evidence._candidate import PlantCandidate
+from deadtime.estimation.evidence._causes import Cause, SensorFault
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording
@@ -87,6 +88,8 @@ class FoundPlant(ReadOnlyArrays):
     fitted: Array
     residuals: Array
     others: tuple[FittedRecording, ...] = ()
+    causes: tuple[Cause, ...] = ()
+    sensor_faults: tuple[SensorFault, ...] = ()
     _own_noise: float = math.nan
     _code: str = ""
     _question: Question = field(kw_only=True)

@@ -67,6 +67,8 @@ class Question(ReadOnlyArrays):
         Only kinds of plant that integrate, or only those that come to rest; None: all.
     hold : float
         For how long the controller holds each command, s; 0 where that is not known.
+    causes : bool
+        Whether what the plant lacks, and what the sensor did not read, is looked for.
     others : tuple of Question
         Further recordings of the same plant; only what is of one recording counts in them.
     """
@@ -84,6 +86,7 @@ class Question(ReadOnlyArrays):
     shift: int = 0
     integrates: bool | None = None
     hold: float = 0.0
+    causes: bool = True
     others: tuple[Question, ...] = ()
 
     @property
@@ -115,6 +118,7 @@ class Question(ReadOnlyArrays):
             integrating=self.integrates,
             level=level,
             noise=noise,
+            causes=self.causes,
             omega=tuple(omega),
             progress=progress,
             known=known,

@@ -106,7 +106,7 @@ def _question(run: Run) -> Question | None:
     controller, limit = (loop.controller, loop.limit) if computed else (None, None)
     recording, window = _most_excited(run)
     try:
-        return question_of(recording, window, None, controller, limit, {})
+        return question_of(recording, window, None, controller, limit, {"causes": False})
     except DeadtimeError:
         return None
 

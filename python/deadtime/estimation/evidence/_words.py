@@ -207,6 +207,8 @@ def _beside(fit: FoundPlant) -> list[str]:
             f"the command is {abs(fit.shift)} row {'early' if fit.shift > 0 else 'late'} in the "
             "recording, and was moved"
         )
+    lines += [f"found: {cause.in_words()}: {cause.remedy}" for cause in fit.causes]
+    lines += [f"left out: {fault.in_words()}" for fault in fit.sensor_faults]
     for place, run in enumerate(fit.runs, 1):
         rows = int((~_isnan(run.residuals)).sum())
         where = f" of recording {place}" if fit.others else ""

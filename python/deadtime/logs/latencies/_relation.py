@@ -262,6 +262,7 @@ def _fitted(
         parts,
         closed_loop=integrates,
         integrates=integrates,
+        causes=False,
         largest_delay=longest,
         **known,
     )

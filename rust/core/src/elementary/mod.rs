@@ -19,6 +19,7 @@
 mod angle;
 mod circular;
 mod double_double;
+mod enclosed;
 mod exponential;
 mod logarithm;
 mod nearest;
@@ -29,6 +30,7 @@ mod tables;
 pub use angle::angle;
 pub use circular::sin_cos;
 pub use double_double::DoubleDouble;
+pub use enclosed::{Enclosed, ORDER};
 pub use exponential::{exp, exp_above};
 pub use logarithm::log;
 

@@ -47,8 +47,9 @@ mod whiten;
 pub use commanded::{Commanded, UnitPlant};
 pub use disturbance::{Disturbance, Entry};
 pub use family::{
-    Between, Candidate, Class, Coefficients, Family, Grade, Named, Noise as FamilyNoise, Numbers,
-    Question, Record, Triple, Verdict, fit_family, refine_family,
+    Between, Candidate, Cause as FamilyCause, CauseKind, Class, Coefficients, Family, Grade, Named,
+    Noise as FamilyNoise, Numbers, Question, Record, SensorFault, SensorKind, Triple, Verdict,
+    fit_family, refine_family,
 };
 pub use fit::{Fit, Model, Search};
 pub use flight::{

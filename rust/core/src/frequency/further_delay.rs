@@ -1,62 +1,43 @@
-//! The further delay with which a loop with a hold loses stability.
+//! The delays with which a loop with a hold is stable, proved.
 //!
-//! A further delay T changes the fraction of a sample in it, and b with that. Its effect on a
-//! crossover at ω is close to a turn by ω T: from a stable loop, steps of less than the smallest
-//! φ/ω over the crossovers, φ the turn that brings L to −1, approach the first loss of stability,
-//! and Newton's iteration for φ = 0 ends at it. The poles are counted after every step, and on both
-//! sides of the result, which proves that stability is lost there; that it is not lost and regained
-//! within a step is not proved.
+//! With m whole samples in the delay and a fraction φ of a sample, h = z^(m+1) a − b, where a and b depend on
+//! φ alone. Over an interval of φ it is proved that no pole is on the circle (`HeldInterval`), and where
+//! that fails the interval is halved, up to where stability is lost. The intervals that were needed for
+//! one sample are then tried for many m at once, and for all of them: L that is nowhere one in modulus
+//! stays stable with any delay. Poles pass a whole number of samples continuously, but where the command
+//! acts at once, L jumps there: the poles are counted on both sides.
 //!
-//! Where the plant has modes faster than a sample, or the command acts at once (L jumps where the
-//! delay is a whole number of samples), the crossovers of all parts of a sample are looked at. Whole
-//! samples turn each of them by ω T exactly and are passed at once; a sample in which stability may
-//! be lost is followed in the steps of `held_range`.
-//!
-//! Neither crossovers nor counts (`circle`) cost more for a longer delay.
+//! Newton's iteration for the turn that brings L to −1 gives the loss its last digits.
 
+use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use super::circle::is_stable;
 use super::gain_crossovers::{Crossover, crossovers};
-use super::held_range::loss_of_delay;
-use crate::stability::HeldLoop;
+use super::held_range::{JUMP, RESOLVED, loses, loss_beside};
+use crate::dde::control_loop::sampled::Timing;
+use crate::stability::{HeldInterval, HeldLoop};
 use crate::{Error, Task};
 
-/// Share of the estimated distance to the loss of stability that a step takes.
-const CAUTIOUS: f64 = 0.7;
-
-/// Turn in radians from which Newton's iteration is used.
-const CLOSE: f64 = 0.02;
-
-/// Upper limits on the steps of the approach and of Newton's iteration.
-const STEPS: u32 = 2000;
+/// Turn in radians within which Newton's iteration stays, and its upper limit.
+const CLOSE: f64 = 0.2;
 const NEWTON: u32 = 30;
 
 /// Last relative step of Newton's iteration, about the rounding of the turn.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Fractions of a sample for which it is found whether the gain reaches one.
-const FRACTIONS: usize = 33;
+/// Relative distance within which rounding may hide the loss from counts, but not from the turn.
+const BESIDE: f64 = 1e-3;
 
-/// Fractions just below a whole sample.
-const LATE: [f64; 3] = [1e-1, 1e-4, 1e-9];
+/// Samples in the delay from which rounding in a part of a sample may end the proof before the loss, and
+/// how much before: what remains is the way of the turn of the crossover, which whole samples turn exactly.
+const MANY: f64 = 1e5;
+const LATE: f64 = 1.0;
 
-/// Product of the fastest mode of the plant and the sample time beyond which the loop gain changes
-/// much with the fraction of a sample in the delay. The fastest oscillation then turns by PART in the
-/// parts of a sample that are looked at, between the least and the most of them.
-const ABRUPT: f64 = 0.5;
-const PART: f64 = 0.25;
-const PARTS: (f64, f64) = (8.0, 128.0);
+/// Shortest part of a sample over which the gain is shown to be nowhere one.
+const SHORTEST: f64 = 1e-4;
 
-/// Relative distance at which a jump of the loop gain is looked at from below.
-const JUMP: f64 = 1e-11;
-
-/// Upper limit on halvings of a step in which stability is lost.
-const HALVINGS: u32 = 60;
-
-/// Relative distances from the result at which stability is counted, the larger ones where rounding
-/// hides it closer by.
-const BESIDE: [f64; 3] = [1e-7, 1e-5, 1e-3];
+/// Most samples in the delay.
+const MOST: f64 = 1e15;
 
 /// The further delay in s with which a stable loop first loses stability, and the frequency there;
 /// infinite where no delay is too much.
@@ -65,50 +46,34 @@ const BESIDE: [f64; 3] = [1e-7, 1e-5, 1e-3];
 /// [`Error::Argument`] where numbers, or the loss, are beyond double precision;
 /// [`Error::Interrupted`].
 pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Error> {
-    let (start, period) = (held.delay(), held.sample_time());
-    let is_abrupt = held.fastest() * period > ABRUPT || held.is_direct();
-    let mut delay = start;
-    for _ in 0..STEPS {
-        task.check()?;
-        let Some(Crossover { omega, turn, .. }) = nearest(held, delay, is_abrupt, task)? else {
-            match next_crossover(held, delay, task)? {
-                Some(next) => delay = next,
-                None => return Ok((f64::INFINITY, f64::NAN)),
-            }
-            continue;
-        };
-        if !is_abrupt
-            && turn < CLOSE
-            && let Some(found) = newton(held, delay, omega, task)?
-        {
-            return confirmed(held, found, task);
-        }
-        let step = CAUTIOUS * turn / omega;
-        let next = if is_abrupt {
-            // At the same fraction of a sample b stays, and a crossover turns by ω T exactly.
-            let samples = (step / period).floor();
-            if samples == 0.0 {
-                let next = delay + period;
-                if let Some(lost) = loss_of_delay(held, (delay, next), task)? {
-                    return confirmed(held, (lost, omega), task);
-                }
-                delay = next;
-                continue;
-            }
-            delay + samples * period
-        } else {
-            delay + step
-        };
-        if !keeps(held, next, task)?.unwrap_or(false) {
-            let found = bracketed(held, delay, next, task)?;
-            return confirmed(held, found, task);
-        }
-        delay = next;
-    }
-    refuse!(
-        "no loss of stability was met from a delay of {start} s to {delay} s, and none beyond is \
-         ruled out: look at single delays with is_stable()"
-    )
+    let start = held.delay();
+    let Some(end) = Search::new(held, task)?.later()? else {
+        return Ok((f64::INFINITY, f64::NAN));
+    };
+    let (found, omega) = turned(held, end, BESIDE, task)?;
+    let (delay, omega) = found.unwrap_or((end, omega));
+    Ok((delay - start, omega))
+}
+
+/// A delay and a frequency.
+type Loss = (f64, f64);
+
+/// The loss of stability next to a delay by the turn of the crossover closest to −1, if there is one, and the
+/// frequency of this crossover.
+fn turned(
+    held: HeldLoop<'_>,
+    near: f64,
+    share: f64,
+    task: &Task,
+) -> Result<(Option<Loss>, f64), Error> {
+    let found = crossovers(&held.at(near)?, task)?;
+    let closest = found
+        .into_iter()
+        .min_by(|p, q| p.distance().total_cmp(&q.distance()));
+    let omega = closest.map_or(f64::NAN, |at| at.omega);
+    let found = newton(held, near, omega, task)?;
+    let is_beside = |found: &Loss| (found.0 - near).abs() <= share * near;
+    Ok((found.filter(is_beside), omega))
 }
 
 /// The stable range of the delay.
@@ -117,102 +82,230 @@ pub fn further_delay(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Erro
 /// As for [`further_delay`].
 pub fn held_delay_range(held: HeldLoop<'_>, task: &Task) -> Result<(f64, f64), Error> {
     let (further, _) = further_delay(held, task)?;
-    let start = held.delay();
-    let earlier = loss_of_delay(held, (start, 0.0), task)?;
-    Ok((earlier.unwrap_or(0.0), start + further))
+    let earlier = Search::new(held, task)?.earlier()?;
+    Ok((earlier.unwrap_or(0.0), held.delay() + further))
 }
 
-/// Is the loop stable at a delay? `None` where rounding decides.
-fn keeps(held: HeldLoop<'_>, delay: f64, task: &Task) -> Result<Option<bool>, Error> {
-    let numbers = held.at(delay)?;
-    is_stable(&numbers, &crossovers(&numbers, task)?, task)
+/// A part of a sample, from one fraction to another.
+type Part = (f64, f64);
+
+struct Search<'a> {
+    held: HeldLoop<'a>,
+    /// Whole samples and fraction at the start.
+    start: (f64, f64),
+    /// What is known of parts of a sample, by the bits of their ends.
+    known: HashMap<(u64, u64), HeldInterval>,
+    task: &'a Task,
 }
 
-/// The crossover whose estimated distance to the loss of stability is least; with a loop gain that
-/// changes much within a sample, at all parts of the next one.
-fn nearest(
-    held: HeldLoop<'_>,
-    delay: f64,
-    is_abrupt: bool,
-    task: &Task,
-) -> Result<Option<Crossover>, Error> {
-    let mut found = crossovers(&held.at(delay)?, task)?;
-    if is_abrupt {
-        for beside in within_sample(held, delay) {
-            found.extend(crossovers(&held.at(beside)?, task)?);
-        }
+impl<'a> Search<'a> {
+    fn new(held: HeldLoop<'a>, task: &'a Task) -> Result<Self, Error> {
+        let timing = Timing::new(held.delay(), held.sample_time());
+        refuse_if!(
+            loses(held, task)? != Some(false),
+            "the loop is not stable at a delay of {} s, to working precision",
+            held.delay()
+        );
+        Ok(Self {
+            held,
+            start: (timing.samples as f64, timing.early / held.sample_time()),
+            known: HashMap::new(),
+            task,
+        })
     }
-    let distance = |at: &Crossover| at.turn / at.omega;
-    Ok(found
-        .into_iter()
-        .min_by(|p, q| distance(p).total_cmp(&distance(q))))
-}
 
-/// Delays in the next sample, on both sides of the whole number of samples as well.
-fn within_sample(held: HeldLoop<'_>, delay: f64) -> Vec<f64> {
-    let period = held.sample_time();
-    let whole = period * ((delay / period * (1.0 + 1e-12)).floor() + 1.0);
-    let turn = held.fastest_oscillation(f64::INFINITY) * period;
-    let parts = (turn / PART).clamp(PARTS.0, PARTS.1).ceil();
-    let inner = (1..parts as u32).map(|part| delay + period * f64::from(part) / parts);
-    inner.chain([whole * (1.0 - JUMP), whole]).collect()
-}
-
-/// The loss of stability between a delay at which the loop is stable and one at which it is not.
-fn bracketed(
-    held: HeldLoop<'_>,
-    mut low: f64,
-    mut high: f64,
-    task: &Task,
-) -> Result<(f64, f64), Error> {
-    let turned = |delay: f64| -> Result<f64, Error> {
-        let found = crossovers(&held.at(delay)?, task)?;
-        let closest = found
-            .into_iter()
-            .min_by(|p, q| p.distance().total_cmp(&q.distance()));
-        Ok(closest.map_or(f64::NAN, |at| at.omega))
-    };
-    for halving in 0..HALVINGS {
-        if high - low <= 2.0 * JUMP * high {
-            break;
+    /// The first loss of stability on the way to longer delays.
+    fn later(&mut self) -> Result<Option<f64>, Error> {
+        let (mut samples, fraction) = self.start;
+        let mut parts = Vec::new();
+        if let Some(lost) = self.lost_in(samples, (fraction, 1.0), &mut parts)? {
+            return Ok(Some(lost));
         }
-        if halving % 6 == 5 {
-            let found = newton(held, high, turned(high)?, task)?;
-            if let Some(found) = found.filter(|found| found.0 >= low && found.0 <= high) {
-                return Ok(found);
+        samples += 1.0;
+        parts = vec![(0.0, 1.0)];
+        let (mut count, mut is_new, mut is_joined) = (1.0, true, false);
+        while samples < MOST {
+            let delay = samples * self.held.sample_time();
+            if is_new {
+                if self.never(delay, &mut parts)? {
+                    return Ok(None);
+                }
+                is_joined = !self.held.is_direct() || self.lead(&parts);
+                is_new = false;
+            }
+            if !is_joined && self.loses(delay)? {
+                return Ok(Some(delay));
+            }
+            // Where L jumps, the way from one m to the next is looked at too.
+            let least = if is_joined && self.held.is_direct() {
+                samples - 1.0
+            } else {
+                samples
+            };
+            if self.avoid(&parts, (least, samples + count - 1.0))? {
+                samples += count;
+                count = if is_joined { 2.0 * count } else { 1.0 };
+            } else if count > 1.0 {
+                count = (0.25 * count).floor().max(1.0);
+            } else {
+                if self.held.is_direct() && self.loses(delay)? {
+                    return Ok(Some(delay));
+                }
+                parts.clear();
+                if let Some(lost) = self.lost_in(samples, (0.0, 1.0), &mut parts)? {
+                    return Ok(Some(lost));
+                }
+                (samples, is_new) = (samples + 1.0, true);
             }
         }
-        let middle = 0.5 * (low + high);
-        if keeps(held, middle, task)?.unwrap_or(false) {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        refuse!(
+            "the loop is stable with delays up to {MOST:e} samples, and nothing beyond is ruled out"
+        )
     }
-    Ok((high, turned(high)?))
-}
 
-/// The next delay with a fraction of a sample for which the gain reaches one.
-fn next_crossover(held: HeldLoop<'_>, delay: f64, task: &Task) -> Result<Option<f64>, Error> {
-    let period = held.sample_time();
-    let here = delay / period;
-    let even = (0..FRACTIONS).map(|k| k as f64 / FRACTIONS as f64);
-    let late = LATE.iter().map(|gap| 1.0 - gap);
-    let mut fractions: Vec<f64> = even
-        .chain(late)
-        .map(|fraction| {
-            let ahead = (fraction - here).rem_euclid(1.0);
-            if ahead > 0.0 { ahead } else { 1.0 }
-        })
-        .collect();
-    fractions.sort_by(f64::total_cmp);
-    for ahead in fractions {
-        let next = delay + ahead * period;
-        if !crossovers(&held.at(next)?, task)?.is_empty() {
-            return Ok(Some(next));
+    /// The same on the way to no delay.
+    fn earlier(&mut self) -> Result<Option<f64>, Error> {
+        let (mut samples, fraction) = self.start;
+        let mut parts = Vec::new();
+        if let Some(lost) = self.lost_in(samples, (fraction, 0.0), &mut parts)? {
+            return Ok(Some(lost));
         }
+        parts = vec![(1.0, 0.0)];
+        let mut count = 1.0;
+        while samples > 0.0 {
+            let delay = samples * self.held.sample_time();
+            if self.held.is_direct() && self.loses(delay * (1.0 - JUMP))? {
+                return Ok(Some(delay));
+            }
+            let count_here = f64::min(count, samples);
+            if self.avoid(&parts, (samples - count_here, samples - 1.0))? {
+                samples -= count_here;
+                count = if self.held.is_direct() {
+                    1.0
+                } else {
+                    2.0 * count
+                };
+            } else if count > 1.0 {
+                count = (0.25 * count).floor().max(1.0);
+            } else {
+                samples -= 1.0;
+                parts.clear();
+                if let Some(lost) = self.lost_in(samples, (1.0, 0.0), &mut parts)? {
+                    return Ok(Some(lost));
+                }
+            }
+        }
+        Ok(None)
     }
-    Ok(None)
+
+    /// The first loss of stability from one fraction of a sample to another; else the parts into which
+    /// the way was cut.
+    fn lost_in(
+        &mut self,
+        samples: f64,
+        way: Part,
+        parts: &mut Vec<Part>,
+    ) -> Result<Option<f64>, Error> {
+        let period = self.held.sample_time();
+        let mut open = vec![way];
+        while let Some(part) = open.pop() {
+            self.task.check()?;
+            if self.avoid(&[part], (samples, samples))? {
+                parts.push(part);
+                continue;
+            }
+            let (from, to) = part;
+            let size = samples + from.max(to).max(0.05);
+            if (to - from).abs() > RESOLVED * size {
+                let middle = 0.5 * (from + to);
+                open.extend([(middle, to), (from, middle)]);
+                continue;
+            }
+            let stable = (samples + from) * period;
+            let beyond = (size * period).copysign(to - from);
+            let found = loss_beside(
+                &mut |delay| {
+                    loses(
+                        HeldLoop::new(&self.held.with_delay(delay.max(0.0)))?,
+                        self.task,
+                    )
+                },
+                stable,
+                (beyond, BESIDE),
+            )?;
+            let found = match found {
+                None => {
+                    let share = if samples > MANY { LATE } else { BESIDE };
+                    turned(self.held, stable, share, self.task)?
+                        .0
+                        .map(|(delay, _)| delay)
+                }
+                found => found,
+            };
+            refuse_if!(
+                found.is_none(),
+                "the loop is stable with delays from {} to {stable} s, and nothing beyond is ruled \
+                 out: a pole is as near to the unit circle as rounding",
+                self.held.delay()
+            );
+            return Ok(found);
+        }
+        Ok(None)
+    }
+
+    /// Is no pole on the circle, in any of these parts of a sample, with any m between these?
+    fn avoid(&mut self, parts: &[Part], (least, most): (f64, f64)) -> Result<bool, Error> {
+        for part in parts {
+            let interval = self.interval(*part);
+            if !interval.avoids_circle((least + 1.0, most + 1.0)) {
+                return Ok(false);
+            }
+            self.task.check()?;
+        }
+        Ok(true)
+    }
+
+    /// Is the gain of the loop nowhere one, for any fraction of a sample? The parts are made as short as that
+    /// takes.
+    fn never(&mut self, delay: f64, parts: &mut Vec<Part>) -> Result<bool, Error> {
+        if !crossovers(&self.held.at(delay)?, self.task)?.is_empty() {
+            return Ok(false);
+        }
+        let mut found = Vec::new();
+        let mut open: Vec<Part> = parts.iter().rev().copied().collect();
+        while let Some((from, to)) = open.pop() {
+            if self.avoid(&[(from, to)], (0.0, f64::INFINITY))? {
+                found.push((from, to));
+            } else if to - from > SHORTEST {
+                let middle = 0.5 * (from + to);
+                open.extend([(middle, to), (from, middle)]);
+            } else {
+                return Ok(false);
+            }
+        }
+        *parts = found;
+        Ok(true)
+    }
+
+    /// Do these parts of a sample need no count where the samples become one more?
+    fn lead(&mut self, parts: &[Part]) -> bool {
+        parts
+            .iter()
+            .all(|part| self.interval(*part).leads_at_minus_one())
+    }
+
+    /// The loop over a part of a sample.
+    fn interval(&mut self, (from, to): Part) -> &HeldInterval {
+        let ends = (from.min(to), from.max(to));
+        let known = self.known.entry((ends.0.to_bits(), ends.1.to_bits()));
+        known.or_insert_with(|| self.held.within_sample(ends))
+    }
+
+    /// Is the loop not stable at a delay?
+    fn loses(&self, delay: f64) -> Result<bool, Error> {
+        let made = self.held.with_delay(delay);
+        Ok(loses(HeldLoop::new(&made)?, self.task)? != Some(false))
+    }
 }
 
 /// The delay at which the turn of the crossover next to `omega` is zero.
@@ -241,24 +334,4 @@ fn newton(
         }
     }
     Ok(None)
-}
-
-/// The further delay, if stability is lost there.
-fn confirmed(
-    held: HeldLoop<'_>,
-    (delay, omega): (f64, f64),
-    task: &Task,
-) -> Result<(f64, f64), Error> {
-    let start = held.delay();
-    for beside in BESIDE {
-        let (before, after) = (delay * (1.0 - beside), delay * (1.0 + beside));
-        let lost = keeps(held, after, task)? == Some(false);
-        if lost && (before <= start || keeps(held, before, task)? == Some(true)) {
-            return Ok((delay - start, omega));
-        }
-    }
-    refuse!(
-        "stability seems to be lost at a delay of {delay} s, but a count of the poles on both \
-         sides does not confirm it: look at single delays with is_stable()"
-    )
 }

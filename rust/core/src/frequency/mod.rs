@@ -41,7 +41,7 @@ pub use further_delay::{further_delay, held_delay_range};
 pub use held::{held_margins, held_margins_of_stable};
 pub use held_gain::{held_gain, held_phase};
 pub use held_gain_range::gain_range_held;
-pub use held_range::{Number, held_range};
+pub use held_range::{Members, Number, held_range};
 pub use margins::{Margins, margins, margins_of_ratio, margins_of_stable};
 pub use passage::Crossing;
 pub use ranges::{corner_range, damping_range, gain_range};

@@ -12,7 +12,7 @@
 //! unless the filter runs on samples itself ([`Rule`]).
 
 use super::entry::{Entry, Number};
-use super::filter::{Rule, SampledFilter};
+use super::filter::{Rule, Sampled, SampledFilter};
 use super::polynomial::{product, scaled, sum};
 
 /// Which terms there are.
@@ -198,7 +198,7 @@ impl Controller {
     pub(super) fn equations<S: Number>(
         &self,
         numbers: &[S],
-        sampled: Option<&SampledFilter>,
+        sampled: Option<&SampledFilter<S>>,
     ) -> ControllerEquations<S> {
         let Terms { p, i, d } = self.terms(numbers);
         let (zero, one) = (S::from(0.0), S::from(1.0));
@@ -224,8 +224,8 @@ impl Controller {
             (Some(_), Some(sampled)) => {
                 made.b.extend([zero.clone(), zero.clone()]);
                 made.e.extend([zero.clone(), zero]);
-                made.c.extend(sampled.c.iter().map(|c| S::from(*c)));
-                let direct = S::from(sampled.d);
+                made.c.extend(sampled.c.iter().cloned());
+                let direct = sampled.d.clone();
                 made.p = made.p + direct.clone();
                 made.m = made.m + -on_error * direct;
             }
@@ -249,24 +249,25 @@ impl Controller {
         made
     }
 
-    /// The filter on samples, for plain numbers.
+    /// The filter on samples.
     ///
     /// # Errors
     /// As [`SampledFilter::new`].
-    pub(super) fn sampled(
+    pub(super) fn sampled<S: Sampled>(
         &self,
-        numbers: &[f64],
-        sample_time: Option<f64>,
-    ) -> Result<Option<SampledFilter>, crate::Error> {
+        numbers: &[S],
+        sample_time: Option<&S>,
+    ) -> Result<Option<SampledFilter<S>>, crate::Error> {
         let d = self.terms(numbers).d;
         match (self.filter(numbers), self.rule, sample_time) {
             (Some((omega, damping)), Some(rule), Some(sample_time)) => {
-                let block = [0.0, omega, -omega, -2.0 * damping * omega];
+                let zero = S::from(0.0);
+                let decay = S::from(-2.0) * damping * omega.clone();
                 let filter = SampledFilter::new(
-                    &block,
-                    &[0.0, omega],
-                    &[0.0, -d * omega],
-                    sample_time,
+                    &[zero.clone(), omega.clone(), -omega.clone(), decay],
+                    &[zero.clone(), omega.clone()],
+                    &[zero, -d * omega],
+                    sample_time.clone(),
                     rule,
                 )?;
                 Ok(Some(filter))

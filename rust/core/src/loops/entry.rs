@@ -2,11 +2,12 @@
 //!
 //! The formulas of a loop are written once, over any [`Entry`]: a number, a number with a slope
 //! ([`Dual`](crate::dde::Dual)), the numbers of many loops ([`Each`](super::Each)), or a polynomial in
-//! free numbers ([`Symbol`](super::Symbol)).
+//! free numbers ([`Symbol`](super::Symbol)), or a function of a number over an interval ([`Enclosed`]).
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::dde::Scalar;
+use crate::elementary::Enclosed;
 
 /// What can be added and multiplied.
 pub trait Entry: Clone + From<f64> + Add<Output = Self> + Mul<Output = Self> {
@@ -24,3 +25,11 @@ impl<S: Scalar> Entry for S {
 }
 
 impl<S: Scalar> Number for S {}
+
+impl Entry for Enclosed {
+    fn is_zero(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Number for Enclosed {}

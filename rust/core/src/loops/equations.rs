@@ -9,7 +9,7 @@ use crate::dde::{Equations, LinearLoop, Scalar, Update};
 use super::control_loop::{ControlLoop, Values};
 use super::controller::ControllerEquations;
 use super::entry::Number;
-use super::filter::SampledFilter;
+use super::filter::{Sampled, SampledFilter};
 use super::plant::StateSpace;
 
 /// What moves the loop.
@@ -31,7 +31,7 @@ impl ControlLoop {
         &self,
         values: &Values<S>,
         input: Input,
-        sampled: Option<&SampledFilter>,
+        sampled: Option<&SampledFilter<S>>,
     ) -> Result<Equations<S>, Error> {
         let fraction = self
             .plant()
@@ -56,16 +56,28 @@ impl ControlLoop {
     /// As [`equations`](Self::equations), and for numbers that these kernels refuse.
     pub fn linear(&self, input: Input) -> Result<LinearLoop, Error> {
         let values = self.values();
-        let sampled = self
-            .controller()
-            .sampled(&values.controller, values.sample_time)?;
-        let equations = self.equations(values, input, sampled.as_ref())?;
-        let update = sampled.map(|filter| self.update(&filter, &equations));
+        let (equations, update) = self.on_samples(values, input)?;
         let plain = LinearLoop::new(equations, values.delay, values.sample_time, values.limit)?;
         match update {
             Some(update) => plain.with_update(update),
             None => Ok(plain),
         }
+    }
+
+    /// The equations for these numbers, and what a sample does to the states.
+    ///
+    /// # Errors
+    /// As [`equations`](Self::equations).
+    pub(super) fn on_samples<S: Sampled>(
+        &self,
+        values: &Values<S>,
+        input: Input,
+    ) -> Result<(Equations<S>, Option<Update<S>>), Error> {
+        let controller = self.controller();
+        let sampled = controller.sampled(&values.controller, values.sample_time.as_ref())?;
+        let equations = self.equations(values, input, sampled.as_ref())?;
+        let update = sampled.map(|filter| self.update(&filter, &equations));
+        Ok((equations, update))
     }
 
     /// The loop in numbers with slopes; its filter must be continuous.
@@ -107,22 +119,23 @@ impl ControlLoop {
     }
 
     /// What a sample does to all states: the filter reads the output, and its states come last.
-    fn update(&self, filter: &SampledFilter, equations: &Equations) -> Update {
+    fn update<S: Number>(&self, filter: &SampledFilter<S>, equations: &Equations<S>) -> Update<S> {
         let (n, m) = (equations.b.len(), filter.g.len());
-        let mut states = vec![0.0; n * n];
-        (0..n).for_each(|i| states[i * n + i] = 1.0);
-        let (mut command, mut reference) = (vec![0.0; n], vec![0.0; n]);
+        let mut states = vec![S::from(0.0); n * n];
+        (0..n).for_each(|i| states[i * n + i] = S::from(1.0));
+        let mut command = vec![S::from(0.0); n];
+        let mut reference = command.clone();
         let on_error = f64::from(u8::from(self.controller().kind.derivative_of_error()));
         for i in 0..m {
             let row = n - m + i;
             for j in 0..m {
-                states[row * n + n - m + j] = filter.f[i * m + j];
+                states[row * n + n - m + j] = filter.f[i * m + j].clone();
             }
-            if equations.c[0] != 0.0 {
-                states[row * n] = filter.g[i] * equations.c[0];
+            if !equations.c[0].is_zero() {
+                states[row * n] = filter.g[i].clone() * equations.c[0].clone();
             }
-            command[row] = filter.g[i] * equations.d;
-            reference[row] = -on_error * filter.g[i];
+            command[row] = filter.g[i].clone() * equations.d.clone();
+            reference[row] = S::from(-on_error) * filter.g[i].clone();
         }
         Update {
             states,

@@ -13,6 +13,7 @@ use crate::quasipoly::QuasiPolynomial;
 
 use super::entry::{Entry, Number};
 use super::polynomial::{entries, led, product, scaled};
+use super::symbol::Symbol;
 
 /// Numerator and denominator, descending.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,6 +87,17 @@ impl Factors {
             num = product(&num, &[zero, one()]);
         }
         Fraction { num, den }
+    }
+}
+
+impl Fraction<Symbol> {
+    /// Where the first free number is this one.
+    pub(super) fn at<S: Entry>(&self, number: &S) -> Fraction<S> {
+        let each = |row: &[Symbol]| row.iter().map(|c| c.at(number)).collect();
+        Fraction {
+            num: each(&self.num),
+            den: each(&self.den),
+        }
     }
 }
 

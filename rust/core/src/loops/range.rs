@@ -1,12 +1,14 @@
 //! The values of one number, around its present one, for which a loop is stable, its limit left out.
 
 use crate::dde::LinearLoop;
+use crate::dde::control_loop::sampled::Timing;
+use crate::elementary::Enclosed;
 use crate::frequency::{
-    Number, corner_range, damping_range, delay_range, end_of_gain, gain_range, gain_range_held,
-    held_delay_range, held_range,
+    Members, Number, corner_range, damping_range, delay_range, end_of_gain, gain_range,
+    gain_range_held, held_delay_range, held_range,
 };
 use crate::quasipoly::QuasiPolynomial;
-use crate::stability::HeldLoop;
+use crate::stability::{HeldInterval, HeldLoop};
 use crate::{Error, Task};
 
 use super::control_loop::{ControlLoop, Place, Values};
@@ -22,6 +24,42 @@ pub struct GivenPlant<'a> {
     pub free: Option<Fraction<Symbol>>,
     /// They for numbers.
     pub at: &'a mut Polynomials<'a>,
+}
+
+/// A loop of which one number varies.
+struct Varied<'a, 'b> {
+    of: &'a ControlLoop,
+    place: Place,
+    given: GivenPlant<'b>,
+}
+
+impl Members for Varied<'_, '_> {
+    fn at(&mut self, value: f64) -> Result<LinearLoop, Error> {
+        let mut values = self.of.values().clone();
+        values.set(self.place, value);
+        if *self.of.plant() == Plant::Given && matches!(self.place, Place::Plant(_)) {
+            values.given = Some((self.given.at)(&values.plant)?);
+        }
+        self.of.with(values).linear(Input::Reference)
+    }
+
+    fn within(&mut self, (low, high): (f64, f64), samples: f64) -> Result<HeldInterval, Error> {
+        let number = Enclosed::between(low, high);
+        let own = self.of.values();
+        let mut values: Values<Enclosed> = own.entries();
+        values.set(self.place, number);
+        values.given = self.given.free.as_ref().map(|free| free.at(&number));
+        let (equations, update) = self.of.on_samples(&values, Input::Reference)?;
+        let period = own.sample_time.unwrap_or_default();
+        let (early, period) = match values.sample_time {
+            Some(varied) if self.place == Place::SampleTime => {
+                (values.delay - Enclosed::from(samples) * varied, varied)
+            }
+            _ => (Timing::new(own.delay, period).early.into(), period.into()),
+        };
+        let times = [early, period - early];
+        Ok(HeldInterval::new(&equations, update.as_ref(), times))
+    }
 }
 
 impl ControlLoop {
@@ -40,7 +78,7 @@ impl ControlLoop {
         };
         let bounds = self.bounds(place, value);
         if self.values().sample_time.is_some() {
-            return self.held_range(place, (value, bounds), given.at, task);
+            return self.held_range(place, (value, bounds), given, task);
         }
         let mut values = self.free(&[place]);
         values.given = given.free;
@@ -62,7 +100,7 @@ impl ControlLoop {
         &self,
         place: Place,
         (value, bounds): (f64, (f64, f64)),
-        given: &mut Polynomials<'_>,
+        given: GivenPlant<'_>,
         task: &Task,
     ) -> Result<(f64, f64), Error> {
         if place == Place::Delay {
@@ -76,16 +114,12 @@ impl ControlLoop {
             Place::SampleTime => Number::SampleTime,
             _ => Number::Other,
         };
-        let is_given = *self.plant() == Plant::Given && matches!(place, Place::Plant(_));
-        let mut at = |value: f64| {
-            let mut values = self.values().clone();
-            values.set(place, value);
-            if is_given {
-                values.given = Some(given(&values.plant)?);
-            }
-            self.with(values).linear(Input::Reference)
+        let mut varied = Varied {
+            of: self,
+            place,
+            given,
         };
-        held_range(&mut at, number, value, bounds, task)
+        held_range(&mut varied, number, value, bounds, task)
     }
 
     /// The loop without a gain, and the one whose feedback is its factor: the feedback is linear in the

@@ -28,6 +28,17 @@ impl Symbol {
         }])
     }
 
+    /// Its value where the first free number is this one.
+    pub(super) fn at<S: Entry>(&self, number: &S) -> S {
+        let terms = self.0.iter().map(|monomial| {
+            let power = monomial.powers.first().copied().unwrap_or(0);
+            (0..power).fold(S::from(monomial.factor), |product, _| {
+                product * number.clone()
+            })
+        });
+        terms.fold(S::from(0.0), |sum, term| sum + term)
+    }
+
     fn put(&mut self, new: Monomial) {
         match self.0.iter_mut().find(|known| known.powers == new.powers) {
             Some(known) => known.factor += new.factor,

@@ -27,7 +27,9 @@ pub(crate) use crossings::radius_of_members;
 pub use crossings::{Crossing, crossings_along};
 pub use delayed::{abscissae, decay};
 pub use family::{Affine, Family, Term};
-pub use held::{HeldLoop, HeldNumbers, LoopRows, held_boundaries, held_map};
+pub use held::{
+    HeldInterval, HeldLoop, HeldNumbers, LoopRows, enclosed_step, held_boundaries, held_map,
+};
 pub(crate) use hold::ROUNDINGS;
 pub use map::{
     Axis, Boundaries, Chart, Proof, Question, Vertex, boundaries, chains, map, robust_map,

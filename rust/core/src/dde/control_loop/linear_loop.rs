@@ -67,13 +67,13 @@ impl<S: Scalar> Equations<S> {
 /// The states of a controller that runs in samples, such as a discretised filter, change in this
 /// way and are constant in between; the rows of J of all other states are those of the identity.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Update {
+pub struct Update<S = f64> {
     /// J, n × n.
-    pub states: Vec<f64>,
+    pub states: Vec<S>,
     /// G, n.
-    pub command: Vec<f64>,
+    pub command: Vec<S>,
     /// H, n.
-    pub reference: Vec<f64>,
+    pub reference: Vec<S>,
 }
 
 /// A validated loop.

@@ -7,6 +7,7 @@ use super::loop_view::Seen;
 use super::minima::Minimum;
 use super::model::Point;
 use super::noise::{Coefficients, Noise};
+use super::series::{Series, Shown, shown};
 use super::tolerances::EVIDENCE;
 use crate::estimation::statistics::{chi_squared_beyond, student_reach};
 use crate::linear_algebra::cholesky::inverse_of_positive;
@@ -32,6 +33,8 @@ pub struct Candidate {
     pub numbers: Numbers,
     /// The static gain, or that of the integrator.
     pub gain: f64,
+    /// What a loop feels of it, with what the command explains beside the class.
+    seen: Seen,
     /// The noise that suits it best, and its coefficients.
     pub noise: Noise,
     /// Its coefficients.
@@ -73,20 +76,28 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    pub(super) fn new(found: &Minimum<'_>, level: f64) -> Self {
+    /// Errors of a minimum; where it may be, with that of its class.
+    pub(super) fn new(found: &Minimum<'_>, level: f64, may_be_wrong: bool) -> Self {
         let model = &found.model;
         let (rows, point) = (model.rows, &found.point);
-        let seen = Seen {
+        let mut seen = Seen {
             class: model.class,
             gain: model.gain(point),
             numbers: model.numbers(&point.x),
+            series: None,
         };
         let noise = model.noise.coefficients(&point.x[model.plant_numbers()..]);
         let count = rows.count();
         let free = count.saturating_sub(model.parameters()).max(1) as f64;
         let variance = point.squares / free;
         let sensitivities = model.sensitivities(point);
-        let (factor, freedom) = dispersion(&sensitivities, &point.whitened, variance);
+        let series = (may_be_wrong && rows.flexible).then(|| {
+            let series = Series::beside(seen.numbers.low_delay(), rows.row);
+            shown(model, point, &sensitivities, series, variance)
+        });
+        let series = series.flatten();
+        let left = series.as_ref().map_or(&point.whitened, |own| &own.left);
+        let (factor, freedom) = dispersion(&sensitivities, left, variance);
         let scales: Vec<f64> = (0..seen.count())
             .map(|at| seen.scale(at, rows.row))
             .collect();
@@ -96,6 +107,17 @@ impl Candidate {
         let rest = factor / explained(&open, &information, &scales);
         let (inner, factor) = if open.share > 0.0 {
             (with_open(&open, known, rest.max(1.0)), rest.max(1.0))
+        } else if let Some(own) = &series {
+            let (moved, inner) = flexible(
+                &seen,
+                own,
+                point,
+                &sensitivities,
+                &scales,
+                factor * variance,
+            );
+            seen = moved;
+            (inner, factor)
         } else {
             (covariance(&information, &scales, factor), factor)
         };
@@ -106,8 +128,9 @@ impl Candidate {
         let mean_weight = (dot(weights, weights) / weights.len().max(1) as f64).sqrt();
         let mut out = Self {
             class: model.class,
-            numbers: seen.numbers,
-            gain: seen.gain,
+            numbers: model.numbers(&point.x),
+            gain: model.gain(point),
+            seen,
             noise: model.noise,
             coefficients: noise,
             values: Vec::new(),
@@ -209,12 +232,8 @@ impl Candidate {
         (1.0 / root, 0.5 * self.numbers.sum / root)
     }
 
-    pub(super) fn seen(&self) -> Seen {
-        Seen {
-            class: self.class,
-            gain: self.gain,
-            numbers: self.numbers,
-        }
+    pub(super) const fn seen(&self) -> Seen {
+        self.seen
     }
 
     /// A quantity and its interval.
@@ -230,6 +249,35 @@ impl Candidate {
         let value = of(&seen);
         (value, value - reach, value + reach)
     }
+}
+
+/// The plant with the error of its class, as far as the record shows it, and the covariance of all numbers.
+fn flexible(
+    seen: &Seen,
+    shown: &Shown,
+    point: &Point,
+    sensitivities: &[Vec<f64>],
+    scales: &[f64],
+    variance: f64,
+) -> (Seen, Vec<f64>) {
+    let mut columns = sensitivities.to_vec();
+    columns.extend_from_slice(&shown.columns);
+    let mut scales = scales.to_vec();
+    scales.resize(columns.len(), shown.deviation / UNKNOWN);
+    let inner = covariance(&products(&columns, &scales, variance), &scales, 1.0);
+    let scores: Vec<f64> = columns
+        .iter()
+        .map(|column| dot(column, &point.whitened) / variance)
+        .collect();
+    let mut out = Seen {
+        series: Some(shown.series),
+        ..*seen
+    };
+    for (at, row) in inner.chunks_exact(scores.len()).enumerate() {
+        out = out.moved(at, dot(row, &scores));
+    }
+    out.numbers.delay = out.numbers.delay.max(0.0);
+    (out, inner)
 }
 
 /// The covariance with what the rows of the command leave open, times a dispersion.

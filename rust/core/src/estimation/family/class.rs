@@ -134,6 +134,11 @@ impl Numbers {
         }
     }
 
+    /// The slower lag, or that of a pair of poles.
+    pub(super) fn lag(&self) -> f64 {
+        self.lags().first().copied().unwrap_or(0.5 * self.sum)
+    }
+
     /// The equivalent delay as ω → 0: delay and lags, less the zero.
     pub(super) fn low_delay(&self) -> f64 {
         self.delay + self.sum - self.zero

@@ -1,15 +1,18 @@
 //! The whole family fitted to one record: rows, minima, intervals, verdict.
 
+use super::answer::{Family, check_level};
 use super::candidate::Candidate;
-use super::class::{Class, Numbers};
+use super::causes::with_causes;
+use super::class::Class;
 use super::excitation::{excited, is_one_sine};
-use super::hull::{Named, Triple, at, hull, mean_delay, turning};
-use super::minima::{Minimum, Plan, minima, without_plant};
+use super::hull::{hull, turning};
+use super::minima::{Minimum, Plan, minima, seeds_of, without_plant};
 use super::noise::Noise;
 use super::refine::{Seed, beside};
 use super::rows::{Part, Record, Rows, Start};
+use super::sensors::without_faults;
 use super::tolerances::{EVIDENCE, RANGES, STARTS};
-use super::verdict::{Findings, Verdict, shifted, verdict};
+use super::verdict::{Findings, shifted, verdict};
 use crate::{Error, Task};
 
 /// Rows that a fit needs beyond its numbers.
@@ -55,109 +58,8 @@ pub struct Question {
     pub noise: Option<Noise>,
     /// Level of the intervals.
     pub level: f64,
-}
-
-/// The answer.
-#[derive(Debug, Clone)]
-pub struct Family {
-    /// Whether it holds.
-    pub verdict: Verdict,
-    /// One for each class, the least BIC first.
-    pub candidates: Vec<Candidate>,
-    /// Intervals over the classes within reach.
-    pub hull: Vec<Named>,
-    /// Are commands taken as straight, and is that known?
-    pub straight: bool,
-    /// Was it known or decided?
-    pub decided: bool,
-    /// Was the plant taken to be at rest at the first row?
-    pub at_rest: bool,
-    /// Rows that count.
-    pub rows: usize,
-    /// The first of them in each record.
-    pub first_rows: Vec<usize>,
-    /// Rows by which the command was moved, above 0 to later ones.
-    pub shift: i64,
-    /// Frequencies at which the command has power, rad/s.
-    pub excited: Vec<f64>,
-    /// The largest delay that may be, that was tried in the end, and one over the noise of each record.
-    largest_delay: f64,
-    room: f64,
-    weights: Vec<f64>,
-    minima: Vec<Candidate>,
-}
-
-impl Family {
-    /// Classes that are not hopeless, with their numbers.
-    fn seeds(&self) -> Vec<(Class, Numbers)> {
-        let best = self.candidates.first().map_or(0.0, |best| best.bic);
-        let own = self.candidates.iter();
-        own.filter(|one| one.bic <= best + EVIDENCE.hopeless)
-            .map(|one| (one.class, one.numbers))
-            .collect()
-    }
-
-    /// The candidates that so many rows may leave: of more rows than these, some that are further behind,
-    /// for what a number adds to the likelihood grows with the rows.
-    fn worth_refining(&self, rows: usize) -> Vec<Candidate> {
-        let best = self.candidates.first().map_or(0.0, |best| best.bic);
-        let more = (rows as f64 / self.rows.max(1) as f64).max(1.0);
-        let reach = (EVIDENCE.reach * more).min(EVIDENCE.hopeless);
-        let mut out = self.minima.clone();
-        for one in &self.candidates {
-            if one.bic <= best + reach && out.iter().all(|known| known.class != one.class) {
-                out.push(one.clone());
-            }
-        }
-        out
-    }
-
-    /// Gain, phase and equivalent delay at frequencies, each with its ends.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`] and [`Error::Memory`].
-    pub fn at(&self, omega: &[f64], level: f64, task: &Task) -> Result<Vec<[Triple; 3]>, Error> {
-        let minima = self.minima_at(level)?;
-        let turning = turning(&minima, task)?;
-        Ok(omega.iter().map(|omega| at(&turning, *omega)).collect())
-    }
-
-    /// The mean equivalent delay over frequencies, rad/s, with weights that add up to one, and its ends.
-    ///
-    /// # Errors
-    /// As of [`Family::at`].
-    pub fn mean_delay(
-        &self,
-        omega: &[f64],
-        weight: &[f64],
-        level: f64,
-        task: &Task,
-    ) -> Result<Triple, Error> {
-        let minima = self.minima_at(level)?;
-        Ok(mean_delay(&turning(&minima, task)?, omega, weight))
-    }
-
-    /// The intervals at another level.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for a level not between 0 and 1, [`Error::Interrupted`], [`Error::Memory`].
-    pub fn hull_at(&self, level: f64, task: &Task) -> Result<Vec<Named>, Error> {
-        let minima = self.minima_at(level)?;
-        Ok(hull(&turning(&minima, task)?, self.largest_delay))
-    }
-
-    fn minima_at(&self, level: f64) -> Result<Vec<Candidate>, Error> {
-        check_level(level)?;
-        Ok(self.minima.iter().map(|one| one.at_level(level)).collect())
-    }
-}
-
-fn check_level(level: f64) -> Result<(), Error> {
-    refuse_if!(
-        !(level > 0.0 && level < 1.0),
-        "level {level}: give one between 0 and 1"
-    );
-    Ok(())
+    /// Is what the plant lacks looked for?
+    pub causes: bool,
 }
 
 /// Fit the family to records of one plant, each with its own start, level and size of noise.
@@ -165,6 +67,20 @@ fn check_level(level: f64) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Argument`] for numbers out of range or too few rows, and as a task ends.
 pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Result<Family, Error> {
+    if !question.causes {
+        return of_readings(records, question, task);
+    }
+    let read = records.iter().enumerate();
+    let (read, faults): (Vec<_>, Vec<_>) = read
+        .map(|(place, record)| without_faults(record, place))
+        .unzip();
+    let mut out = of_readings(&read, question, task)?;
+    out.sensor = faults.concat();
+    Ok(out)
+}
+
+/// Fit the family to records whose outputs are readings.
+fn of_readings(records: &[Record], question: &Question, task: &Task) -> Result<Family, Error> {
     let starts = starts_of(records, question)?;
     let shortest = shortest(records);
     if let Some(delay) = question.largest_delay {
@@ -406,6 +322,7 @@ fn one_kind(
             begun: &begun,
             noises: &[Noise::White],
             seeds: &[],
+            grids: true,
         };
         let found = minima(&white, task)?;
         (room, seeds, weights) = (largest, seeds_of(&found), weights_of(&found));
@@ -419,6 +336,9 @@ fn one_kind(
             rows = Rows::new(records, starts, room, straight, question.in_loop);
         }
         rows.weights.clone_from(&weights);
+        // What rows leave open of a command imitates causes.
+        let open = straight && records.iter().any(|record| record.sent.is_some());
+        rows.flexible = question.causes && !open;
         let thin = rows.thinned(STARTS.thin);
         let plan = Plan {
             rows: &rows,
@@ -427,6 +347,7 @@ fn one_kind(
             begun: &begun,
             noises: &noises,
             seeds: &seeds,
+            grids: true,
         };
         let found = minima(&plan, task)?;
         // Coloured noise may need a longer delay than the white noise of the first pass.
@@ -442,7 +363,11 @@ fn one_kind(
             continue;
         }
         let silent = without_plant(&plan, task)?;
-        let mut out = answer(&found, silent, question, largest, task)?;
+        let answered = |found: &[Minimum<'_>]| answer(found, silent, question, largest, task);
+        let mut out = answered(&found)?;
+        if rows.flexible {
+            out = with_causes(out, &plan, &found, &answered, task)?;
+        }
         (out.room, out.weights) = (room, weights);
         return Ok(out);
     }
@@ -451,12 +376,6 @@ fn one_kind(
 /// Most times that records are weighted anew, and the change of a weight that asks for it.
 const REWEIGHTED: usize = 2;
 const CHANGED: f64 = 0.1;
-
-/// Classes and numbers of minima.
-fn seeds_of(found: &[Minimum<'_>]) -> Vec<(Class, Numbers)> {
-    let numbers = |one: &Minimum<'_>| (one.model.class, one.model.numbers(&one.point.x));
-    found.iter().map(numbers).collect()
-}
 
 /// One over the noise of each record, as the best class leaves it; one record has the weight 1.
 fn weights_of(found: &[Minimum<'_>]) -> Vec<f64> {
@@ -513,15 +432,22 @@ fn answer(
     let rows = found.first().map(|best| best.model.rows);
     let excited = rows.map_or(Vec::new(), excited);
     let is_sine = rows.is_some_and(|rows| is_one_sine(rows, &excited));
-    let candidate = |one: &Minimum<'_>| {
-        let mut out = Candidate::new(one, question.level);
+    let made = |one: &Minimum<'_>, may_be_wrong: bool| {
+        let mut out = Candidate::new(one, question.level, may_be_wrong);
         if is_sine {
             out.told = out.told.min(TOLD_BY_SINE);
         }
         out
     };
-    let all: Vec<Candidate> = found.iter().map(candidate).collect();
-    let mut minima: Vec<Candidate> = chosen(&all, within_reach(found));
+    let all: Vec<Candidate> = found.iter().map(|one| made(one, false)).collect();
+    let reached = within_reach(found).into_iter().map(|at| {
+        if rows.is_some_and(|rows| rows.flexible) {
+            made(&found[at], true)
+        } else {
+            all[at].clone()
+        }
+    });
+    let mut minima: Vec<Candidate> = reached.collect();
     // What is further behind in BIC, though more likely, counts where the record tells all of it.
     let reach = minima.first().map_or(0.0, |best| best.bic) + EVIDENCE.reach;
     minima.retain(|one| one.bic <= reach || one.told == one.values.len());
@@ -550,6 +476,9 @@ fn answer(
         first_rows: parts.iter().filter_map(first).collect(),
         shift: 0,
         excited,
+        causes: Vec::new(),
+        rivals: Vec::new(),
+        sensor: Vec::new(),
         largest_delay,
         room: largest_delay,
         weights: Vec::new(),

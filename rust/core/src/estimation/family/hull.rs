@@ -220,13 +220,7 @@ pub(super) fn hull(all: &[Turning<'_>], largest_delay: f64) -> Vec<Named> {
     let times = same().map(|one| one.candidate.interval(|seen| seen.numbers.low_delay()));
     out.push(Named::new("delay+lag", times.collect()));
     if let Some(largest) = best.candidate.numbers.lags().first() {
-        let lag = |seen: &Seen| {
-            seen.numbers
-                .lags()
-                .first()
-                .copied()
-                .unwrap_or(0.5 * seen.numbers.sum)
-        };
+        let lag = |seen: &Seen| seen.numbers.lag();
         let real = same().filter(|one| !one.candidate.numbers.lags().is_empty());
         let lags = real.map(|one| one.candidate.interval(lag)).collect();
         let mut lag = Named::new("lag", lags).within(f64::INFINITY);

@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use super::class::{Class, Numbers};
+use super::series::{Series, TERMS};
 use crate::elementary::{angle, exp, log};
 use crate::frequency::margins;
 use crate::quasipoly::QuasiPolynomial;
@@ -28,17 +29,24 @@ pub(super) struct Seen {
     pub(super) class: Class,
     pub(super) gain: f64,
     pub(super) numbers: Numbers,
+    /// What the command explains beside it.
+    pub(super) series: Option<Series>,
 }
 
 impl Seen {
-    /// How many numbers vary: ln gain, delay, ln of those of the lags, zero.
-    pub(super) fn count(&self) -> usize {
+    /// How many numbers of the plant vary: ln gain, delay, ln of those of the lags, zero.
+    pub(super) fn own(&self) -> usize {
         1 + self.class.searched()
+    }
+
+    /// How many numbers vary, with those of the series.
+    pub(super) fn count(&self) -> usize {
+        self.own() + self.series.map_or(0, |_| TERMS)
     }
 
     /// The scale of each of them.
     pub(super) fn scale(&self, at: usize, row: f64) -> f64 {
-        let is_zero = self.class.has_zero && at + 1 == self.count();
+        let is_zero = self.class.has_zero && at + 1 == self.own();
         match at {
             1 => self.numbers.delay + self.numbers.sum + row,
             _ if is_zero => self.numbers.zero.abs().max(self.numbers.sum),
@@ -48,7 +56,13 @@ impl Seen {
 
     /// With one of them moved.
     pub(super) fn moved(mut self, at: usize, step: f64) -> Self {
-        let is_zero = self.class.has_zero && at + 1 == self.count();
+        let is_zero = self.class.has_zero && at + 1 == self.own();
+        if let Some(place) = at.checked_sub(self.own()) {
+            if let Some(series) = &mut self.series {
+                series.factors[place] += step;
+            }
+            return self;
+        }
         match at {
             0 => self.gain *= exp(step),
             1 => self.numbers.delay += step,
@@ -71,7 +85,9 @@ impl Seen {
         } else {
             0.0
         };
-        log(self.gain.abs()) + 0.5 * (log(1.0 + square(zero * omega)) - log(poles)) - integrator
+        let error = self.series.map_or(0.0, |series| series.log_gain(omega));
+        error + log(self.gain.abs()) + 0.5 * (log(1.0 + square(zero * omega)) - log(poles))
+            - integrator
     }
 
     /// The gain is that at ω = 0, and may be negative where that at crossover is not.
@@ -88,7 +104,8 @@ impl Seen {
             zero,
         } = self.numbers;
         let poles = angle(sum * omega, 1.0 - product * omega * omega);
-        angle(zero * omega, 1.0) - poles - delay * omega - self.turns()
+        let error = self.series.map_or(0.0, |series| series.phase(omega));
+        error + angle(zero * omega, 1.0) - poles - delay * omega - self.turns()
     }
 
     pub(super) fn turns(&self) -> f64 {

@@ -58,6 +58,8 @@ pub(super) struct Plan<'a> {
     pub(super) noises: &'a [Noise],
     /// Numbers of minima that are known; a grid takes the place of those of a class that has none.
     pub(super) seeds: &'a [(Class, Numbers)],
+    /// Are grids searched where noise is coloured?
+    pub(super) grids: bool,
 }
 
 /// The minima of all classes, best first; each class under the noise that suits it best.
@@ -265,7 +267,7 @@ fn under<'a>(
             responds: true,
             level: true,
         };
-        let mut starts = if kind == Noise::Arma11 {
+        let mut starts = if kind == Noise::Arma11 && plan.grids {
             grid(&on(plan.thin, &model), task)?
         } else {
             Vec::new()
@@ -276,9 +278,18 @@ fn under<'a>(
         };
         for known in own.filter(hopeful) {
             let plant = known.model.plant_numbers();
-            let mut x = known.point.x[..plant].to_vec();
-            x.extend(noise(&model, &known.point, &known.point.x[plant..]));
-            starts.push(x);
+            let (numbers, own) = known.point.x.split_at(plant);
+            // A number at its limit is left by no step: a start without it stands beside.
+            let begins = if own.is_empty() {
+                vec![own]
+            } else {
+                vec![own, &[]]
+            };
+            for own in begins {
+                let mut x = numbers.to_vec();
+                x.extend(noise(&model, &known.point, own));
+                starts.push(x);
+            }
         }
         // The best of those that it contains, under this noise.
         let contained = all.iter().filter_map(|known: &Minimum<'a>| {
@@ -290,9 +301,18 @@ fn under<'a>(
         });
         let contained = contained.min_by(|a, b| a.0.total_cmp(&b.0));
         starts.extend(contained.map(|(_, x)| x));
-        // Richer noise makes no class less likely.
-        let best = most_likely(&all).min(most_likely(before));
-        all.extend(distinct(&model, starts, (STARTS.refined, best), task)?);
+        // Richer noise makes no class less likely; the richest may begin far from where it ends.
+        let best = if kind == Noise::Arma22 {
+            most_likely(&all)
+        } else {
+            most_likely(&all).min(most_likely(before))
+        };
+        let follow = if kind == Noise::Arma22 {
+            STARTS.coloured
+        } else {
+            STARTS.refined
+        };
+        all.extend(distinct(&model, starts, (follow, best), task)?);
     }
     Ok(all)
 }
@@ -320,4 +340,10 @@ pub(super) fn without_plant<'a>(plan: &Plan<'a>, task: &Task) -> Result<f64, Err
         least = least.min(found.bic);
     }
     Ok(least)
+}
+
+/// Classes and numbers of minima.
+pub(super) fn seeds_of(found: &[Minimum<'_>]) -> Vec<(Class, Numbers)> {
+    let numbers = |one: &Minimum<'_>| (one.model.class, one.model.numbers(&one.point.x));
+    found.iter().map(numbers).collect()
 }

@@ -9,10 +9,15 @@
 //! count, `response` is exact, `model` the likelihood of one class under one `noise`, `search` its
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
-//! leave open, `hull` intervals over all classes within reach, `verdict` what is claimed.
+//! leave open, `causes` what a linear plant lacks,
+//! `sensors` which readings are none, `series` the error of a class, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
+mod answer;
+mod aside;
 mod between;
 mod candidate;
+mod cause;
+mod causes;
 mod class;
 mod dispersion;
 mod excitation;
@@ -27,14 +32,19 @@ mod refine;
 mod response;
 mod rows;
 mod search;
+mod sensors;
+mod series;
 mod starts;
 mod tolerances;
 mod verdict;
 
+pub use answer::Family;
 pub use candidate::Candidate;
+pub use cause::{Cause, CauseKind};
 pub use class::{Class, Numbers};
-pub use fit::{Between, Family, Question, fit_family, refine_family};
+pub use fit::{Between, Question, fit_family, refine_family};
 pub use hull::{Named, Triple};
 pub use noise::{Coefficients, Noise};
 pub use rows::Record;
+pub use sensors::{SensorFault, SensorKind};
 pub use verdict::{Grade, Verdict};

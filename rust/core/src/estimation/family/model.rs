@@ -41,8 +41,22 @@ pub(super) struct Point {
     /// Output less model.
     pub(super) residual: Vec<f64>,
     response: Response,
+    /// Of each cause.
+    asides: Vec<Response>,
     free: Vec<Column>,
-    projection: Projection,
+    pub(super) projection: Projection,
+}
+
+impl Point {
+    /// The speed of the output of unit gain at the rows of a record.
+    pub(super) fn speed(&self, place: std::ops::Range<usize>) -> impl Iterator<Item = f64> {
+        self.response.by_delay[place].iter().map(|slope| -slope)
+    }
+
+    /// Factors of the causes, in units of the output.
+    pub(super) fn of_causes(&self) -> &[f64] {
+        &self.linear[..self.asides.len()]
+    }
 }
 
 impl Model<'_> {
@@ -70,7 +84,9 @@ impl Model<'_> {
             free + 1
         };
         let own: usize = self.rows.parts.iter().map(own).sum();
-        self.searched() + usize::from(self.responds) + own
+        let causes = self.rows.causes.iter().map(|cause| cause.parameters());
+        let causes: usize = if self.responds { causes.sum() } else { 0 };
+        self.searched() + usize::from(self.responds) + own + causes
     }
 
     pub(super) fn numbers(&self, x: &[f64]) -> Numbers {
@@ -177,6 +193,22 @@ impl Model<'_> {
         out
     }
 
+    /// What each cause adds, times one.
+    fn asides(&self, numbers: &Numbers) -> Vec<Response> {
+        let of_one = |at: usize| {
+            let mut out = Response::default();
+            for part in &self.rows.parts {
+                out.append(part.asides[at].as_ref().map_or_else(
+                    || Response::zero(part.used.len()),
+                    |aside| aside.response(part, self.class, numbers),
+                ));
+            }
+            out
+        };
+        let columns = self.rows.causes.iter().map(|cause| cause.columns());
+        (0..columns.sum()).map(of_one).collect()
+    }
+
     /// The output, less its mean where a level is free.
     fn output(&self) -> Vec<f64> {
         let has_level = self.level || self.class.integrating;
@@ -208,7 +240,7 @@ impl Model<'_> {
         }
     }
 
-    fn whitener(&self, x: &[f64]) -> Whiteners<'_> {
+    pub(super) fn whitener(&self, x: &[f64]) -> Whiteners<'_> {
         self.whiteners(&x[self.plant_numbers()..])
     }
 
@@ -233,13 +265,15 @@ impl Model<'_> {
     /// The likelihood at a point.
     pub(super) fn at(&self, x: Vec<f64>) -> Point {
         let numbers = self.numbers(&x);
-        let (response, free) = if self.responds {
-            (self.response(&numbers), self.free(&numbers))
+        let (response, asides, free) = if self.responds {
+            let (own, free) = (self.response(&numbers), self.free(&numbers));
+            (own, self.asides(&numbers), free)
         } else {
-            (Response::default(), Vec::new())
+            (Response::default(), Vec::new(), Vec::new())
         };
         let whitener = self.whitener(&x);
-        let mut raw = self.beside(&free);
+        let mut raw: Vec<Column> = asides.iter().map(|own| own.value.clone().into()).collect();
+        raw.extend(self.beside(&free));
         if self.responds {
             raw.push(response.value.clone().into());
         }
@@ -261,6 +295,7 @@ impl Model<'_> {
             whitened: left,
             residual,
             response,
+            asides,
             free,
             projection,
         }
@@ -318,19 +353,28 @@ impl Model<'_> {
         columns
     }
 
+    /// What the command and the causes explain at a point, from responses times one.
+    fn explained(&self, point: &Point, response: &Response, asides: &[Response]) -> Response {
+        let mut out = Response::zero(response.value.len());
+        out.add(self.gain(point), response);
+        for (factor, aside) in point.of_causes().iter().zip(asides) {
+            out.add(*factor, aside);
+        }
+        out
+    }
+
     /// Derivatives of the model's output with respect to the numbers of the plant.
     fn raw_slopes(&self, point: &Point) -> Vec<Vec<f64>> {
-        let gain = self.gain(point);
-        let scaled = |column: &[f64]| column.iter().map(|entry| gain * entry).collect();
-        let mut columns: Vec<Vec<f64>> = vec![scaled(&point.response.by_delay)];
+        let own = self.explained(point, &point.response, &point.asides);
+        let mut columns: Vec<Vec<f64>> = vec![own.by_delay];
         for at in 1..=self.class.order {
             let mut x = point.x.clone();
             x[at] += SEARCH.step;
             let numbers = self.numbers(&x);
-            let after = self.response(&numbers);
+            let after = self.explained(point, &self.response(&numbers), &self.asides(&numbers));
             let mut change = vec![0.0; after.value.len()];
-            add_multiple(&mut change, gain / SEARCH.step, &after.value);
-            add_multiple(&mut change, -gain / SEARCH.step, &point.response.value);
+            add_multiple(&mut change, 1.0 / SEARCH.step, &after.value);
+            add_multiple(&mut change, -1.0 / SEARCH.step, &own.value);
             if !point.free.is_empty() {
                 let places = point.linear.len() - 1 - point.free.len()..;
                 let later = self.free(&numbers);
@@ -344,43 +388,69 @@ impl Model<'_> {
             columns.push(change);
         }
         if self.class.has_zero {
-            columns.push(scaled(&point.response.by_zero));
+            columns.push(own.by_zero);
         }
         columns
     }
 
-    /// Take what the linear numbers explain, apart from the gain, from the slopes of the plant's
-    /// numbers: ln gain, delay, those of the lags, zero.
-    pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
+    /// The standard error of the factor of a cause, beside all other numbers.
+    pub(super) fn error_of_cause(&self, point: &Point, at: usize) -> f64 {
         let whitener = self.whitener(&point.x);
-        let beside = self.beside(&point.free);
-        let nuisance = Projection::new(beside.iter().map(|column| whitener.column(column)));
+        let mut others = self.beside(&point.free);
+        let asides = point.asides.iter().enumerate();
+        let asides = asides.filter(|(own, _)| *own != at);
+        others.extend(asides.map(|(_, own)| own.value.clone().into()));
+        others.push(point.response.value.clone().into());
+        others.extend(self.raw_slopes(point).into_iter().map(Column::from));
+        let mut own = whitener.whiten(&point.asides[at].value);
+        Projection::new(others.iter().map(|column| whitener.column(column))).taken(&mut own);
+        let free = self.rows.count().saturating_sub(self.parameters()).max(1);
+        (point.squares / (free as f64 * dot(&own, &own))).sqrt()
+    }
+
+    /// What the command explains of the output.
+    pub(super) fn commanded(&self, point: &Point) -> Vec<f64> {
         let gain = self.gain(point);
-        let by_gain = point
+        point
             .response
             .value
             .iter()
             .map(|entry| gain * entry)
-            .collect();
-        std::iter::once(by_gain)
-            .chain(self.raw_slopes(point))
-            .map(|raw: Vec<f64>| {
-                let mut column = whitener.whiten(&raw);
+            .collect()
+    }
+
+    /// Whitened columns without what the linear numbers explain, apart from the gain.
+    pub(super) fn beside_linear(&self, point: &Point, raw: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let whitener = self.whitener(&point.x);
+        let asides = point.asides.iter().map(|own| own.value.clone().into());
+        let beside = asides.chain(self.beside(&point.free));
+        let nuisance = Projection::new(beside.map(|column| whitener.column(&column)));
+        raw.iter()
+            .map(|raw| {
+                let mut column = whitener.whiten(raw);
                 nuisance.taken(&mut column);
                 column
             })
             .collect()
     }
+
+    /// The slopes of the plant's numbers without what the other linear numbers explain: ln gain, delay,
+    /// those of the lags, zero.
+    pub(super) fn sensitivities(&self, point: &Point) -> Vec<Vec<f64>> {
+        let mut raw = vec![self.commanded(point)];
+        raw.extend(self.raw_slopes(point));
+        self.beside_linear(point, raw)
+    }
 }
 
 /// The whiteners of all records.
-struct Whiteners<'a> {
+pub(super) struct Whiteners<'a> {
     own: Vec<Whitener<'a>>,
     places: Vec<std::ops::Range<usize>>,
 }
 
 impl Whiteners<'_> {
-    fn whiten(&self, column: &[f64]) -> Vec<f64> {
+    pub(super) fn whiten(&self, column: &[f64]) -> Vec<f64> {
         if let [own] = &self.own[..] {
             return own.whiten(column);
         }

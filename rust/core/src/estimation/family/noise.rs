@@ -59,15 +59,17 @@ impl Noise {
     /// Coefficients of the autoregression and the moving average.
     pub(super) fn coefficients(self, x: &[f64]) -> Coefficients {
         let bounded = |x: f64, limit: f64| limit * x / (1.0 + x * x).sqrt();
-        let (memory, averaging) = (RANGES.memory, RANGES.averaging);
+        let memory = RANGES.memory;
+        // A root near −1 is that of a filter; one near 1 fits away the offset.
+        let averaged = |x: f64| bounded(x, if x > 0.0 { memory } else { RANGES.averaging });
         match (self, x) {
             (Self::Arma11, [ar, ma]) => Coefficients {
                 ar: [bounded(*ar, memory), 0.0],
-                ma: [bounded(*ma, averaging), 0.0],
+                ma: [averaged(*ma), 0.0],
             },
             (Self::Arma22, [a, b, c, d]) => {
                 let [a, b] = [bounded(*a, memory), bounded(*b, memory)];
-                let [c, d] = [bounded(*c, averaging), bounded(*d, averaging)];
+                let [c, d] = [averaged(*c), averaged(*d)];
                 Coefficients {
                     ar: [a * (1.0 - b), b],
                     ma: [c * (1.0 + d), d],

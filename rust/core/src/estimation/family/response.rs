@@ -6,9 +6,11 @@
 //!     ∫ v = ∫ u − q Δv′ − p Δv.
 //! Both hold for one lag with q = 0. Values at a row are those just before it.
 
+use super::aside::{Aside, Signal};
 use super::class::{Class, Numbers};
 use super::rows::Part;
 use crate::elementary::{exp, sin_cos};
+use crate::linear_algebra::vectors::add_multiple;
 
 /// Two steps closer than this share of a row are one, and their transition is computed once.
 const SAME_STEP: f64 = 1e-9;
@@ -27,6 +29,22 @@ pub(super) struct Response {
 }
 
 impl Response {
+    /// None at so many rows.
+    pub(super) fn zero(rows: usize) -> Self {
+        Self {
+            value: vec![0.0; rows],
+            by_delay: vec![0.0; rows],
+            by_zero: vec![0.0; rows],
+        }
+    }
+
+    /// With another one, times a factor, added.
+    pub(super) fn add(&mut self, factor: f64, other: &Self) {
+        add_multiple(&mut self.value, factor, &other.value);
+        add_multiple(&mut self.by_delay, factor, &other.by_delay);
+        add_multiple(&mut self.by_zero, factor, &other.by_zero);
+    }
+
     /// With that of the next record behind it.
     pub(super) fn append(&mut self, mut next: Self) {
         self.value.append(&mut next.value);
@@ -237,6 +255,51 @@ fn response_to(
         state.record(&mut out);
     }
     out
+}
+
+impl Signal {
+    fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
+        let first = self.value.first().copied().unwrap_or(0.0);
+        let value: Vec<f64> = self.value.iter().map(|own| own - first).collect();
+        response_to(&self.sent, &value, self.straight, part, class, numbers)
+    }
+}
+
+impl Aside {
+    /// What it adds to the output, times one.
+    pub(super) fn response(&self, part: &Part, class: Class, numbers: &Numbers) -> Response {
+        match self {
+            Self::Input {
+                sent,
+                value,
+                straight,
+            } => response_to(sent, value, *straight, part, class, numbers),
+            Self::Difference(one, other, factor) => {
+                let mut out = Response::zero(part.used.len());
+                for (signal, factor) in [(one, *factor), (other, -factor)] {
+                    out.add(factor, &signal.response(part, class, numbers));
+                }
+                out
+            }
+            Self::Step(from) => {
+                let mut out = Response::zero(part.used.len());
+                for (value, row) in out.value.iter_mut().zip(&part.used) {
+                    *value = f64::from(u8::from(part.time[*row] >= *from));
+                }
+                out
+            }
+            Self::Later(from) => {
+                let mut out = response(part, class, numbers);
+                for (value, row) in out.by_delay.iter_mut().zip(&part.used) {
+                    *value *= if part.time[*row] >= *from { 0.5 } else { -0.5 };
+                }
+                out.value = out.by_delay;
+                let none = Response::zero(out.value.len());
+                (out.by_delay, out.by_zero) = (none.by_delay, none.by_zero);
+                out
+            }
+        }
+    }
 }
 
 /// The free responses of the lags from the first row that is used on, one column a state.

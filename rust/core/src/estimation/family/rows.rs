@@ -1,5 +1,7 @@
 //! The rows of a record as the family uses them: which count, and where the command is known.
 
+use super::aside::Aside;
+use super::cause::CauseKind;
 use super::tolerances::{REST, SEARCH};
 use crate::Error;
 
@@ -202,6 +204,8 @@ pub(super) struct Part {
     /// Residuals are never taken for smaller than this: rounding of the output.
     pub(super) rounding: f64,
     pub(super) start: Start,
+    /// What each cause of the rows adds here.
+    pub(super) asides: Vec<Option<Aside>>,
 }
 
 impl Part {
@@ -229,6 +233,7 @@ impl Part {
             mean: 0.0,
             rounding: 0.0,
             start,
+            asides: Vec::new(),
         };
         let count = out.used.len().max(1) as f64;
         out.mean = out.used.iter().map(|at| record.output[*at]).sum::<f64>() / count;
@@ -289,6 +294,10 @@ pub(super) struct Rows {
     pub(super) span: f64,
     pub(super) largest_delay: f64,
     pub(super) in_loop: bool,
+    /// What is fitted beside the plant.
+    pub(super) causes: Vec<CauseKind>,
+    /// May the class be in error?
+    pub(super) flexible: bool,
 }
 
 impl Rows {
@@ -312,6 +321,8 @@ impl Rows {
             span: parts.iter().fold(0.0, |span, part| part.span.max(span)),
             largest_delay,
             in_loop,
+            causes: Vec::new(),
+            flexible: false,
             parts,
         }
     }

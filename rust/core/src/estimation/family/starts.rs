@@ -144,6 +144,8 @@ fn lagged(model: &Model<'_>, numbers: &Numbers) -> [Numbers; 2] {
 pub(super) fn noise(model: &Model<'_>, from: &Point, known: &[f64]) -> Vec<f64> {
     const CORRELATIONS: [f64; 3] = [0.3, 1.5, 4.0];
     const AVERAGES: [f64; 2] = [0.0, -0.5];
+    // Noise that is integrated twice, or a wave.
+    const RESONANT: f64 = -2.0;
     let mut candidates: Vec<Vec<f64>> = Vec::new();
     for ar in CORRELATIONS {
         for ma in AVERAGES {
@@ -152,6 +154,9 @@ pub(super) fn noise(model: &Model<'_>, from: &Point, known: &[f64]) -> Vec<f64> 
                 1 => vec![ar, ma],
                 _ => vec![ar, 0.0, ma, 0.0],
             });
+        }
+        if model.noise.order() == 2 {
+            candidates.push(vec![ar, RESONANT, 0.0, 0.0]);
         }
     }
     if let [ar, ma] = known

@@ -84,6 +84,8 @@ pub(super) struct Starts {
     pub(super) followed: usize,
     /// The same where minima of the class are known.
     pub(super) refined: usize,
+    /// The same under the richest noise, whose numbers may begin at a limit.
+    pub(super) coloured: usize,
     /// Minima of a class that are kept.
     pub(super) kept: usize,
     /// All of these for a class without lags, whose delays may be periods of the command apart.
@@ -102,6 +104,7 @@ pub(super) const STARTS: Starts = Starts {
     gridded: 2,
     followed: 4,
     refined: 3,
+    coloured: 5,
     kept: 2,
     delays_only: 8,
     thin: 400,
@@ -193,4 +196,129 @@ pub(super) const BLOCKS: Blocks = Blocks {
     prior: 2.0,
     most_leverage: 0.98,
     jackknife: 0.5,
+};
+
+/// Causes beside the plant.
+pub(super) struct Causes {
+    /// Classes beside which causes are scored: more see causes that a flexible plant hides, and take longer.
+    pub(super) classes: usize,
+    /// Share of a column that is its own, below which the plant says the same.
+    pub(super) own: f64,
+    /// Least of the squares that one column leaves, as a share.
+    pub(super) least: f64,
+    /// Least factor of a cause whose size is tried: less takes for one what is of another size.
+    pub(super) share: f64,
+    /// Beginnings of a load that are tried first, and how near to the best one others are tried, in rows.
+    pub(super) beginnings: usize,
+    pub(super) fine: f64,
+    /// The same where the plant is searched beside each.
+    pub(super) near: f64,
+    /// Rows before a beginning and after it.
+    pub(super) margin: usize,
+    /// Causes that are fitted: more find what the score takes for another, and take longer.
+    pub(super) followed: usize,
+    /// How often a gain that changes follows the plant that was found with it.
+    pub(super) rounds: usize,
+    /// Steps to the size of a cause, and the change of it, as a share, that ends them.
+    pub(super) refined: usize,
+    pub(super) settled: f64,
+    /// BIC by which a cause has to lead: less names what is not there.
+    pub(super) adopted: f64,
+    /// BIC by which it leads where the plant without it is ruled out: more widens intervals.
+    pub(super) certain: f64,
+    /// The same for a further one, as a share of the lead of the first: less takes for a second cause what
+    /// is wrong with the first.
+    pub(super) further: f64,
+    /// Share of the record within which a second load is the first one.
+    pub(super) apart: f64,
+    /// Fall of −2 ln L by a second load, as a share of that by the first, from which on both are a
+    /// disturbance: more takes wind for a load.
+    pub(super) again: f64,
+    /// Sizes of what sticks that are tried between two of the first.
+    pub(super) between: usize,
+    /// Standard errors from zero that a cause has to be.
+    pub(super) sure: f64,
+    /// Numbers of causes beside one plant: more than these are not looked for.
+    pub(super) most: usize,
+}
+
+pub(super) const CAUSES: Causes = Causes {
+    classes: 3,
+    own: 1e-8,
+    least: 1e-9,
+    share: 0.25,
+    beginnings: 48,
+    fine: 0.25,
+    near: 0.02,
+    margin: 8,
+    followed: 4,
+    rounds: 1,
+    refined: 8,
+    settled: 0.002,
+    adopted: 6.0,
+    certain: 40.0,
+    further: 0.04,
+    apart: 0.1,
+    again: 0.3,
+    between: 8,
+    sure: 3.0,
+    most: 3,
+};
+
+/// Readings that are no readings.
+pub(super) struct Sensors {
+    /// Fewest readings that show how a sensor reads.
+    pub(super) fewest: usize,
+    /// Steps of the sensor that readings usually move by, where equal ones are no readings: less takes a
+    /// coarse sensor for one that repeats.
+    pub(super) coarse: f64,
+    /// Equal readings in multiples of those by chance, and beyond them, from which on all are repeats.
+    pub(super) excess: f64,
+    pub(super) few: f64,
+    /// Runs of equal readings by chance in a record, above which they are repeats.
+    pub(super) chance: f64,
+    /// Rows, and multiples of the usual repeat, from which on a reading is frozen.
+    pub(super) frozen: f64,
+    pub(super) longer: f64,
+    /// Most rows of a glitch, how many steps before and after it are looked at, and multiples of the largest
+    /// of these by which a glitch leaves and comes back: less takes motion for one.
+    pub(super) longest: usize,
+    pub(super) around: usize,
+    pub(super) far: f64,
+}
+
+pub(super) const SENSORS: Sensors = Sensors {
+    fewest: 40,
+    coarse: 3.0,
+    excess: 3.0,
+    few: 10.0,
+    chance: 1e-3,
+    frozen: 6.0,
+    longer: 4.0,
+    longest: 5,
+    around: 6,
+    far: 3.0,
+};
+
+/// The series that stands for a plant's error.
+pub(super) struct Flexible {
+    /// Its pole in multiples of one over the delay and lags: more sees errors at higher frequencies.
+    pub(super) pole: f64,
+    /// Half of the angle of a row from which on it stays as it is, below π/2.
+    pub(super) highest: f64,
+    /// Deviations of its factors that are tried: the least, the largest, how many.
+    pub(super) least: f64,
+    pub(super) most: f64,
+    pub(super) sizes: usize,
+    /// Fall of −2 ln L from which on a series is taken: more is narrower.
+    pub(super) fall: f64,
+}
+
+pub(super) const SERIES: Flexible = Flexible {
+    pole: 2.0,
+    highest: 1.5,
+    least: 1e-3,
+    most: 1.0,
+    sizes: 25,
+    fall: 0.0,
 };

@@ -17,7 +17,8 @@
 //! Everything is computed in double-double arithmetic: Φ − I and Γ by Taylor's series of a 2^q-th
 //! part of the time and q doublings, as in `dde::propagator`. The errors, below `ROUGHNESS` of the
 //! same recursion with moduli (entries of M enlarged by a share of the largest, for the errors of
-//! the series), are compared with the polynomials themselves: `coefficients` of `Hold`.
+//! the series), are compared with the polynomials themselves: `coefficients` of `Hold`. Over an
+//! interval of a number the same formulas give polynomials that enclose all of it (`Enclosed`).
 
 use crate::Error;
 use crate::dde::control_loop::sampled::Timing;
@@ -26,22 +27,14 @@ use crate::elementary::DoubleDouble;
 use crate::linear_algebra::balance::balanced;
 use crate::stability::crossings::sizes;
 
+use super::step::{Coefficient, Step, identity, joined, times};
+
 /// Bound on the errors in double-double arithmetic, relative to sums of moduli: some thousand
 /// roundings of 2⁻¹⁰⁴ each, and doublings that enlarge them.
 const ROUGHNESS: f64 = 1e-25;
 
 /// Share of the largest entry of M that is added to the modulus of each.
 const SPREAD: f64 = 1e-4;
-
-/// Largest norm of A times a step for which the series is summed without doubling, and the size,
-/// relative to the first term, of those that are left out, as the 27th with this norm is: 0.5²⁶/27! =
-/// 1.4e-36.
-const REACH: f64 = 0.5;
-const LEFT_OUT: f64 = 2e-36;
-const MOST_TERMS: u32 = 27;
-
-/// Upper limit on the doublings.
-const MOST_DOUBLINGS: i32 = 1000;
 
 /// Upper limit on the states: the recursion loses digits with each.
 const MOST_STATES: usize = 24;
@@ -50,10 +43,6 @@ const MOST_STATES: usize = 24;
 /// units of one over the sample time, for |z| ≤ 1.
 const LEAST: f64 = 1.0 / 64.0;
 const LARGEST: f64 = 4.0;
-
-type Matrix = Vec<DoubleDouble>;
-
-const ZERO: DoubleDouble = DoubleDouble::new(0.0, 0.0);
 
 /// A polynomial in σ with bounds on the sums of moduli that its coefficients come from.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -64,23 +53,17 @@ pub(super) struct Polynomial {
 
 /// What the polynomials of a loop with any feedback follow from.
 #[derive(Debug, Clone)]
-pub(super) struct LoopPolynomials {
+pub(super) struct LoopPolynomials<T = DoubleDouble> {
     /// d, s.
     pub(super) delay: f64,
     pub(super) a: Polynomial,
     /// Exponents of the units of the states.
     units: Vec<i32>,
-    a_exact: Matrix,
+    pub(super) a_exact: Vec<T>,
     a_moduli: Vec<f64>,
     /// adj(σI − M) (G + Γ₀ σ): for each power of σ a vector, with moduli.
-    forward: Vec<Matrix>,
+    forward: Vec<Vec<T>>,
     forward_moduli: Vec<Vec<f64>>,
-}
-
-/// What a step does: Φ − I, and Γ of one input.
-struct Step {
-    growth: Matrix,
-    gamma: Matrix,
 }
 
 impl LoopPolynomials {
@@ -104,92 +87,115 @@ impl LoopPolynomials {
             "an entry of the equations is not finite: choose smaller gains"
         );
         countable(delay, sample_time)?;
-        Ok(Self::built((a, b), None, delay, sample_time))
+        Ok(Self::double((a, b), None, delay, sample_time))
     }
 
-    /// The same for a loop whose samples change its states as well.
+    /// The same for one loop, whose samples may change its states as well.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub(super) fn of_loop(plant: &LinearLoop, delay: f64, sample_time: f64) -> Result<Self, Error> {
         let equations = plant.equations();
-        let (a, b) = (&equations.a[..], &equations.b[..]);
-        match plant.update() {
-            None => Self::new(a, b, delay, sample_time),
-            Some(update) if b.len() <= MOST_STATES => {
-                countable(delay, sample_time)?;
-                Ok(Self::built((a, b), Some(update), delay, sample_time))
-            }
-            Some(_) => refuse!(
-                "{} states of plant and controller: up to {MOST_STATES} are taken",
-                b.len()
-            ),
-        }
+        let n = equations.b.len();
+        refuse_if!(
+            n > MOST_STATES,
+            "{n} states of plant and controller: up to {MOST_STATES} are taken"
+        );
+        countable(delay, sample_time)?;
+        let states = (&equations.a[..], &equations.b[..]);
+        Ok(Self::double(states, plant.update(), delay, sample_time))
     }
 
-    fn built(
-        (a, b): (&[f64], &[f64]),
-        update: Option<&Update>,
+    fn double((a, b): (&[f64], &[f64]), update: Option<&Update>, delay: f64, period: f64) -> Self {
+        let exact = |entries: &[f64]| entries.iter().map(|x| DoubleDouble::from(*x)).collect();
+        let update = update.map(|update| Update {
+            states: exact(&update.states),
+            command: exact(&update.command),
+            reference: Vec::new(),
+        });
+        let timing = Timing::new(delay, period);
+        let times = [timing.early, timing.late].map(DoubleDouble::from);
+        let delay = (timing.samples + 1) as f64 * period;
+        Self::built(
+            (&exact(a), &exact(b)),
+            update.as_ref(),
+            times,
+            period.into(),
+            delay,
+        )
+    }
+
+    /// b for this feedback.
+    pub(super) fn feedback(&self, k: &[f64], l: f64) -> Polynomial {
+        let k: Vec<DoubleDouble> = k.iter().map(|k| DoubleDouble::from(*k)).collect();
+        Polynomial::known(self.fed(&k, l.into()))
+    }
+}
+
+impl<T: Coefficient> LoopPolynomials<T> {
+    /// Of the parts of a sample before and after a command arrives, and d = (m + 1) Ts.
+    pub(super) fn built(
+        (a, b): (&[T], &[T]),
+        update: Option<&Update<T>>,
+        [early, late]: [T; 2],
+        sample_time: T,
         delay: f64,
-        sample_time: f64,
     ) -> Self {
         let n = b.len();
         // In units of the states, powers of two, that make A small.
-        let (a, units) = balanced(a, n);
-        let scaled = |vector: &[f64]| -> Vec<f64> {
+        let near: Vec<f64> = a.iter().map(|entry| entry.near()).collect();
+        let (_, units) = balanced(&near, n);
+        let power = |exponent: i32| libm::ldexp(1.0, exponent);
+        let scaled = |vector: &[T]| -> Vec<T> {
             let entries = vector.iter().zip(&units);
-            entries.map(|(x, unit)| libm::ldexp(*x, -unit)).collect()
+            entries.map(|(x, unit)| x.scaled(power(-unit))).collect()
         };
-        let timing = Timing::new(delay, sample_time);
-        let late = Step::new(&a, &scaled(b), timing.late);
-        let early = Step::new(&a, &scaled(b), timing.early);
+        let square = |entries: &[T]| -> Vec<T> {
+            let place = |(i, x): (usize, &T)| x.scaled(power(units[i % n] - units[i / n]));
+            entries.iter().enumerate().map(place).collect()
+        };
+        let (a, b) = (square(a), scaled(b));
+        let late = Step::new(&a, &b, late);
+        let early = Step::new(&a, &b, early);
         // Φ − I = F₀ + F₁ + F₀ F₁ with F = Φ − I of both parts.
         let product = times(&late.growth, &early.growth, n);
-        let sum = |x: DoubleDouble, y: DoubleDouble| x + y;
+        let sum = |x: T, y: T| x + y;
         let mut growth = joined(&joined(&late.growth, &early.growth, sum), &product, sum);
         // Γ₀ + (I + F₀) Γ(δ).
         let moved = times(&late.growth, &early.gamma, n);
         let mut all = joined(&joined(&late.gamma, &early.gamma, sum), &moved, sum);
         if let Some(update) = update {
             // x becomes J x + G w first: Φ J − I = F J + (J − I), and Φ G is added.
-            let exact = |entries: &[f64]| -> Matrix {
-                entries
-                    .iter()
-                    .map(|entry| DoubleDouble::from(*entry))
-                    .collect()
-            };
-            let place = |i: usize| libm::ldexp(update.states[i], units[i % n] - units[i / n]);
-            let states: Vec<f64> = (0..n * n).map(place).collect();
-            let (states, command) = (exact(&states), exact(&scaled(&update.command)));
+            let (states, command) = (square(&update.states), scaled(&update.command));
             let change = joined(&states, &identity(n), |x, y| x - y);
             let added = joined(&command, &times(&growth, &command, n), sum);
             all = joined(&all, &added, sum);
             growth = joined(&times(&growth, &states, n), &change, sum);
         }
-        let m: Matrix = growth.iter().map(|entry| entry.over(sample_time)).collect();
-        let g: Matrix = all.iter().map(|entry| entry.over(sample_time)).collect();
-        let delay = (timing.samples + 1) as f64 * sample_time;
+        let m: Vec<T> = growth.iter().map(|entry| entry.per(sample_time)).collect();
+        let g: Vec<T> = all.iter().map(|entry| entry.per(sample_time)).collect();
         let found = Self::of(&m, &g, &late.gamma, delay);
         Self { units, ..found }
     }
 
-    fn of(m: &[DoubleDouble], g: &[DoubleDouble], now: &[DoubleDouble], delay: f64) -> Self {
+    fn of(m: &[T], g: &[T], now: &[T], delay: f64) -> Self {
         let n = g.len();
+        let zero = T::from(0.0);
         let sizes = moduli(m);
-        let mut a = vec![ZERO; n + 1];
+        let mut a = vec![zero; n + 1];
         let mut a_moduli = vec![0.0; n + 1];
-        let mut forward = vec![vec![ZERO; n]; n + 1];
+        let mut forward = vec![vec![zero; n]; n + 1];
         let mut forward_moduli = vec![vec![0.0; n]; n + 1];
         if let Some(leading) = a.last_mut() {
-            *leading = DoubleDouble::ONE;
+            *leading = T::from(1.0);
         }
         if let Some(leading) = a_moduli.last_mut() {
             *leading = 1.0;
         }
         let (g_sizes, now_sizes) = (moduli(g), moduli(now));
         // The coefficient of σʲ of the adjugate, from j = n − 1 down.
-        let mut adjugate = identity(n);
-        let mut adjugate_sizes: Vec<f64> = adjugate.iter().map(|entry| entry.high).collect();
+        let mut adjugate: Vec<T> = identity(n);
+        let mut adjugate_sizes: Vec<f64> = adjugate.iter().map(|entry| entry.near()).collect();
         for power in (0..n).rev() {
             add_product(&mut forward[power], &adjugate, g);
             add_product(&mut forward[power + 1], &adjugate, now);
@@ -198,7 +204,7 @@ impl LoopPolynomials {
             let next = times(m, &adjugate, n);
             let next_sizes = times_sizes(&sizes, &adjugate_sizes, n);
             let count = (n - power) as f64;
-            let trace = (0..n).fold(ZERO, |sum, i| sum + next[i * n + i]);
+            let trace = (0..n).fold(zero, |sum, i| sum + next[i * n + i]);
             a[power] = (-trace).over(count);
             a_moduli[power] = (0..n).map(|i| next_sizes[i * n + i]).sum::<f64>() / count;
             adjugate = next;
@@ -219,106 +225,41 @@ impl LoopPolynomials {
         }
     }
 
-    /// b for this feedback.
-    pub(super) fn feedback(&self, k: &[f64], l: f64) -> Polynomial {
+    /// The coefficients of b for this feedback, with sums of moduli.
+    pub(super) fn fed(&self, k: &[T], l: T) -> Vec<(T, f64)> {
         let mut found = Vec::with_capacity(self.forward.len());
         let powers = self.forward.iter().zip(&self.forward_moduli);
         for ((vector, moduli), (a, a_size)) in powers.zip(self.a_exact.iter().zip(&self.a_moduli)) {
             let mut sum = *a * l;
-            let mut size = l.abs() * a_size;
+            let mut size = l.size() * a_size;
             for ((entry, modulus), (k, unit)) in
                 vector.iter().zip(moduli).zip(k.iter().zip(&self.units))
             {
-                let k = libm::ldexp(*k, *unit);
+                let k = k.scaled(libm::ldexp(1.0, *unit));
                 sum = sum + *entry * k;
-                size += k.abs() * modulus;
+                size += k.size() * modulus;
             }
             found.push((sum, size));
         }
-        Polynomial::known(found.into_iter())
+        found
     }
 }
 
 impl Polynomial {
     /// From coefficients and sums of moduli. One below its error is taken as exactly zero: a zero and
     /// a pole at z = 1 of a controller cancel, and what rounding leaves of them would count as a root.
-    fn known(coefficients: impl Iterator<Item = (DoubleDouble, f64)>) -> Self {
+    fn known<T: Coefficient>(coefficients: impl IntoIterator<Item = (T, f64)>) -> Self {
         let mut found = Self::default();
         for (c, size) in coefficients {
             let error = ROUGHNESS * size;
-            let is_zero = c.high.abs() <= error;
-            found.coefficients.push(if is_zero { 0.0 } else { c.high });
+            let is_zero = c.size() <= error;
+            found
+                .coefficients
+                .push(if is_zero { 0.0 } else { c.near() });
             found.errors.push(if is_zero { 0.0 } else { error });
         }
         found
     }
-}
-
-impl Step {
-    fn new(a: &[f64], b: &[f64], time: f64) -> Self {
-        let n = b.len();
-        let norm = (0..n).fold(0.0, |most: f64, j| {
-            most.max((0..n).map(|i| a[i * n + j].abs()).sum())
-        });
-        let mut doublings = 0;
-        let mut step = time;
-        while norm * step > REACH && doublings < MOST_DOUBLINGS {
-            step *= 0.5;
-            doublings += 1;
-        }
-        let a: Matrix = a.iter().map(|entry| DoubleDouble::from(*entry)).collect();
-        // F = Σ (A t)ʲ/j!, Γ = Σ Aʲ tʲ⁺¹/(j + 1)! B.
-        let mut growth = vec![ZERO; n * n];
-        let mut power = identity(n);
-        let mut gamma: Matrix = b.iter().map(|g| DoubleDouble::product(*g, step)).collect();
-        let mut term = gamma.clone();
-        let mut size = 1.0;
-        for j in 1..=MOST_TERMS {
-            if size < LEFT_OUT {
-                break;
-            }
-            size *= norm * step / f64::from(j + 1);
-            let scaled =
-                |entry: &DoubleDouble, divisor: u32| (*entry * step).over(f64::from(divisor));
-            power = times(&a, &power, n)
-                .iter()
-                .map(|entry| scaled(entry, j))
-                .collect();
-            growth = joined(&growth, &power, |x, y| x + y);
-            term = times(&a, &term, n)
-                .iter()
-                .map(|entry| scaled(entry, j + 1))
-                .collect();
-            gamma = joined(&gamma, &term, |x, y| x + y);
-        }
-        for _ in 0..doublings {
-            let twice = |x: DoubleDouble, y: DoubleDouble| x.scaled(2.0) + y;
-            gamma = joined(&gamma, &times(&growth, &gamma, n), twice);
-            growth = joined(&growth, &times(&growth, &growth, n), twice);
-        }
-        Self { growth, gamma }
-    }
-}
-
-fn identity(n: usize) -> Matrix {
-    let entry = |place: usize| DoubleDouble::from(f64::from(u8::from(place.is_multiple_of(n + 1))));
-    (0..n * n).map(entry).collect()
-}
-
-/// The product of a square matrix of side n with another matrix, both row-major.
-fn times(left: &[DoubleDouble], right: &[DoubleDouble], n: usize) -> Matrix {
-    let width = right.len().checked_div(n).unwrap_or(0);
-    let mut product = vec![ZERO; right.len()];
-    for i in 0..n {
-        for j in 0..width {
-            let mut sum = ZERO;
-            for inner in 0..n {
-                sum = sum + left[i * n + inner] * right[inner * width + j];
-            }
-            product[i * width + j] = sum;
-        }
-    }
-    product
 }
 
 fn times_sizes(left: &[f64], right: &[f64], n: usize) -> Vec<f64> {
@@ -331,16 +272,8 @@ fn times_sizes(left: &[f64], right: &[f64], n: usize) -> Vec<f64> {
     (0..n * n).map(entry).collect()
 }
 
-fn joined(
-    left: &[DoubleDouble],
-    right: &[DoubleDouble],
-    with: impl Fn(DoubleDouble, DoubleDouble) -> DoubleDouble,
-) -> Matrix {
-    left.iter().zip(right).map(|(x, y)| with(*x, *y)).collect()
-}
-
 /// `sum` += matrix times vector.
-fn add_product(sum: &mut [DoubleDouble], matrix: &[DoubleDouble], vector: &[DoubleDouble]) {
+fn add_product<T: Coefficient>(sum: &mut [T], matrix: &[T], vector: &[T]) {
     for (sum, line) in sum.iter_mut().zip(matrix.chunks_exact(vector.len().max(1))) {
         for (entry, x) in line.iter().zip(vector) {
             *sum = *sum + *entry * *x;
@@ -359,13 +292,13 @@ fn add_sizes(sum: &mut [f64], matrix: &[f64], vector: &[f64]) {
 }
 
 /// The moduli of the entries, each enlarged by a share of the largest.
-fn moduli(entries: &[DoubleDouble]) -> Vec<f64> {
+fn moduli<T: Coefficient>(entries: &[T]) -> Vec<f64> {
     let largest = entries
         .iter()
-        .fold(0.0, |most: f64, entry| most.max(entry.high.abs()));
+        .fold(0.0, |most: f64, entry| most.max(entry.size()));
     entries
         .iter()
-        .map(|entry| entry.high.abs() + SPREAD * largest)
+        .map(|entry| entry.size() + SPREAD * largest)
         .collect()
 }
 

@@ -2,10 +2,12 @@
 
 use num_complex::Complex64;
 
+use super::interval::HeldInterval;
 use super::model::{LoopPolynomials, share_of_errors};
 use super::poles::Poles;
-use crate::dde::LinearLoop;
 use crate::dde::control_loop::sampled;
+use crate::dde::{Equations, LinearLoop, Update};
+use crate::elementary::Enclosed;
 use crate::linear_algebra::balance::balanced_norm;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::quasipoly::{QuasiPolynomial, modulus};
@@ -23,10 +25,6 @@ const FEW: f64 = 10.0;
 
 /// A rate this small beside the largest one is that of an integrator.
 const AT_REST: f64 = 1e-9;
-
-/// Distance of a pole from the circle that counts at least: a smaller one sees narrower resonances
-/// where two meet and takes longer.
-const CLOSEST: f64 = 1e-3;
 
 /// A sampled loop whose polynomials can be formed at any delay.
 #[derive(Debug, Clone, Copy)]
@@ -78,27 +76,32 @@ impl<'a> HeldLoop<'a> {
         lasting.fold(0.0, |most, s| most.max(s.im.abs()))
     }
 
-    /// The relative change of the distance between e^(λ Ts) and the next pole on a relative change of
-    /// Ts, largest of such oscillations; within their own distance from the circle poles are one.
-    pub fn fastest_meeting(&self, decay: f64) -> f64 {
-        let modes = self.modes();
-        let poles: Vec<Complex64> = modes.iter().map(|s| (s * self.sample_time).exp()).collect();
-        let mut most = 0.0f64;
-        for (i, (s, z)) in modes.iter().zip(&poles).enumerate() {
-            if s.im <= 0.0 || s.re * self.sample_time <= -decay {
-                continue;
-            }
-            let others = poles.iter().enumerate().filter(|(j, _)| *j != i);
-            let next = others.fold(1.0f64, |least, (_, other)| least.min(modulus(z - other)));
-            let own = (1.0 - modulus(*z)).abs().max(CLOSEST);
-            most = most.max(modulus(*s) * self.sample_time / next.max(own));
-        }
-        most
-    }
-
     /// The same loop with another delay.
     pub(crate) fn with_delay(&self, delay: f64) -> LinearLoop {
         self.plant.clone().with_delay(delay)
+    }
+
+    /// The loop with every fraction of a sample between two, from 0 to 1, in its delay.
+    pub(crate) fn within_sample(&self, (low, high): (f64, f64)) -> HeldInterval {
+        let exact = |entries: &[f64]| -> Vec<Enclosed> {
+            entries.iter().map(|x| Enclosed::from(*x)).collect()
+        };
+        let own = self.plant.equations();
+        let equations = Equations {
+            a: exact(&own.a),
+            b: exact(&own.b),
+            k: exact(&own.k),
+            l: own.l.into(),
+            ..Equations::default()
+        };
+        let update = self.plant.update().map(|update| Update {
+            states: exact(&update.states),
+            command: exact(&update.command),
+            reference: Vec::new(),
+        });
+        let period = Enclosed::from(self.sample_time);
+        let early = Enclosed::between(low, high) * period;
+        HeldInterval::new(&equations, update.as_ref(), [early, period - early])
     }
 
     /// The longest time constant of plant and controller that decays or grows, s.

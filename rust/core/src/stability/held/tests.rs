@@ -1,5 +1,7 @@
 //! Maps against the eigenvalues of transition matrices.
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::Task;
 use crate::dde::control_loop::sampled;
@@ -37,31 +39,35 @@ fn plant(lags: &[f64]) -> Plant {
     Plant { a, b, p, v }
 }
 
-/// Poles s of the loop with Kp and Kv.
-fn poles(
-    plant: &Plant,
-    gains: (f64, f64),
-    delay: f64,
-    sample_time: f64,
-) -> Vec<num_complex::Complex64> {
+/// The loop with Kp and Kv.
+fn with_gains(plant: &Plant, gains: (f64, f64), delay: f64, sample_time: f64) -> LinearLoop {
     let k = plant
         .p
         .iter()
         .zip(&plant.v)
         .map(|(p, v)| gains.0 * p + gains.1 * v)
         .collect();
-    let direct = if plant.b.len() == 1 { -gains.1 } else { 0.0 };
     let n = plant.b.len();
     let equations = Equations {
         a: plant.a.clone(),
         b: plant.b.clone(),
         e: vec![0.0; n],
         k,
-        l: direct,
+        l: if n == 1 { -gains.1 } else { 0.0 },
         c: vec![0.0; n],
         ..Equations::default()
     };
-    sampled::poles(&LinearLoop::new(equations, delay, Some(sample_time), None).unwrap()).unwrap()
+    LinearLoop::new(equations, delay, Some(sample_time), None).unwrap()
+}
+
+/// Its poles s.
+fn poles(
+    plant: &Plant,
+    gains: (f64, f64),
+    delay: f64,
+    sample_time: f64,
+) -> Vec<num_complex::Complex64> {
+    sampled::poles(&with_gains(plant, gains, delay, sample_time)).unwrap()
 }
 
 fn mapped(
@@ -204,4 +210,33 @@ fn maps_agree_with_eigenvalues() {
         }
     }
     assert!(compared > 20_000, "{compared}");
+}
+
+proptest! {
+    #[test]
+    fn no_pole_crosses_within_a_proved_part_of_a_sample(
+        lag in 0.05..0.6_f64,
+        gains in (0.2..6.0_f64, -0.3..0.6_f64),
+        samples in 0_u8..6,
+        low in 0.0..1.0_f64,
+        width in 1e-7..0.3_f64,
+    ) {
+        let (plant, period) = (plant(&[lag]), 0.1);
+        let (start, end) = (f64::from(samples), (low + width).min(1.0));
+        let of = with_gains(&plant, gains, start * period, period);
+        let held = HeldLoop::new(&of).unwrap();
+        let at = |fraction: f64| poles(&plant, gains, (start + fraction) * period, period);
+        let count = |fraction: f64| at(fraction).iter().filter(|s| s.re > 0.0).count();
+        if held.within_sample((low, end)).avoids_circle((start + 1.0, start + 1.0)) {
+            for part in 0_u8..=8 {
+                prop_assert_eq!(count(low + (end - low) * f64::from(part) / 8.0), count(low));
+            }
+        } else {
+            // A short part is proved where no pole is next to the circle.
+            let short = held.within_sample((low, low + 1e-7 * (end - low)));
+            let nearest = at(low).iter().fold(1.0, |least: f64, s| least.min(s.re.abs()));
+            let is_known = short.avoids_circle((start + 1.0, start + 1.0));
+            prop_assert!(is_known || nearest < 1e-3);
+        }
+    }
 }

@@ -1,0 +1,155 @@
+"""What a plant lacks, and what a sensor did: found in a recording, and put into words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import deadtime.estimation._native as native
+from deadtime._base.digits import shown
+
+#: Quantile of a 95 % interval.
+REACH = 1.96
+
+#: What each cause of the kernel is called, and what it says of size and time.
+WORDS = {
+    "load": "a load of {size} in units of the command begins at {time}",
+    "output step": "the output jumps by {size} at {time}, and the plant does not move",
+    "delay change": "the delay changes by {size} s at {time}",
+    "dead zone": "commands within ±{size} do nothing",
+    "play": "the actuator has a play of {size}",
+    "stiction": "the actuator sticks until the command is {size} away from it",
+    "upper limit": "the command does nothing more above {size}",
+    "lower limit": "the command does nothing more below -{size}",
+    "rate limit": "what reaches the plant changes by at most {size} in a second",
+    "slope limit": "the plant's response changes by at most {size} of the command in a second",
+    "drag": "a force of {size} times the square of the speed slows the motion",
+    "gain ramp": "the gain changes by {share} over the recording",
+    "gain by level": "the gain changes by {share} over the range of the output",
+}
+
+#: What to do about each.
+REMEDIES = {
+    "load": "if you know the load, record without it",
+    "output step": "look at the sensor, or at the estimator behind it, at that time",
+    "delay change": "estimate before and after it by a window",
+    "dead zone": "add it to the command in the controller, or command more than it",
+    "play": "remove the play, or command moves that are large against it",
+    "stiction": "free the actuator, or command moves that are large against it",
+    "upper limit": "give the controller this limit",
+    "lower limit": "give the controller this limit",
+    "rate limit": "give the loop this limit of the command's rate",
+    "slope limit": "keep commands small enough not to reach it, or give the plant this limit",
+    "drag": "the gain holds for speeds as in this recording",
+    "gain ramp": "look what changes, such as a battery or a temperature",
+    "gain by level": "record around the level at which the loop is to work",
+}
+
+#: Both sides of a limit have one name.
+NAMES = {"upper limit": "unequal limits", "lower limit": "unequal limits"}
+
+SENSOR_WORDS = {
+    "frozen": "the sensor is frozen for {rows} rows from {start:.4g} to {stop:.4g} s",
+    "repeated": "the sensor repeats its reading in {rows} rows",
+    "glitch": "the sensor leaves and comes back in {rows} rows",
+}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What a linear plant lacks, found in a recording.
+
+    Attributes
+    ----------
+    name : str
+        ``"load"``, ``"output step"``, ``"delay change"``, ``"dead zone"``, ``"play"``,
+        ``"stiction"``, ``"unequal limits"``, ``"rate limit"``, ``"slope limit"``, ``"drag"``,
+        ``"gain ramp"`` or ``"gain by level"``.
+    size : float
+        In units of the command for a load, a dead zone, play, stiction and limits; of the output
+        for its step; a share for a gain that changes; s for a change of delay.
+    ci : (float, float)
+        Its 95 % interval.
+    time : float or None
+        When it began, s; None where it was there all the time.
+    lead : float
+        BIC by which the recording is explained better with it.
+    others : tuple of str
+        Other causes that explain the recording about as well.
+    """
+
+    name: str
+    size: float
+    ci: tuple[float, float]
+    time: float | None
+    lead: float
+    others: tuple[str, ...] = ()
+    _kind: str = ""
+
+    def in_words(self) -> str:
+        """What it is, with its size."""
+        error = (self.ci[1] - self.ci[0]) / (2.0 * REACH)
+        words = WORDS[self._kind].format(
+            size=shown(self.size, error),
+            share=f"{shown(100.0 * self.size, 100.0 * error)} %",
+            time="" if self.time is None else f"{self.time:.4g} s",
+        )
+        if not self.others:
+            return words
+        return f"{words}; {' or '.join(self.others)} explains the recording about as well"
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it."""
+        return REMEDIES[self._kind]
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """Rows of a recording that are no readings of the sensor; they are left out.
+
+    Attributes
+    ----------
+    name : {"frozen", "repeated", "glitch"}
+        What the sensor did.
+    recording : int
+        The recording, from 0 on.
+    rows : int
+        How many rows were left out.
+    start, stop : float
+        Times of the first and the last of them, s.
+    """
+
+    name: str
+    recording: int
+    rows: int
+    start: float
+    stop: float
+
+    def in_words(self) -> str:
+        """What the sensor did, and where."""
+        words = SENSOR_WORDS[self.name]
+        return words.format(rows=self.rows, start=self.start, stop=self.stop)
+
+
+def causes_of(found: native.FamilyFit) -> tuple[Cause, ...]:
+    """The causes in the answer of the kernel; only the last one has others beside it."""
+    named = []
+    for kind, size, error, time, _, lead in found.causes:
+        reach = REACH * error if math.isfinite(error) else math.inf
+        ends = (size - reach, size + reach)
+        began = None if math.isnan(time) else time
+        named.append(Cause(NAMES.get(kind, kind), size, ends, began, lead, (), kind))
+    if named and found.rival_causes:
+        last = named.pop()
+        others = dict.fromkeys(NAMES.get(kind, kind) for kind in found.rival_causes)
+        others.pop(last.name, None)
+        named.append(
+            Cause(last.name, last.size, last.ci, last.time, last.lead, tuple(others), last._kind)
+        )
+    return tuple(named)
+
+
+def sensor_faults_of(found: native.FamilyFit) -> tuple[SensorFault, ...]:
+    """What sensors did, in the answer of the kernel."""
+    return tuple(SensorFault(*one) for one in found.sensor_faults)

@@ -1,0 +1,333 @@
+//! Causes fitted with the whole family of plants, and adopted where they explain the record clearly better.
+
+use super::super::answer::Family;
+use super::super::cause::{Cause, CauseKind};
+use super::super::minima::{Minimum, Plan, minima, seeds_of};
+use super::super::model::Model;
+use super::super::noise::Noise;
+use super::super::rows::Rows;
+use super::super::search::minimum;
+use super::super::series::flexible_bic;
+use super::super::tolerances::{CAUSES, EVIDENCE, STARTS};
+use super::asides::{columns_from, moving};
+use super::commands::Shape;
+use super::screen::{Suspect, begins_again, suspects};
+use crate::elementary::log;
+use crate::{Error, Task};
+
+/// Makes an answer of minima.
+pub(crate) type Answer<'f> = dyn Fn(&[Minimum<'_>]) -> Result<Family, Error> + 'f;
+
+/// The rows with a suspect, and its size where the command passes it.
+fn with_suspect(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+    let kind = suspect.kind;
+    if kind.begins() {
+        return beginning(suspect, rows, task).map(|rows| (rows, 0.0));
+    }
+    if kind.is_passed() {
+        return with_size(suspect, rows, task);
+    }
+    // As the plant moves without it, and then as it moves with it.
+    let mut own = rows.clone();
+    let mut x = suspect.x.clone();
+    for round in 0..=CAUSES.rounds {
+        let model = beside(suspect, &own);
+        let point = if round == 0 {
+            model.at(x)
+        } else {
+            minimum(&model, model.at(x), f64::INFINITY, task)?
+        };
+        let each = 0..rows.parts.len();
+        let asides = each.map(|at| moving(kind, &model, &point, at).map(|own| vec![own]));
+        let asides = asides.collect();
+        x = point.x;
+        own = rows.with_asides(kind, asides);
+    }
+    Ok((own, 0.0))
+}
+
+/// The rows with something that begins, at the likeliest time beside that of the score.
+fn beginning(suspect: &mut Suspect, rows: &Rows, task: &Task) -> Result<Rows, Error> {
+    let with = |time: f64| {
+        let mut asides = vec![None; rows.parts.len()];
+        let part = &rows.parts[suspect.record];
+        asides[suspect.record] = Some(columns_from(suspect.kind, part, time));
+        rows.with_asides(suspect.kind, asides)
+    };
+    let mut x = suspect.x.clone();
+    let mut best = (f64::INFINITY, suspect.time, 0.0);
+    let mut time = suspect.time;
+    if suspect.kind == CauseKind::Load {
+        for _ in 0..CAUSES.refined {
+            let own = with(time);
+            let model = beside(suspect, &own);
+            let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
+            let deviance = model.deviance(&point);
+            let later = match point.of_causes() {
+                [.., slope, size] => -slope / size,
+                _ => 0.0,
+            };
+            if deviance < best.0 {
+                best = (deviance, time, later);
+                x = point.x;
+            } else {
+                // Too far.
+                best.2 *= 0.5;
+            }
+            let step = best.2.clamp(-suspect.between.1, suspect.between.1);
+            if !step.is_finite() || step.abs() < CAUSES.near * rows.parts[suspect.record].row {
+                break;
+            }
+            time = best.1 + step;
+        }
+        time = best.1;
+    }
+    let out = with(time);
+    suspect.time = time;
+    Ok(out)
+}
+
+/// The plant beside which a suspect is likeliest.
+fn beside<'a>(suspect: &Suspect, rows: &'a Rows) -> Model<'a> {
+    Model {
+        rows,
+        class: suspect.class,
+        noise: suspect.noise,
+        responds: true,
+        level: true,
+    }
+}
+
+/// The rows with a suspect of the likeliest size.
+fn with_size(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+    let kind = suspect.kind;
+    if kind == CauseKind::Stiction {
+        return sticking(suspect, rows, task);
+    }
+    let mut size = suspect.size;
+    let mut x = suspect.x.clone();
+    let first = Shape {
+        kind,
+        size,
+        lag: 0.0,
+    };
+    let mut best = (f64::INFINITY, first);
+    for _ in 0..CAUSES.refined {
+        let lag = beside(suspect, rows).numbers(&x).lag();
+        let shape = Shape { kind, size, lag };
+        let own = rows.behind(shape);
+        let model = beside(suspect, &own);
+        let point = minimum(&model, model.at(x.clone()), f64::INFINITY, task)?;
+        let deviance = model.deviance(&point);
+        if deviance < best.0 {
+            best = (deviance, shape);
+            x.clone_from(&point.x);
+        }
+        let change = point.of_causes().last().copied().unwrap_or(0.0) / model.gain(&point);
+        let (low, high) = suspect.between;
+        let reach = 0.5 * (high - low);
+        let next = (size + change).clamp((size - reach).max(0.5 * size), size + reach);
+        if !next.is_finite() || (next - size).abs() < CAUSES.settled * size {
+            break;
+        }
+        size = next;
+    }
+    Ok((rows.behind(best.1), best.1.size))
+}
+
+/// The same of what sticks, whose likelihood jumps between sizes.
+fn sticking(suspect: &Suspect, rows: &Rows, task: &Task) -> Result<(Rows, f64), Error> {
+    let (low, high) = suspect.between;
+    let mut shape = Shape {
+        kind: suspect.kind,
+        size: suspect.size,
+        lag: 0.0,
+    };
+    let mut best = (f64::INFINITY, shape);
+    for step in 1..CAUSES.between {
+        shape.size = low + (high - low) * step as f64 / CAUSES.between as f64;
+        let own = rows.behind(shape);
+        let model = beside(suspect, &own);
+        let point = minimum(&model, model.at(suspect.x.clone()), f64::INFINITY, task)?;
+        let deviance = model.deviance(&point);
+        if deviance < best.0 {
+            best = (deviance, shape);
+        }
+    }
+    Ok((rows.behind(best.1), best.1.size))
+}
+
+/// The causes of a minimum, the last one with the size that the command had passed.
+fn causes_of(
+    known: &[Cause],
+    suspect: &Suspect,
+    size: f64,
+    best: &Minimum<'_>,
+    lead: f64,
+) -> Vec<Cause> {
+    let (model, point) = (&best.model, &best.point);
+    let gain = model.gain(point);
+    let mut out = known.to_vec();
+    out.push(Cause {
+        kind: suspect.kind,
+        size,
+        error: 0.0,
+        time: suspect.time,
+        record: suspect.record,
+        lead,
+    });
+    let (count, mut end) = (out.len(), 0);
+    for (at, cause) in out.iter_mut().enumerate() {
+        end += cause.kind.columns();
+        let scale = if cause.kind == CauseKind::OutputStep {
+            1.0
+        } else {
+            gain
+        };
+        if cause.kind == CauseKind::Stiction {
+            if at + 1 == count {
+                let step = (suspect.between.1 - suspect.between.0) / CAUSES.between as f64;
+                cause.error = step / 12.0_f64.sqrt();
+            }
+            continue;
+        }
+        let passed = if cause.kind.is_passed() {
+            cause.size
+        } else {
+            0.0
+        };
+        cause.size = passed + point.of_causes()[end - 1] / scale;
+        cause.error = model.error_of_cause(point, end - 1) / scale.abs();
+    }
+    out
+}
+
+/// The answer with what the plant lacks: a cause that is clearly better is adopted, and then a second one is
+/// looked for; those that the record does not rule out widen the intervals.
+pub(crate) fn with_causes(
+    own: Family,
+    plan: &Plan<'_>,
+    found: &[Minimum<'_>],
+    answer: &Answer<'_>,
+    task: &Task,
+) -> Result<Family, Error> {
+    let known = plan.rows.causes.iter().map(|kind| kind.parameters());
+    if known.sum::<usize>() >= CAUSES.most {
+        return Ok(own);
+    }
+    let Some(best) = found.first() else {
+        return Ok(own);
+    };
+    let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
+    for mut suspect in suspects(plan.rows, found, task)? {
+        let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
+        tried.push((suspect, rows, size));
+    }
+    let seeds = seeds_of(found);
+    let thinned = tried.iter().map(|(_, rows, _)| rows.thinned(STARTS.thin));
+    let thin: Vec<Rows> = thinned.collect();
+    let pairs = tried.iter().zip(&thin);
+    let plans: Vec<Plan<'_>> = pairs
+        .map(|((_, rows, _), thin)| Plan {
+            rows,
+            thin,
+            seeds: &seeds,
+            grids: false,
+            ..*plan
+        })
+        .collect();
+    let (mut fits, mut families) = (Vec::new(), Vec::new());
+    for (plan, (suspect, _, size)) in plans.iter().zip(&tried) {
+        let fit = minima(plan, task)?;
+        let mut family = answer(&fit)?;
+        if let Some(first) = fit.first() {
+            family.causes = causes_of(&own.causes, suspect, *size, first, best.bic - first.bic);
+        }
+        families.push(family);
+        fits.push(fit);
+    }
+    let bic = |at: usize| {
+        fits[at]
+            .first()
+            .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic)
+    };
+    let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
+    // Plants whose class is in error explain what a cause would.
+    let near = found
+        .iter()
+        .filter(|one| one.bic < best.bic + EVIDENCE.reach);
+    let linear = near.map(flexible_bic).fold(best.bic, f64::min);
+    let mut adopted = None;
+    if let Some(at) = winner.filter(|at| bic(*at) < linear - CAUSES.adopted)
+        && is_there(&families[at].causes, &fits[at], plan, task)?
+    {
+        adopted = Some(at);
+    }
+    let (mut out, floor) = match adopted {
+        Some(at) => {
+            let family = families[at].clone();
+            let deeper = with_causes(family, &plans[at], &fits[at], answer, task)?;
+            (deeper, bic(at) + EVIDENCE.reach)
+        }
+        None => (own.clone(), linear),
+    };
+    if adopted.is_some_and(|at| best.bic < bic(at) + CAUSES.certain) {
+        out.add_within(&own, f64::INFINITY);
+    }
+    for (at, family) in families.iter().enumerate() {
+        if Some(at) != adopted {
+            out.add_within(family, floor);
+            let is_rival = adopted.is_some_and(|own| bic(at) < bic(own) + EVIDENCE.likely);
+            let last = family.causes.last().filter(|_| is_rival);
+            out.rivals.extend(last.map(|cause| cause.kind));
+        }
+    }
+    out.rehull(task)?;
+    Ok(out)
+}
+
+/// Is the last of these causes there: of a size that is not zero, better than the same plant under the same
+/// noise without it, and no beginning of many?
+fn is_there(
+    causes: &[Cause],
+    fit: &[Minimum<'_>],
+    plan: &Plan<'_>,
+    task: &Task,
+) -> Result<bool, Error> {
+    let (Some(cause), Some(best)) = (causes.last(), fit.first()) else {
+        return Ok(false);
+    };
+    let first = causes.first().map_or(0.0, |first| first.lead);
+    if causes.len() > 1 && cause.lead < CAUSES.further * first {
+        return Ok(false);
+    }
+    let size = if cause.kind.is_positive() {
+        cause.size
+    } else {
+        cause.size.abs()
+    };
+    if size.is_nan() || size < CAUSES.sure * cause.error {
+        return Ok(false);
+    }
+    let model = Model {
+        rows: plan.rows,
+        ..best.model
+    };
+    let start = model.at(best.point.x.clone());
+    let without = Minimum::new(model, minimum(&model, start, f64::INFINITY, task)?);
+    if best.bic > without.bic - CAUSES.adopted {
+        return Ok(false);
+    }
+    if !cause.kind.begins() {
+        return Ok(true);
+    }
+    let again = begins_again(cause.kind, cause.time, best);
+    let rows = plan.rows.count() as f64;
+    let penalty = log(rows) * cause.kind.parameters() as f64;
+    let most = if best.model.noise == Noise::White {
+        penalty + CAUSES.adopted
+    } else {
+        CAUSES.again * (cause.lead + penalty)
+    };
+    Ok(again < most)
+}

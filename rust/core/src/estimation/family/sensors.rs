@@ -1,0 +1,236 @@
+//! Readings that a sensor did not take: frozen and repeated ones, and glitches. They are left out.
+//!
+//! Equal readings of a coarse sensor are none of these: repeats count where readings usually differ by
+//! many steps of the sensor. A glitch leaves for a few rows and comes back.
+
+use super::rows::Record;
+use super::tolerances::SENSORS;
+
+/// What a sensor did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SensorKind {
+    /// It gave one value for a long time.
+    Frozen,
+    /// It gave some values several times.
+    Repeated,
+    /// It left for a few rows and came back.
+    Glitch,
+}
+
+impl SensorKind {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Frozen => "frozen",
+            Self::Repeated => "repeated",
+            Self::Glitch => "glitch",
+        }
+    }
+}
+
+/// Rows that were left out of a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensorFault {
+    /// Why.
+    pub kind: SensorKind,
+    /// The record.
+    pub record: usize,
+    /// How many rows.
+    pub rows: usize,
+    /// Times of the first and of the last of them, s.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
+}
+
+/// The record without what the sensor did not read, and what that was.
+pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<SensorFault>) {
+    let mut out = record.clone();
+    let mut faults = Vec::new();
+    let known: Vec<usize> = (0..out.output.len())
+        .filter(|row| out.output[*row].is_finite())
+        .collect();
+    if known.len() < SENSORS.fewest {
+        return (out, faults);
+    }
+    let values: Vec<f64> = known.iter().map(|row| record.output[*row]).collect();
+    // How a sensor reads is seen in all rows; what it did counts in those that are fitted.
+    let first = known.partition_point(|row| *row < out.earlier);
+    let mut leave = |kind: SensorKind, runs: &[std::ops::Range<usize>]| {
+        let fitted = runs.iter().map(|run| run.start.max(first)..run.end);
+        let runs: Vec<_> = fitted.filter(|run| !run.is_empty()).collect();
+        let rows = runs.iter().map(ExactSizeIterator::len).sum();
+        if let (Some(first), Some(last)) = (runs.first(), runs.last()) {
+            faults.push(SensorFault {
+                kind,
+                record: place,
+                rows,
+                from: record.time[known[first.start]],
+                to: record.time[known[last.end - 1]],
+            });
+        }
+        for at in runs.into_iter().flatten() {
+            out.output[known[at]] = f64::NAN;
+        }
+    };
+    let repeats = repeats(&values);
+    let usual = usual_run(&values);
+    let long = SENSORS.frozen.max(SENSORS.longer * usual);
+    let (frozen, short): (Vec<_>, Vec<_>) = repeats
+        .into_iter()
+        .partition(|run| run.len() as f64 >= long);
+    for run in &frozen {
+        leave(SensorKind::Frozen, std::slice::from_ref(run));
+    }
+    leave(SensorKind::Repeated, &short);
+    leave(SensorKind::Glitch, &glitches(&values));
+    (out, faults)
+}
+
+/// How many rows a reading usually lasts.
+fn usual_run(values: &[f64]) -> f64 {
+    let runs = values.chunk_by(|one, next| one == next);
+    median(runs.map(|run| run.len() as f64).collect())
+}
+
+/// Readings that repeat the one before them by more than chance.
+fn repeats(values: &[f64]) -> Vec<std::ops::Range<usize>> {
+    let steps: Vec<f64> = values
+        .windows(2)
+        .map(|two| (two[1] - two[0]).abs())
+        .collect();
+    let mut moved: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    moved.sort_by(f64::total_cmp);
+    let Some(least) = moved.first().copied() else {
+        return Vec::new();
+    };
+    if moved[moved.len() / 2] < SENSORS.coarse * least {
+        return Vec::new();
+    }
+    let count = steps.len() as f64;
+    // As often as a reading moves by one step up or down, it stays where it is.
+    let single = moved.iter().filter(|step| **step < 1.5 * least).count() as f64;
+    let equal = (steps.len() - moved.len()) as f64;
+    let chance = 0.5 * single.max(2.0);
+    let longest = if equal > SENSORS.excess * chance + SENSORS.few {
+        1.0
+    } else {
+        (count / SENSORS.chance).ln() / (count / chance).ln()
+    };
+    let mut out = Vec::new();
+    let mut at = 0;
+    while at < steps.len() {
+        let start = at;
+        while at < steps.len() && steps[at] == 0.0 {
+            at += 1;
+        }
+        // A vehicle at rest leaves by one step of the sensor.
+        let leaves = steps
+            .get(at)
+            .is_none_or(|step| *step >= SENSORS.coarse * least);
+        // A plant may rest before its first command.
+        if start > 0 && (at - start) as f64 >= longest && leaves {
+            out.push(start + 1..at + 1);
+        }
+        at += 1;
+    }
+    out
+}
+
+/// Readings that leave for a few rows and come back, both by far more than those around them move.
+fn glitches(values: &[f64]) -> Vec<std::ops::Range<usize>> {
+    let steps: Vec<f64> = values.windows(2).map(|two| two[1] - two[0]).collect();
+    let around = |first: usize, last: usize| {
+        let before = first.saturating_sub(SENSORS.around)..first;
+        let after = last + 1..(last + 1 + SENSORS.around).min(steps.len());
+        let sizes = before.chain(after).map(|at| steps[at].abs());
+        sizes.fold(0.0, f64::max)
+    };
+    let mut out = Vec::new();
+    let mut at = 0;
+    while at + 1 < steps.len() {
+        // Out by the step `at`, back by the step `back`.
+        let comes_back = |back: &usize| {
+            let (leaves, returns) = (steps[at], steps[*back]);
+            let moves = around(at, *back);
+            let least = leaves.abs().min(returns.abs());
+            moves > 0.0
+                && leaves * returns < 0.0
+                && least > SENSORS.far * moves
+                && (leaves + returns).abs() < 0.5 * least
+        };
+        let latest = (at + SENSORS.longest).min(steps.len() - 1);
+        if let Some(back) = (at + 1..=latest).find(comes_back) {
+            out.push(at + 1..back + 1);
+            at = back;
+        }
+        at += 1;
+    }
+    out
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(output: Vec<f64>) -> Record {
+        Record {
+            time: (0..output.len()).map(|at| 0.1 * at as f64).collect(),
+            command: vec![0.0; output.len()],
+            sent: None,
+            hold: 0.0,
+            output,
+            earlier: 0,
+        }
+    }
+
+    fn noisy(rows: usize, step: f64) -> Vec<f64> {
+        let wave = |at: usize| {
+            let noise = ((at * 7919 + 13) % 1009) as f64 / 1009.0 - 0.5;
+            (at as f64 * 0.05).sin() + 0.05 * noise
+        };
+        let rounded = |y: f64| {
+            if step > 0.0 {
+                (y / step).round() * step
+            } else {
+                y
+            }
+        };
+        (0..rows).map(wave).map(rounded).collect()
+    }
+
+    #[test]
+    fn frozen_rows_and_glitches_are_left_out_and_nothing_of_a_coarse_sensor() {
+        let mut output = noisy(400, 0.0);
+        let held = output[200];
+        output[200..230].fill(held);
+        output[300..303].iter_mut().for_each(|y| *y += 2.0);
+        let (clean, faults) = without_faults(&of(output), 0);
+        assert_eq!(faults.len(), 2);
+        assert_eq!((faults[0].kind, faults[0].rows), (SensorKind::Frozen, 29));
+        assert_eq!((faults[1].kind, faults[1].rows), (SensorKind::Glitch, 3));
+        assert_eq!(clean.output.iter().filter(|y| y.is_nan()).count(), 32);
+        for step in [0.0, 0.01, 0.1] {
+            assert!(without_faults(&of(noisy(400, step)), 0).1.is_empty());
+        }
+    }
+
+    #[test]
+    fn readings_that_repeat_are_counted() {
+        let mut output = noisy(400, 0.0);
+        for at in (1..400).filter(|at| at % 3 == 0) {
+            output[at] = output[at - 1];
+        }
+        let (_, faults) = without_faults(&of(output), 1);
+        assert_eq!(
+            (faults[0].kind, faults[0].rows),
+            (SensorKind::Repeated, 133)
+        );
+        assert_eq!(faults[0].record, 1);
+    }
+}
