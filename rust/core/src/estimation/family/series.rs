@@ -73,7 +73,7 @@ impl Series {
         let ratio = 0.5 * self.pole * self.row;
         let (own, keep) = (ratio / (1.0 + ratio), (1.0 - ratio) / (1.0 + ratio));
         let first = values.first().copied().unwrap_or(0.0);
-        let mut out = vec![Vec::with_capacity(values.len()); TERMS];
+        let mut out: Vec<Vec<f64>> = vec![Vec::new(); TERMS];
         // Of each stage the last input and output; a constant passes the first with gain 1 and the others
         // with −1.
         let mut states = [(0.0, 0.0); TERMS];
@@ -138,7 +138,7 @@ pub(super) fn shown(
     variance: f64,
 ) -> Option<Shown> {
     let response = model.commanded(point);
-    let mut raw: Vec<Vec<f64>> = vec![Vec::with_capacity(response.len()); TERMS];
+    let mut raw: Vec<Vec<f64>> = vec![Vec::new(); TERMS];
     for (part, place) in model.rows.parts.iter().zip(model.rows.places()) {
         let own = series.columns(&response[place], &part.gaps);
         for (column, own) in raw.iter_mut().zip(own) {
@@ -213,12 +213,9 @@ mod tests {
             one.factors[at] = 1.0;
             let (re, im) = one.at(omega);
             let (re, im) = (re - 1.0, im);
-            for row in count - 50..count {
+            for (row, value) in column.iter().enumerate().skip(count - 50) {
                 let (sine, cosine) = sin_cos(omega * 0.1 * row as f64);
-                assert!(
-                    (column[row] - (re * sine + im * cosine)).abs() < 1e-9,
-                    "{at}"
-                );
+                assert!((value - (re * sine + im * cosine)).abs() < 1e-9, "{at}");
             }
         }
         // What rests stays where it is.
