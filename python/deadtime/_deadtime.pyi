@@ -823,10 +823,6 @@ LONGEST_DELAY: Final[float]
 MOST_NUMBERS: Final[int]
 SHORTEST_LAG: Final[float]
 
-def excited_part(
-    time: _Reals, command_time: _Reals, command: _Reals
-) -> tuple[int, int, int, int] | None: ...
-
 @final
 class FamilyCandidate:
     plant: Final[str]
