@@ -9,11 +9,11 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import deadtime as dtm
 import numpy as np
@@ -177,18 +177,34 @@ COLUMNS = {
 }
 
 
+#: Groups of columns: title, key, width and digits of each.
+Columns: TypeAlias = Mapping[str, Sequence[tuple[str, str, int, int]]]
+
+
+def titles(columns: Columns, first: str, wide: int) -> str:
+    """Two lines: the groups, and the columns behind one of this width."""
+    groups = "".join(f"{title:>{sum(c[2] for c in some)}}" for title, some in columns.items())
+    names = "".join(f"{c[0]:>{c[2]}}" for some in columns.values() for c in some)
+    return f"{first:{wide}}{groups}\n{'':{wide}}{names}"
+
+
+def cells(columns: Columns, row: Mapping[str, Any]) -> str:
+    """The numbers of a row; a dash where there is none."""
+    each = (column for some in columns.values() for column in some)
+    return "".join(
+        f"{'-':>{wide}}" if math.isnan(row[key]) else f"{row[key]:>{wide}.{digits}f}"
+        for _, key, wide, digits in each
+    )
+
+
 def header() -> str:
     """Two lines: the groups, and the columns."""
-    groups = "".join(f"{title:>{sum(c[2] for c in some)}}" for title, some in COLUMNS.items())
-    titles = "".join(f"{c[0]:>{c[2]}}" for some in COLUMNS.values() for c in some)
-    return f"{'shares in %':24}{groups}\n{'':24}{titles}  demands"
+    return f"{titles(COLUMNS, 'shares in %', 24)}  demands"
 
 
 def line(row: dict[str, Any]) -> str:
     """A row of the table."""
-    text = f"{row['name']:24}"
-    for _, key, wide, digits in (column for some in COLUMNS.values() for column in some):
-        text += f"{'-':>{wide}}" if math.isnan(row[key]) else f"{row[key]:>{wide}.{digits}f}"
+    text = f"{row['name']:24}{cells(COLUMNS, row)}"
     missed = "; misses " + ", ".join(row["missed"]) if row["missed"] else ""
     return f"{text}  {', '.join(row['met']) or 'meets none'}{missed}"
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from reality.table import pool_of
+from reality.table import cells, pool_of, titles
 
 from strangers.demands import WRONG_POOLED, missed
 from strangers.estimates import Estimate, estimates
@@ -115,16 +115,12 @@ COLUMNS: dict[str, list[tuple[str, str, int, int]]] = {
 
 def header() -> str:
     """Two lines: the groups, and the columns."""
-    groups = "".join(f"{title:>{sum(c[2] for c in some)}}" for title, some in COLUMNS.items())
-    titles = "".join(f"{c[0]:>{c[2]}}" for some in COLUMNS.values() for c in some)
-    return f"{'':38}{groups}\n{'':38}{titles}  misses"
+    return f"{titles(COLUMNS, '', 38)}  misses"
 
 
 def line(row: dict[str, Any]) -> str:
     """A row of the table."""
-    text = f"{row['row']:38}"
-    for _, key, wide, digits in (column for some in COLUMNS.values() for column in some):
-        text += f"{'-':>{wide}}" if math.isnan(row[key]) else f"{row[key]:>{wide}.{digits}f}"
+    text = f"{row['row']:38}{cells(COLUMNS, row)}"
     return f"{text}  {', '.join(row['missed'])}".rstrip()
 
 

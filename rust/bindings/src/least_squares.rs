@@ -1,4 +1,6 @@
 //! Bindings of least squares on simulated loops.
+//!
+//! Its classes are short, and share what they read from Python and give to it: one file.
 
 use deadtime::estimation::{
     self as core, Chebyshev, ClosedLoop, Fitted, FittedNumber, HeldPath, Joint, Minimum, Part,
