@@ -114,6 +114,25 @@ _PACKAGES = {
 #: Version of the installed package.
 __version__: str
 
+#: Names that other packages have, and how the same is written here.
+_ELSEWHERE = {
+    "bode": "G.bode(), with G a TransferFunction or ControlLoop",
+    "bode_plot": "G.bode()",
+    "exp": "delay(T) for exp(-T s)",
+    "freqresp": "G.frequency_response(omega)",
+    "impulse_response": "G.impulse_response(duration)",
+    "margin": "G.margin(), with the loop gain G, or loop.margin() of a ControlLoop",
+    "nyquist": "G.nyquist()",
+    "nyquist_plot": "G.nyquist()",
+    "pade": "G.to_control(pade=n) or G.to_scipy(pade=n); here delays are never approximated",
+    "poles": "G.rightmost(n), or G.poles(re, im) for a region",
+    "root_locus": "crossings(family, ranges), or loop.explore()",
+    "ss": "DelaySystem(A, B, C, D)",
+    "step": "G.step_response()",
+    "step_response": "G.step_response()",
+    "tf": "TransferFunction(num, den, delay=T), or an expression in s and delay(T)",
+}
+
 _PACKAGE_OF = {name: package for package, names in _PACKAGES.items() for name in names.split()}
 
 __all__ = sorted(_PACKAGE_OF)
@@ -129,7 +148,8 @@ if not TYPE_CHECKING:  # A type checker reads the imports above.
         elif name in _PACKAGES and not name.startswith("_"):
             value = importlib.import_module(f"deadtime.{name}")
         else:
-            raise AttributeError(f"module 'deadtime' has no attribute {name!r}")
+            here = f": write {_ELSEWHERE[name]}" if name in _ELSEWHERE else ""
+            raise AttributeError(f"module 'deadtime' has no attribute {name!r}{here}")
         globals()[name] = value
         return value
 

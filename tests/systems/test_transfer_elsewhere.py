@@ -8,7 +8,18 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
-from deadtime import TransferFunction, delay, feedback, s
+from deadtime import (
+    PD,
+    PI,
+    PID,
+    ControlLoop,
+    P,
+    TransferFunction,
+    delay,
+    feedback,
+    parameters,
+    s,
+)
 from transfers import LOOPS
 
 # Loops
@@ -90,7 +101,7 @@ def test_python_control_agrees_without_delay(num, den):
 
     theirs = control.tf(num, den)
     ours = TransferFunction(num, den)
-    assert TransferFunction.from_control(theirs) == ours
+    assert TransferFunction(theirs) == ours
     omega = np.geomspace(0.01, 100, 50)
     np.testing.assert_allclose(ours.frequency_response(omega), theirs(1j * omega), rtol=1e-12)
     both = feedback(ours), control.feedback(theirs)
@@ -117,7 +128,7 @@ def test_python_control_both_ways():
     import control
 
     theirs = control.ss([[0.0, 1.0], [-4.0, -0.4]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
-    G = TransferFunction.from_control(theirs, delay=0.36)
+    G = TransferFunction(theirs, delay=0.36)
     z = 0.3 + 2j
     assert G(z) == pytest.approx(complex(theirs(z)) * cmath.exp(-0.36 * z), rel=1e-12)
     back = TransferFunction([1.0, 2.0], [3.0, 4.0]).to_control()
@@ -136,11 +147,9 @@ def test_python_control_both_ways():
         (control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2))), "2 inputs"),
     ):
         with pytest.raises(ValueError, match=message):
-            TransferFunction.from_control(bad)
-    with pytest.raises(TypeError, match="int"):
-        TransferFunction.from_control(3)
+            TransferFunction(bad)
     with pytest.raises(ValueError, match="delay"):
-        TransferFunction.from_control(theirs, delay=-1.0)
+        TransferFunction(theirs, delay=-1.0)
 
 
 def test_scipy_both_ways():
@@ -150,9 +159,8 @@ def test_scipy_both_ways():
         signal.lti([2.0], [1.0, 3.0]),
         signal.ZerosPolesGain([], [-3.0], 2.0),
         signal.StateSpace([[-3.0]], [[1.0]], [[2.0]], [[0.0]]),
-        ([2.0], [1.0, 3.0]),
     ):
-        G = TransferFunction.from_scipy(system, delay=0.1)
+        G = TransferFunction(system, delay=0.1)
         assert G(1.0) == pytest.approx(0.5 * math.exp(-0.1))
     back = TransferFunction([2.0], [1.0, 3.0]).to_scipy()
     assert isinstance(back, signal.TransferFunction)
@@ -160,16 +168,93 @@ def test_scipy_both_ways():
     rough = (2.0 / (s + 3) * delay(0.1)).to_scipy(pade=3)
     assert rough.freqresp([1.0])[1][0] == pytest.approx(2 / (3 + 1j) * cmath.exp(-0.1j), rel=1e-9)
     with pytest.raises(ValueError, match=r"dt=0\.1"):
-        TransferFunction.from_scipy(signal.dlti([1.0], [1.0, 0.5], dt=0.1))
+        TransferFunction(signal.dlti([1.0], [1.0, 0.5], dt=0.1))
     with pytest.raises(ValueError, match="2 outputs"):
-        TransferFunction.from_scipy(
-            signal.StateSpace([[-1.0]], [[1.0]], [[1.0], [2.0]], [[0.0], [0.0]])
-        )
-    with pytest.raises(TypeError, match="float"):
-        TransferFunction.from_scipy(3.0)
+        TransferFunction(signal.StateSpace([[-1.0]], [[1.0]], [[1.0], [2.0]], [[0.0], [0.0]]))
     for order in (0, 21):
         with pytest.raises(ValueError, match=f"pade={order}"):
             (1 / s * delay(0.1)).to_scipy(pade=order)
+
+
+@needs_control
+def test_systems_of_other_packages_take_part_in_algebra():
+    import control
+    from scipy import signal
+
+    G = 1.8 / (40.0 * s + 1.0)
+    for theirs in (control.tf([1.8], [40.0, 1.0]), control.ss([[-0.025]], [[0.045]], [[1]], [[0]])):
+        for one in (theirs * delay(12.0), delay(12.0) * theirs, theirs * (delay(12.0) / 1.0)):
+            assert one(0.1j) == pytest.approx((G * delay(12.0))(0.1j), rel=1e-14)
+        for one, other in ((theirs + s, G + s), (s - theirs, s - G), (s / theirs, s / G)):
+            assert one(0.1j) == pytest.approx(other(0.1j), rel=1e-14)
+        assert feedback(G, theirs)(1j) == pytest.approx(feedback(G, G)(1j), rel=1e-14)
+    one = signal.lti([1.8], [40.0, 1.0]) * delay(12.0)
+    assert one(0.1j) == pytest.approx((G * delay(12.0))(0.1j), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("written", "spelled"),
+    [
+        (lambda: np.exp(-12 * s), r"exp\(-12 s\) is written deadtime\.delay\(12\)"),
+        (lambda: math.exp(-0.5 * s), r"deadtime\.delay\(0\.5\)"),
+        (lambda: math.e ** (-3 * s), r"deadtime\.delay\(3\)"),
+        (lambda: np.exp(3 * s), r"deadtime\.delay\(T\)"),
+        (lambda: np.exp(-s * (s + 1)), r"deadtime\.delay\(T\)"),
+        (lambda: np.exp(-s * parameters("T")[0]), r"deadtime\.delay\(T\)"),
+        (lambda: np.exp(-1 / s), r"deadtime\.delay\(T\)"),
+        (lambda: np.sin(s), r"numpy\.sin takes no QuasiPolynomial"),
+        (lambda: np.array([1.0, 2.0]) * s, r"numpy\.multiply takes no QuasiPolynomial"),
+    ],
+)
+def test_a_delay_in_another_spelling_is_answered_with_the_right_one(written, spelled):
+    with pytest.raises(TypeError, match=spelled):
+        written()
+
+
+def test_numbers_of_numpy_stay_numbers():
+    two = np.float64(2.0)
+    assert two * s == 2.0 * s
+    assert s * two == 2.0 * s
+    assert two + s == 2.0 + s
+    assert two - s == 2.0 - s
+    assert two / s == 2.0 / s
+    assert np.array(2.0) * s == 2.0 * s
+    assert (two == s) is False
+    assert (two != s) is True
+
+
+@needs_control
+def test_a_system_of_another_package_as_a_controller():
+    import control
+    from scipy import signal
+
+    plant = 1.8 / (40.0 * s + 1.0) * delay(12.0)
+    for given, expected in (
+        (control.tf([2.0], [1.0]), P(2.0)),
+        (control.tf([2.0, 0.5], [1.0, 0.0]), PI(2.0, 0.5)),
+        (control.tf([4.0, 2.0, 0.5], [2.0, 0.0]), PID(1.0, 0.25, 2.0)),
+        (signal.lti([2.0, 0.5], [1.0, 0.0]), PI(2.0, 0.5)),
+        (2.0 + 0.5 / s, PI(2.0, 0.5)),
+        (2.0 + 0.5 * s, PD(2.0, 0.5)),
+    ):
+        assert ControlLoop(plant, given).controller == expected
+    for bad in (1.0 / (s + 1.0), delay(1.0), (2.0 + 0.5 / s) * delay(1.0), 1.0 / s**2):
+        with pytest.raises(ValueError, match=r"deadtime\.feedback\(C \* G\)"):
+            ControlLoop(plant, bad)
+    with pytest.raises(TypeError, match="controller=3"):
+        ControlLoop(plant, 3.0)
+
+
+@pytest.mark.parametrize("name", ["bode", "margin", "nyquist", "pade", "step_response", "tf"])
+def test_names_of_other_packages_say_what_to_write(name):
+    with pytest.raises(AttributeError, match=f"no attribute '{name}': write "):
+        getattr(dtm, name)
+    assert not hasattr(dtm, "no_such_name")
+
+
+def test_all_poles_of_an_infinite_spectrum_name_the_rightmost():
+    with pytest.raises(ValueError, match=r"rightmost\(n\)"):
+        feedback(1.8 / (40.0 * s + 1.0) * delay(12.0)).poles()
 
 
 def test_without_python_control_it_says_what_to_install(monkeypatch):

@@ -14,6 +14,7 @@ from deadtime._base.validation import non_negative
 from deadtime.loops._controllers import Controller
 from deadtime.loops._explored import explorer_of
 from deadtime.loops._gain import LoopGain
+from deadtime.loops._given_controllers import controller_of
 from deadtime.loops._given_plants import plant_and_delay
 from deadtime.loops._in_time import LoopInTime
 from deadtime.loops._plants import Plant
@@ -36,8 +37,8 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         with one input and one output. A delay in series with it is added to `delay`, and is not
         part of the `plant` of the loop. With delays inside it becomes a
         `deadtime.loops.PlantWithDelays`, which takes no `sample_time` and no `limit`.
-    controller : Controller
-        `P`, `PV`, `PD`, `PI` or `PID`.
+    controller : Controller, TransferFunction or a system as above
+        `P`, `PV`, `PD`, `PI` or `PID`; or a transfer function that is one of them.
     delay : float, optional
         Delay in s, zero or more; None where it is not known yet.
     sample_time : float, optional
@@ -84,7 +85,7 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
     def __init__(
         self,
         plant: object,
-        controller: Controller,
+        controller: object,
         *,
         delay: float | None = None,
         sample_time: float | None = None,
@@ -99,7 +100,8 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
                     "command and output; leave delay_path out, or give the plant without its delay"
                 )
             delay = in_series + (0.0 if delay is None else non_negative("delay", delay))
-        specification = LoopSpecification(own, controller, delay, sample_time, limit, delay_path)
+        controls = controller_of(controller)
+        specification = LoopSpecification(own, controls, delay, sample_time, limit, delay_path)
         given = vars(specification)
         mine = {name: given[name] for name in _NAMES}
         mine["specification"] = specification

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from deadtime._base.validation import non_zero
 from deadtime.loops._plants import NO_GAIN, Plant, PlantForm, RationalPlant
 from deadtime.roots import QuasiPolynomial
-from deadtime.systems import DelaySystem, TransferFunction
+from deadtime.systems import DelaySystem, TransferFunction, polynomials_of
 
 
 @dataclass(frozen=True)
@@ -124,9 +124,5 @@ def transfer_function_of(given: object) -> TransferFunction | None:
                 "transfer functions, system.transfer_function(output, input)"
             )
         return given.transfer_function()
-    package = type(given).__module__
-    if package.startswith("control."):
-        return TransferFunction.from_control(given)
-    if package.startswith("scipy.signal"):
-        return TransferFunction.from_scipy(given)
-    return None
+    found = polynomials_of(given)
+    return None if found is None else TransferFunction(*found)

@@ -9,8 +9,9 @@ independent program checks.
 # The files. `_quasipolynomial` and `_parametric` are the functions, `_characteristic` the questions
 # about their roots, `_root_set`, `_chains`, `_sensitivity` and `_expansion` the answers.
 # `_crossings` varies one number, `_ratio` leaves out the roots of a numerator. `_determinant` and
-# `_matrix_roots` serve systems of matrices, `_scalar_delay` the scalar equation. `certificate`
-# holds proofs of root counts and an independent program that checks them.
+# `_matrix_roots` serve systems of matrices, `_scalar_delay` the scalar equation. `_exponential`
+# says how a delay is written. `certificate` holds proofs of root counts and an independent program
+# that checks them.
 
 from deadtime.roots._chains import Chain
 from deadtime.roots._characteristic import Edge as Edge
@@ -25,6 +26,7 @@ from deadtime.roots._determinant import (
     expanded_and_exact as expanded_and_exact,
 )
 from deadtime.roots._expansion import Expansion
+from deadtime.roots._exponential import NoExponential as NoExponential
 from deadtime.roots._family import HasFamily as HasFamily, family_of as family_of
 from deadtime.roots._matrix_roots import (
     MatrixDeterminant as MatrixDeterminant,

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, SupportsFloat, cast
 
 from deadtime._base.frozen import Immutable
 from deadtime._base.validation import finite, numbers_at
+from deadtime.roots._exponential import NoExponential
 from deadtime.roots._native import Family
 from deadtime.roots._quasipolynomial import QuasiPolynomial, is_number
 from deadtime.roots._text import Delay, Monomial, Powers, Terms, family_text, latex
@@ -44,7 +45,7 @@ class FamilyTerm(NamedTuple):
     slopes: tuple[tuple[str, float], ...]
 
 
-class ParametricQuasiPolynomial(Immutable):
+class ParametricQuasiPolynomial(NoExponential, Immutable):
     """A quasi-polynomial whose coefficients and delays depend on named parameters.
 
     Made by algebra from `parameters`, `s`, `delay` and numbers: ``+``, ``-``, ``*``, whole powers
@@ -67,8 +68,6 @@ class ParametricQuasiPolynomial(Immutable):
     >>> round(h.at(Kp=2.0, Kv=0.3, T=0.36).spectral_abscissa(), 6)
     -3.31678
     """
-
-    __array_ufunc__ = None  # numpy scalars and arrays leave the operation to this class
 
     _names: tuple[str, ...]
     _terms: Terms

@@ -27,6 +27,7 @@ from deadtime._base.frozen import Immutable
 from deadtime._base.validation import Range, unmasked, whole_number
 from deadtime.roots._characteristic import Characteristic
 from deadtime.roots._expansion import Expansion
+from deadtime.roots._exponential import NoExponential
 from deadtime.roots._text import joined, latex, row_text
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ Kind: TypeAlias = Literal["polynomial", "retarded", "neutral", "difference", "ad
 _Family = TypeVar("_Family", covariant=True)
 
 
-class QuasiPolynomial(Immutable, Characteristic):
+class QuasiPolynomial(NoExponential, Immutable, Characteristic):
     r"""A quasi-polynomial :math:`h(s) = \sum_j p_j(s)\, e^{-s\tau_j}` with real coefficients.
 
     Usually built by algebra with `deadtime.s`, `deadtime.delay` and numbers. Immutable; equal
@@ -74,9 +75,6 @@ class QuasiPolynomial(Immutable, Characteristic):
     """
 
     __slots__ = ("_coefficients", "_delays", "_native")
-
-    # NumPy leaves `array * h` and `number * h` to this class.
-    __array_ufunc__ = None
 
     _native: native.QuasiPolynomial
     _coefficients: NDArray[np.float64]
@@ -154,6 +152,11 @@ class QuasiPolynomial(Immutable, Characteristic):
 
     # Algebra
 
+    def _time(self) -> float | None:
+        rows = self._coefficients
+        slope = float(rows[0, 1]) if rows.shape == (1, 2) else 0.0
+        return -slope if slope < 0.0 and not (rows[0, 0] or self._delays[0]) else None
+
     def __pos__(self) -> QuasiPolynomial:
         return self
 
@@ -163,7 +166,7 @@ class QuasiPolynomial(Immutable, Characteristic):
     def __add__(self, other: object) -> QuasiPolynomial:
         second = _operand(other)
         if second is None:
-            return NotImplemented
+            return cast(QuasiPolynomial, _beyond(self, "__add__", other))
         return self._wrap(self._native.add(second._native))
 
     __radd__ = __add__
@@ -171,13 +174,13 @@ class QuasiPolynomial(Immutable, Characteristic):
     def __sub__(self, other: object) -> QuasiPolynomial:
         second = _operand(other)
         if second is None:
-            return NotImplemented
+            return cast(QuasiPolynomial, _beyond(self, "__sub__", other))
         return self._wrap(self._native.sub(second._native))
 
     def __rsub__(self, other: object) -> QuasiPolynomial:
         first = _operand(other)
         if first is None:
-            return NotImplemented
+            return cast(QuasiPolynomial, _beyond(self, "__rsub__", other))
         return self._wrap(first._native.sub(self._native))
 
     def __mul__(self, other: object) -> QuasiPolynomial:
@@ -185,7 +188,7 @@ class QuasiPolynomial(Immutable, Characteristic):
             return self._wrap(self._native.mul(other._native))
         if is_number(other):
             return self._wrap(self._native.scale(float(cast(float, other))))
-        return NotImplemented
+        return cast(QuasiPolynomial, _beyond(self, "__mul__", other))
 
     __rmul__ = __mul__
 
@@ -202,12 +205,12 @@ class QuasiPolynomial(Immutable, Characteristic):
             return self._wrap(native.QuasiPolynomial(self._coefficients / divisor, self._delays))
         if isinstance(other, QuasiPolynomial):
             return _quotient(self, other)
-        return NotImplemented
+        return cast(QuasiPolynomial, _beyond(self, "__truediv__", other))
 
     def __rtruediv__(self, other: float) -> TransferFunction:
         first = _operand(other)
         if first is None:
-            return NotImplemented
+            return cast("TransferFunction", _beyond(self, "__rtruediv__", other))
         return _quotient(first, self)
 
     def __pow__(self, exponent: object) -> Any:
@@ -390,6 +393,13 @@ def _quotient(num: QuasiPolynomial, den: QuasiPolynomial) -> TransferFunction:
     from deadtime.systems import TransferFunction
 
     return TransferFunction(num, den)
+
+
+def _beyond(h: QuasiPolynomial, operation: str, other: object) -> Any:
+    """Leave a system of another package, which has no type here, to the transfer function of h."""
+    if type(other).__module__.partition(".")[0] not in ("control", "scipy"):
+        return NotImplemented
+    return getattr(_quotient(h, QuasiPolynomial([[1.0]], [0.0])), operation)(other)
 
 
 class Exponent(Protocol[_Family]):

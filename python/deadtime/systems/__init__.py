@@ -11,6 +11,7 @@ converted from and to those of other packages.
 # and `_run` simulate; `_response` is the result.
 
 from deadtime.systems._delay_system import DelaySystem
+from deadtime.systems._interchange import polynomials_of as polynomials_of
 from deadtime.systems._margins import Margins, margins as margins, margins_of as margins_of
 from deadtime.systems._plots import plot_bode as plot_bode, plot_responses as plot_responses
 from deadtime.systems._response import (

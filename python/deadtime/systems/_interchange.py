@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import importlib
 from math import factorial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +34,17 @@ def control_package() -> Any:
         raise ImportError("this needs python-control: pip install control") from error
 
 
-def polynomials_of_control(system: Any) -> tuple[Array, Array]:
+def polynomials_of(system: object) -> tuple[Array, Array] | None:
+    """Numerator and denominator of a system of python-control or scipy.signal; None for others."""
+    package = type(system).__module__
+    if package.startswith("control."):
+        return _of_control(system)
+    if package.startswith("scipy.signal"):
+        return _of_scipy(system)
+    return None
+
+
+def _of_control(system: Any) -> tuple[Array, Array]:
     """Numerator and denominator, descending, of a continuous system with one input and output."""
     control = control_package()
     if not isinstance(system, (control.TransferFunction, control.StateSpace)):
@@ -53,18 +63,14 @@ def polynomials_of_control(system: Any) -> tuple[Array, Array]:
     return _numbers(system.num[0][0]), _numbers(system.den[0][0])
 
 
-def polynomials_of_scipy(system: Any) -> tuple[Array, Array]:
-    """Numerator and denominator, descending, of an `lti` or a tuple that makes one."""
+def _of_scipy(system: Any) -> tuple[Array, Array]:
+    """Numerator and denominator, descending, of an `lti`."""
     from scipy import signal
 
-    if isinstance(system, tuple):
-        system = cast(Any, signal.lti)(*system)
     if isinstance(system, signal.dlti):
         raise _is_sampled(system)
     if not isinstance(system, signal.lti):
-        raise TypeError(
-            f"{type(system).__name__}: give an lti system of scipy.signal, or a tuple as for lti"
-        )
+        raise TypeError(f"{type(system).__name__}: give an lti system of scipy.signal")
     if isinstance(system, signal.StateSpace):
         if system.D.shape != (1, 1):
             raise ValueError(

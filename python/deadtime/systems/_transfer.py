@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from deadtime._base.frozen import Immutable
 from deadtime._base.validation import OpenRange, non_negative, unmasked
 from deadtime.roots import (
+    NoExponential,
     Parameter,
     ParametricQuasiPolynomial,
     QuasiPolynomial,
@@ -23,7 +24,7 @@ from deadtime.roots import (
     s,
 )
 from deadtime.systems._frequency_domain import FrequencyDomain
-from deadtime.systems._interchange import Writable, polynomials_of_control, polynomials_of_scipy
+from deadtime.systems._interchange import Writable, polynomials_of
 from deadtime.systems._native import ratio
 from deadtime.systems._parts import (
     Polynomial,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     pass
 
 
-class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writable):
+class TransferFunction(NoExponential, Immutable, FrequencyDomain, HasPoles, HasResponses, Writable):
     """A transfer function num(s)/den(s) of two quasi-polynomials.
 
     Usually made by dividing: ``2.0 / s * delay(0.36)``. Immutable. A delay common to numerator
@@ -51,7 +52,8 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
     Parameters
     ----------
     num, den : QuasiPolynomial, float or sequence of float
-        A sequence holds the coefficients of a polynomial in descending powers of s.
+        A sequence holds the coefficients of a polynomial in descending powers of s. Alone, `num`
+        may be a continuous system of python-control or scipy.signal with one input and output.
     delay : float, default 0
         A delay in series, in s, zero or more.
 
@@ -85,13 +87,13 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
 
     __slots__ = ("_den", "_num")
 
-    # NumPy leaves `array * G` and `number * G` to this class.
-    __array_ufunc__ = None
-
     _num: QuasiPolynomial
     _den: QuasiPolynomial
 
     def __init__(self, num: Polynomial, den: Polynomial = 1.0, *, delay: float = 0.0) -> None:
+        if isinstance(den, float) and (given := polynomials_of(num)) is not None:
+            num, below = given
+            den = below if den == 1.0 else den * below
         n, d = quasi_polynomial("num", num), quasi_polynomial("den", den)
         if not d.coefficients.any():
             raise ZeroDivisionError("den is zero: a transfer function needs one that is not")
@@ -379,62 +381,6 @@ class TransferFunction(Immutable, FrequencyDomain, HasPoles, HasResponses, Writa
 
     # Other packages
 
-    @classmethod
-    def from_control(cls, system: Any, delay: float = 0.0) -> TransferFunction:
-        """Read a system of python-control and put a delay in series.
-
-        Parameters
-        ----------
-        system : control.TransferFunction or control.StateSpace
-            Continuous, with one input and one output.
-        delay : float, default 0
-            In s, zero or more.
-
-        Returns
-        -------
-        TransferFunction
-
-        Raises
-        ------
-        ImportError
-            If python-control is not installed.
-        ValueError
-            If the system is sampled or has several inputs or outputs, or the delay is negative.
-        TypeError
-            If it is no such system.
-        """
-        return cls(*polynomials_of_control(system), delay=delay)
-
-    @classmethod
-    def from_scipy(cls, system: Any, delay: float = 0.0) -> TransferFunction:
-        """Read a system of scipy.signal and put a delay in series.
-
-        Parameters
-        ----------
-        system : scipy.signal.lti or tuple
-            Continuous, with one input and one output; a tuple as `scipy.signal.lti` takes it.
-        delay : float, default 0
-            In s, zero or more.
-
-        Returns
-        -------
-        TransferFunction
-
-        Raises
-        ------
-        ValueError
-            If the system is sampled or has several outputs, or the delay is negative.
-        TypeError
-            If it is no such system.
-
-        Examples
-        --------
-        >>> import deadtime as dtm
-        >>> dtm.TransferFunction.from_scipy(([2.0], [1.0, 0.0]), delay=0.36)
-        2 exp(-0.36 s) / s
-        """
-        return cls(*polynomials_of_scipy(system), delay=delay)
-
 
 def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
     """Close a loop: G / (1 - sign G H), with G forward and H back.
@@ -444,8 +390,8 @@ def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
 
     Parameters
     ----------
-    G, H : TransferFunction, QuasiPolynomial or float
-        Forward and return path.
+    G, H : TransferFunction, QuasiPolynomial, float or system
+        Forward and return path; a system is one of python-control or scipy.signal.
     sign : {-1, 1}, default -1
         -1 for negative, 1 for positive feedback.
 
@@ -490,7 +436,8 @@ def _operand(value: object) -> TransferFunction | None:
         return value
     if isinstance(value, QuasiPolynomial) or is_number(value):
         return TransferFunction(cast(Any, value))
-    return None
+    found = polynomials_of(value)
+    return None if found is None else TransferFunction(*found)
 
 
 def _inverse(G: TransferFunction) -> TransferFunction:

@@ -127,7 +127,8 @@ pub(crate) fn endless(h: &QuasiPolynomial, re: (f64, f64)) -> Error {
     };
     Error::argument(format!(
         "the region re=({}, {}) with an open imaginary part holds infinitely many roots, or cannot \
-         be shown to hold finitely many: {reason}; give both ends of im, or move re",
+         be shown to hold finitely many: {reason}; give both ends of im, or move re, or ask \
+         rightmost(n) for the n rightmost ones",
         re.0, re.1
     ))
 }
