@@ -136,9 +136,9 @@ def _fitted(study: FlightStudy) -> str:
     if all(age is not None for age in ages):
         mean = sum(age for age in ages if age is not None) / len(ages)
         words += (
-            " Outputs are taken at the times of the vehicle's clock; when a command was computed "
-            f"they were {1e3 * mean:.0f} ms older than on the arrival of a fast message, on "
-            "average, which is part of the delay."
+            " Outputs are taken at the times of the vehicle's clock. When a command was computed, "
+            f"they were on average {1e3 * mean:.0f} ms older than on the arrival of a fast "
+            "message. This is part of the delay."
         )
     if learned.split is None:
         words += f" The delay is not divided between link and vehicle: {learned.unsplit}."

@@ -226,9 +226,10 @@ class InternetLoop:
         sentences = [
             f"Measured, the command in force is {1e3 * self.age:.1f} ms old on average: "
             f"{mean['round trip']:.1f} ms of round trip, {mean['held']:.1f} ms until the "
-            f"controller answers, {mean['hold']:.1f} ms because a command holds for a sample time, "
-            f"and {mean['waiting']:.1f} ms for packets that were lost, overtaken or buffered and "
-            "processes that wake up late (below zero where the newest packets are faster than all)."
+            f"controller answers, {mean['hold']:.1f} ms because a command holds for a sample "
+            f"time. The rest, {mean['waiting']:.1f} ms, is for packets that were lost, overtaken "
+            "or buffered, and for processes that wake up late. It is below zero where the newest "
+            "packets are faster than the average."
         ]
         unsteady = [run for run in self.runs if run.is_unsteady]
         if unsteady:

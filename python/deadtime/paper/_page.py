@@ -17,7 +17,7 @@ CAPTIONS = {
     "table1": "The delays that the measured overshoots give: printed, by the dominant root, and by "
     "the exact step response.",
     "figure2": "Left: step responses of the loop. Middle: period and first peak with a hold or a "
-    "lag over those of a delay alone that overshoots by as much, for the six rows of Table 1. "
+    "lag, divided by those of a delay alone with the same overshoot; the six rows of Table 1. "
     "Right: how far one loop for all gains misses the overshoots of Table 1.",
     "figure3": "Left: responses on both sides of the limit. Middle: the rightmost root. Right: "
     "where a simulation in fixed steps sees the limit.",

@@ -124,8 +124,8 @@ class Figure10(Part):
         return (
             f"Kv = 0.3 is the most stable gain only among multiples of 0.1: the best is "
             f"{ideal.best:.4f} ({ideal.best_abscissa:.3f} 1/s).",
-            f"The filter is not minor: at Kv = 0.3 the rightmost root moves from "
-            f"{_in_words(ideal.roots[0.3])} to {_in_words(filtered.roots[0.3])}, the best gain is "
+            f"The filter matters: at Kv = 0.3 the rightmost root moves from "
+            f"{_in_words(ideal.roots[0.3])} to {_in_words(filtered.roots[0.3])}. The best gain is "
             f"{filtered.best:.3f} ({filtered.best_abscissa:.3f}), and the loop is stable up to "
             f"{filtered.critical:.3f} instead of {ideal.critical:.3f}.",
         )

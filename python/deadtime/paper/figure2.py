@@ -191,8 +191,9 @@ class Figure2(Part):
             "0.09 to 0.13 s is not caused by its method: at a constant round trip the method's "
             f"estimates rise by {1e3 * self._rise():.1f} ms from K = 5 to 10. Runs at different "
             "hours, of round trips that differ by a third, would explain it as well.",
-            "With a jitter of 20 ms and the newest answer in use, the effective delay is "
-            f"{1e3 * self._won():.0f} ms shorter than with a constant round trip of the same mean.",
+            "With a jitter of 20 ms and the newest answer in use, the effective delay is shorter. "
+            f"It is {1e3 * self._won():.0f} ms below that of a constant round trip of the same "
+            "mean.",
         )
 
     def _periods(self, hold: float = 0.0, lag: float = 0.0) -> list[float]:

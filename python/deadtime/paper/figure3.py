@@ -83,9 +83,8 @@ class Figure3(Part):
         low, high = (1e3 * math.pi / (2.0 * gain) for gain in (19.0, 18.0))
         return (
             f"The loop loses stability at K = {self.limit:.3f}. A simulation that is stable at 18 "
-            f"and not at 19 has a delay of {low:.1f} to {high:.1f} ms instead of 100, or steps so "
-            f"coarse (of those tried: {', '.join(fits)} ms) that it describes itself more than "
-            "the loop.",
+            f"and not at 19 has a delay of {low:.1f} to {high:.1f} ms instead of 100. Or its steps "
+            f"are too coarse (of those tried: {', '.join(fits)} ms).",
             f"With the command held for 65 ms the limit is {self.held_limit:.2f}: leaving out the "
             "hold errs on the unsafe side.",
         )

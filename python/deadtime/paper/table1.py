@@ -107,7 +107,7 @@ class Table1(Part):
         """What the table shows."""
         exact = [row.exact_delay for row in self.rows]
         return (
-            "The column of damping ratios is not equation (5) of the printed overshoots but the "
+            "The column of damping ratios is not equation (5) of the printed overshoots. It is the "
             "damping ratio of the dominant root at the delay that the paper uses further on.",
             f"By the exact step response the delays run from {1e3 * min(exact):.1f} to "
             f"{1e3 * max(exact):.1f} ms: the trend with K is not caused by the dominant root (see "

@@ -124,8 +124,8 @@ def _range_finding(columns: Columns, loop: ControlLoop) -> Iterator[Finding]:
     yield Finding(
         "output_range",
         "warning",
-        f"the output moves over {ratio:.3g} times the range of the reference, unlike that of a "
-        "well damped loop with an integrating plant, which reaches its reference: check that both "
+        f"the output moves over {ratio:.3g} times the range of the reference. In a well damped "
+        "loop with an integrating plant it reaches its reference: check that both "
         "are in one unit and belong to one loop, and that the loop was closed",
         "a fit of the loop may end at any delay",
         math.inf,

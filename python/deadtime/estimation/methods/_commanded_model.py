@@ -183,9 +183,8 @@ def commanded_model(run: Run, names: tuple[str, ...], assumed: Assumed) -> Comma
         )
     if isinstance(loop.plant, RateLimited) and data.sent is None and commands.are_computed:
         raise NotIdentifiableError(
-            "rows are further apart than the samples of the controller, and what a plant that "
-            "limits the rate of its command got depends on every command: choose a window without "
-            "missing rows"
+            "rows are further apart than the samples of the controller. A plant that limits the "
+            "rate of its command depends on every command: choose a window without missing rows"
         )
     return CommandedModel(
         recording=data,

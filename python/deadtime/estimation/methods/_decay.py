@@ -111,9 +111,9 @@ class Decay(OfOne):
             ),
             uncalibrated=(
                 "the decay method assumes the given gain and an exponential tail: noise "
-                f"alone makes the delay uncertain by {stderr:.2g} s, a gain that is 1 % off moves "
-                f"it by {0.01 / rate:.2g} s, and other modes in the tail shift it "
-                "further; use method='waveform' for an interval"
+                f"alone makes the delay uncertain by {stderr:.2g} s. A gain that is 1 % off moves "
+                f"it by {0.01 / rate:.2g} s; other modes in the tail move it "
+                "too; use method='waveform' for an interval"
             ),
             details={"rate": rate, "rate_error": error, "tail_samples": samples},
         )

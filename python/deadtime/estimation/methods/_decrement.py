@@ -42,8 +42,8 @@ class Decrement(OfOne):
 
     name: ClassVar[str] = "decrement"
     limits: ClassVar[str] = (
-        "It takes the peaks as those of one decaying oscillation, so that other modes in the first "
-        "peaks, and noise on which the controller acts, move the delay."
+        "It takes the peaks as those of one decaying oscillation. Other modes in the first "
+        "peaks move the delay, and so does noise on which the controller acts."
     )
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
@@ -98,8 +98,8 @@ class Decrement(OfOne):
             ),
             uncalibrated=(
                 "the decrement method assumes one decaying oscillation: noise alone makes the "
-                f"delay uncertain by {math.sqrt(own[0, 0]):.2g} s, but other modes in the first "
-                "peaks, and noise that the controller acts on, shift it further; use "
+                f"delay uncertain by {math.sqrt(own[0, 0]):.2g} s. Other modes in the first "
+                "peaks move it too, and so does noise on which the controller acts; use "
                 "method='waveform' for an interval"
             ),
             details={

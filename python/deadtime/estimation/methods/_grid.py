@@ -123,10 +123,9 @@ class Grid(OfOne):
             start=model.start_of(point),
             message=_message(names, grid, white),
             uncalibrated=(
-                "the grid method fits the response to the reference, without the noise that the "
-                f"controller acts on: the curvature of the cost gives {low:.4g} to {high:.4g} s "
-                "(95 %), which has this coverage only where the controller does not act on the "
-                "noise; use method='output_error' or 'waveform' for an interval"
+                "the grid method leaves out that the controller acts on the noise: the curvature "
+                f"of the cost gives {low:.4g} to {high:.4g} s (95 %), which holds only where the "
+                "controller does not; use method='output_error' or 'waveform' for an interval"
             ),
             details={
                 "delays": grid.tolist(),

@@ -162,8 +162,8 @@ class Overshoot(OfOne):
             ),
             uncalibrated=(
                 "the overshoot method reads one peak: noise alone makes the delay uncertain by "
-                f"{stderr:.2g} s, but the largest of noisy samples is biased upwards and a wrong "
-                "gain, a lag or the hold shift it further; use method='waveform' for an interval"
+                f"{stderr:.2g} s. The largest of noisy samples is too high on average, and a wrong "
+                "gain, a lag or the hold move the delay; use method='waveform' for an interval"
             ),
             details=details,
         )

@@ -117,7 +117,7 @@ class Relay(OfOne):
             ),
             uncalibrated=(
                 f"the relay method gives the scatter of {count} cycles, {stderr:.2g} s for "
-                "their mean, but not what a lag or a drift adds to each of them; use "
+                "their mean. A lag or a drift adds the same to each of them; use "
                 "method='output_error' for an interval"
             ),
             details={

@@ -95,9 +95,9 @@ def why_two_clocks(found: LoopLatency, command: Stamped, response: Stamped) -> s
         first = stated(found.time + grows.start, error, "s")
         also = f", whose stamps do so by {1e6 * abs(apart):.3g} ppm" if apart else ""
         return (
-            f"the time from command to response grows by {by} each second, as where {names} are "
-            f"stamped by clocks that drift apart{also}, or where the vehicle changes; when the log "
-            f"began, it was {first}"
+            f"the time from command to response grows by {by} each second; it was {first} when the "
+            f"log began. Either {names} are stamped by clocks that drift apart{also}, or the "
+            "vehicle changes"
         )
     if abs(apart) * length <= worth or not (grows is None or grows.may_be(apart)):
         return ""

@@ -154,8 +154,8 @@ class GainSchedule(ReadOnlyArrays, Pictured):
             )
         if self.lowered < 1.0:
             lines.append(
-                f"the gains were lowered to {100.0 * self.lowered:.0f} % of the way from the robust"
-                " ones to those of the same margins, for which there is no proof"
+                f"for gains of the same margins there is no proof: they were moved to the robust "
+                f"ones, to {100.0 * self.lowered:.0f} % of the way from these"
             )
         return "\n".join(lines)
 
@@ -352,9 +352,8 @@ def _proved(
     found, share, refused = attempt(0.0), 0.0, 1.0
     if found is None:
         raise NotProvedError(
-            f"no form was found for the robust gains Kp = {claims.Kp:.4g}, Kv = {claims.Kv:.4g} "
-            f"alone, for delays of {claims.ages[-1][0]} to {claims.ages[-1][1]} samples that "
-            "change at any time"
+            f"no proof was found for the robust gains Kp = {claims.Kp:.4g}, Kv = {claims.Kv:.4g}, "
+            f"with delays that change from {claims.ages[-1][0]} to {claims.ages[-1][1]} samples"
             + ("" if claims.limit is None else f" and steps of {step:g}")
             + ": take a larger gain_margin, a shorter range, a smaller decay or smaller steps"
         )

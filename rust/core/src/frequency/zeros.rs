@@ -80,9 +80,8 @@ pub(super) fn zeros_between(
         }
         refuse_if!(
             looked_at > MOST,
-            "between {low:e} and {high:e} rad/s there are too many crossings to list (the gain \
-             is one, or the phase a multiple of 180 degrees, on a whole range of frequencies, or \
-             the delay is very long for such frequencies)"
+            "between {low:e} and {high:e} rad/s there are too many crossings to list: the delay \
+             is very long for such frequencies, or gain or phase cross on a whole range of them"
         );
         let (m, r) = (0.5 * (a + b), 0.5 * (b - a));
         let here = f.taylor(m);
