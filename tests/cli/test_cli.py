@@ -38,16 +38,32 @@ def demo(tmp_path_factory):
     return folder, result.stdout
 
 
-def test_the_demo_shows_the_truth_beside_the_estimates(demo):
+@pytest.fixture(scope="module")
+def all_of_demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("all")
+    result = process("demo", "--all", cwd=folder, PYTHONIOENCODING="ascii", LC_ALL="C")
+    assert result.returncode == 0, result.stderr
+    return folder, result.stdout
+
+
+def test_the_demo_is_a_paragraph_that_names_the_truth_once(demo):
     _, printed = demo
+    assert printed.count("0.402") == 1
+    assert "Reliable: the delay of the loop is 0.40" in printed
+    # The limit of the true loop under proportional control is 5.0; half of it is called safe.
+    assert "keep Kp below 2.5" in printed
+    assert "Try Kp" in printed
+    assert "inf" not in printed
+    assert "paper" not in printed
+    last = printed.rstrip().splitlines()[-2:]
+    assert last == ["open demo/report.html", "your own file: deadtime estimate FILE"]
+
+
+def test_all_methods_of_the_demo_are_shown_where_asked_for(all_of_demo):
+    _, printed = all_of_demo
     assert "the truth" in printed
     for method in ("paper", "exact", "with limit", "waveform with lag"):
         assert method in printed
-    assert "Reliable: the delay of the loop is 0.4" in printed
-    # the limit of the true loop under proportional control is 5.0; half of it is called safe
-    assert "Kp above 2.5" in printed
-    assert "inf" not in printed
-    assert "Try Kp" in printed
     # On this ASCII terminal, where a bullet and a minus once ended it with exit code 1.
     assert "?" not in printed
 
@@ -94,9 +110,9 @@ def test_a_narrow_terminal_leaves_out_no_digits(demo, monkeypatch):
     assert "waveform with lag" in narrow
 
 
-def test_the_three_commands_that_the_demo_ends_with_run(demo):
-    folder, printed = demo
-    lines = [line.split() for line in printed.splitlines() if line.startswith("  deadtime ")]
+def test_the_three_commands_that_the_demo_prints_run(all_of_demo):
+    folder, printed = all_of_demo
+    lines = [line.split() for line in printed.splitlines() if line.startswith("deadtime ")]
     assert len(lines) == 3
     for line in lines:
         result = run(*line[1:], cwd=folder)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+import typer
 
 from deadtime._base.bounds import Bounds
 from deadtime._base.page import check_pages
@@ -25,6 +26,7 @@ COLUMNS = ("time", "reference", "output")
 def command(
     folder: Path = Path("demo"),
     seed: Annotated[int, Bounds(0)] = 1,
+    methods: Annotated[bool, typer.Option("--all")] = False,
     as_json: opt.As_json = False,
 ) -> None:
     """Fly a simulated loop with known truth and find its delay and its gains; no hardware.
@@ -35,6 +37,8 @@ def command(
         Where to write.
     seed
         Seed of the sensor noise.
+    methods
+        Print the estimates of all methods, and why they differ.
     """
     check_pages()
     with stages(6, quiet=as_json) as begin:
@@ -65,15 +69,23 @@ def command(
             },
         )
         return
-    print_table(estimates_table(found.comparison, flight.numbers))
-    print_points(found.comparison.explanation())
-    print_text(f"\n{found.headline()}", "bold")
-    print_text(f"\nThe flight is in {file}, the report in {page}. To go on:")
-    for line in _next_commands(found.known, flight.window, file, found.fit):
-        print(f"  {line}")
+    if methods:
+        print_table(estimates_table(found.comparison, flight.numbers))
+        print_points(found.comparison.explanation())
+        print_text("")
+    print_text(
+        f"Simulated: a vehicle that lags behind {flight.truth.delay:g} s of radio delay, and noise "
+        f"on its height. Its true delay and lag are {flight.numbers['delay+lag']:.3f} s together."
+    )
+    print_text(f"\n{found.headline()}\n", "bold")
+    if methods:
+        for line in _next_commands(found.known, flight.window, file):
+            print(line)
+    print(f"open {page}")
+    print("your own file: deadtime estimate FILE")
 
 
-def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path, fit: object) -> list[str]:
+def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path) -> list[str]:
     columns = (
         f"{shlex.quote(str(file))} --time t_s --reference ref_m --output height_m "
         f"--kp {loop.controller.gains['Kp']:g} --sample-time {loop.sample_time:g} "

@@ -152,22 +152,18 @@ class Study:
         parts = " (delay and lag together)" if "lag" in fit.free else ""
         gains = ", ".join(f"{key} = {value:.3g}" for key, value in self.designed.gains.items())
         sentences = [
-            f"Reliable: the delay of the loop is {late:.2f} s{parts}, between {low:.3f} and "
-            f"{high:.3f} s with 95 % confidence."
+            f"Reliable: the delay of the loop is {late:.3f} s{parts}, between {low:.3f} and "
+            f"{high:.3f} s (95 %)."
             if self.verdict == "reliable"
             else f"Indication: the delay of the loop is about {rough(late, 's')}{parts}, "
             f"{NOT_CLAIMED}; {fit.reason}.",
-            f"Under proportional control Kp above {self.safe_gain():.2f} is unsafe (less than a "
-            f"factor of 2 from instability at {self.held_limit:.2f}"
-            + (
-                f"; without the hold the limit would seem to be {self.continuous_limit:.2f})."
-                if self.known.is_sampled
-                else ")."
-            ),
-            f"Try {gains}: a step {_settles(self.responses['designed for the delay'])}, and the "
-            f"loop stays stable up to {self.gain_margin:.1f} times the estimated gain, or a delay "
-            f"of {self.largest_delay:.2f} s. With gains designed without the delay a "
-            f"step {_settles(self.responses['designed without the delay'])}.",
+            f"Under proportional control it is unstable above Kp = {self.held_limit:.2f}: keep Kp "
+            f"below {self.safe_gain():.2f}.",
+            f"Try {gains}: a step {_settles(self.responses['designed for the delay'])}.",
+            f"The loop stays stable up to {self.gain_margin:.1f} times the estimated gain, or a "
+            f"delay of {self.largest_delay:.2f} s.",
+            "With gains designed without the delay a step "
+            f"{_settles(self.responses['designed without the delay'])}.",
         ]
         return " ".join(sentences)
 
@@ -248,4 +244,4 @@ def _settles(response: Response) -> str:
             "overshoot"
         )
     amplitude = float(np.ptp(response.outputs[response.time > 0.5 * response.time[-1]]))
-    return f"has not settled after {response.time[-1]:g} s (it still oscillates by {amplitude:.2g})"
+    return f"still oscillates by {amplitude:.2g} after {response.time[-1]:g} s"
