@@ -114,7 +114,7 @@ def main() -> int:
     """Print what is wrong, and return the exit code."""
     root = Path(sys.argv[1])
     wrong = [*broken_links(root), *loaded_from_the_network(root)]
-    entries = set().union(*(Page(path).anchors for path in (root / "reference").glob("*.html")))
+    entries = set().union(*(Page(path).anchors for path in (root / "reference").rglob("*.html")))
     names = list(public_names())
     wrong += [f"{name}: no entry in the reference" for name in names if name not in entries]
     print(

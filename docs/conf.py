@@ -16,26 +16,34 @@ extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.viewcode",
     "sphinx_copybutton",
+    "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "entries",
+    "folded_tests",
     "formulas",
+    "names",
     "used_in",
 ]
-myst_enable_extensions = ["dollarmath", "amsmath"]
-autodoc_default_options = {
-    "inherited-members": "object,tuple,int,Exception",
-    "special-members": "__call__",
-}
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+autodoc_default_options = {"special-members": "__call__"}
 autodoc_member_order = "groupwise"
 autodoc_typehints = "none"
+autosummary_generate = False
+# In docstrings `name` is a link where there is an entry of that name.
+default_role = "py:obj"
 numpydoc_show_class_members = False
 exclude_patterns = ["_build", "paper/reproduction-numbers.md"]
 html_math_renderer = "mathml"
 html_theme = "furo"
-html_title = "deadtime"
+html_title = f"deadtime {release}"
+html_logo = html_favicon = "styles/mark.svg"
 html_show_copyright = False
 html_static_path = ["styles"]
 html_css_files = ["pages.css"]
+html_js_files = ["pages.js"]
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#0b5f9e", "color-brand-content": "#0b5f9e"},
     "dark_css_variables": {"color-brand-primary": "#7cc0f5", "color-brand-content": "#7cc0f5"},
@@ -70,3 +78,16 @@ dtm.ControlLoop(dtm.Integrator(), dtm.PV(Kp=1.5, Kv=0.13), delay=0.36, limit=1.0
     {"Kp": (0.0, 6.0), "Kv": (-1.0, 1.0)}
 ).save(f"{_explorer}/explorer.html")
 html_extra_path = [_explorer]
+
+
+def _level_of_captions(app, page, template, context, tree):
+    """The captions of the list of pages are headings, to a screen reader of the second level."""
+    shown = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = shown.replace(
+        'role="heading"', 'role="heading" aria-level="2"'
+    )
+
+
+def setup(app):
+    """Change the list of pages when the theme has made it."""
+    app.connect("html-page-context", _level_of_captions, priority=900)

@@ -2,8 +2,10 @@
 
 import doctest
 import inspect
+import pkgutil
 import re
 import runpy
+import tomllib
 from pathlib import Path
 
 import deadtime as dtm
@@ -15,6 +17,7 @@ DOCS = ROOT / "docs"
 
 
 PAGES = [
+    "index.md",
     "start/five-minutes.md",
     "start/from-python-control.md",
     "start/from-qpmr-and-dde-biftool.md",
@@ -46,7 +49,7 @@ PACKAGES = sorted(package for package in dtm._PACKAGES if package != "_base.erro
 
 def test_the_reference_has_a_page_for_each_package():
     pages = {path.stem for path in (DOCS / "reference").glob("*.md")}
-    assert pages == {*PACKAGES, "index", "errors", "json"}
+    assert pages == {*PACKAGES, "index", "errors", "json", "json-vehicles"}
     index = (DOCS / "reference" / "index.md").read_text(encoding="utf-8")
     for package in PACKAGES:
         page = (DOCS / "reference" / f"{package}.md").read_text(encoding="utf-8")
@@ -56,6 +59,21 @@ def test_the_reference_has_a_page_for_each_package():
         )
         (row,) = re.findall(rf"^\| \[`{package}`\].*$", index, re.MULTILINE)
         assert re.findall(r"`(\w+)`", row.split("|")[3]) == dtm._PACKAGES[package].split()
+
+
+def test_every_public_name_has_its_place_in_the_reference():
+    tables = tomllib.loads((DOCS / "reference" / "contents.toml").read_text(encoding="utf-8"))
+    check = runpy.run_path(str(DOCS / "check.py"), run_name="imported")
+    listed = {
+        f"deadtime.{package}.{name}"
+        for package, pages in tables.items()
+        for names in pages.values()
+        for name in names.split()
+    }
+    described = {one for one in check["public_names"]() if one.count(".") == 2}
+    assert described - listed == set(), "docs/reference/contents.toml does not list these"
+    for name in listed:
+        assert pkgutil.resolve_name(name) is not None
 
 
 @pytest.mark.parametrize("package", PACKAGES)
