@@ -35,6 +35,9 @@ autosummary_generate = False
 # In docstrings `name` is a link where there is an entry of that name.
 default_role = "py:obj"
 numpydoc_show_class_members = False
+# Types of arguments link to the classes that `names` gives.
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"
 exclude_patterns = ["_build", "paper/reproduction-numbers.md"]
 html_math_renderer = "mathml"
 html_theme = "furo"

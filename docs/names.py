@@ -14,6 +14,7 @@ from docutils import nodes
 from entries import contents
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
+from sphinx.config import Config
 from sphinx.environment import BuildEnvironment
 
 
@@ -64,6 +65,13 @@ def _link_literals(app: Sphinx, tree: nodes.document) -> None:
             link += literal
 
 
+def _link_types(app: Sphinx, config: Config) -> None:
+    """Types of arguments are classes of the package; those of the language have no page here."""
+    config.numpydoc_xref_aliases_complete = {
+        name: full for name, full in _entries().items() if re.fullmatch("[A-Z][A-Za-z]+", name)
+    }
+
+
 def _resolve(app: Sphinx, env: BuildEnvironment, node: pending_xref, shown: nodes.Node) -> Any:
     """A name of another package, in a docstring."""
     target = node.get("reftarget", "")
@@ -74,7 +82,8 @@ def _resolve(app: Sphinx, env: BuildEnvironment, node: pending_xref, shown: node
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Link literals when a page has been read, and names that nothing else resolves."""
+    """Link types, literals when a page has been read, and names that nothing else resolves."""
+    app.connect("config-inited", _link_types, priority=900)
     app.connect("doctree-read", _link_literals)
     app.connect("missing-reference", _resolve)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
