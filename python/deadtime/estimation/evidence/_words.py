@@ -91,6 +91,10 @@ def _python(value: Any) -> str:
     return f"dtm.{value!r}" if isinstance(value, Controller) else repr(value)
 
 
+#: Why an estimate is none, or no more than an indication, where the command moves at the beginning.
+TOO_EARLY = "the command moves only before the rows that count"
+TAKEN_AT_REST = "the plant is taken to be at rest at the first row, which nothing shows"
+
 #: Reasons that are those of one step, if the command is one.
 FEW_NUMBERS = ("too few told", "classes contradict", "crossover not told")
 
@@ -237,14 +241,13 @@ def _advice_on(fit: FoundPlant) -> Advice:
         return Advice(
             "leave the plant out: another is likelier", {"plant": None}, fit._question.options()
         )
-    if not fit.at_rest and not _moves_in(fit):
-        return Advice(
-            "the command moves only before the rows that count; if the process was at rest at the "
-            "first row, say so",
-            {"at_rest": True},
-            fit._question.options(),
-        )
-    return _advice_by_reason(fit, fit._question.options())
+    if fit._code == TAKEN_AT_REST or fit.reason == TOO_EARLY:
+        words = "if the plant was at rest at the first row, say so"
+        return Advice(words, {"at_rest": True}, fit._question.options())
+    advice = _advice_by_reason(fit, fit._question.options())
+    if advice.options and fit.reason.endswith(TAKEN_AT_REST):
+        return replace(advice, options={"at_rest": True, **advice.options})
+    return advice
 
 
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
@@ -278,7 +281,7 @@ def _reliable_part(question: Question) -> OpenRange | None:
     return None
 
 
-def _moves_in(fit: FoundPlant) -> bool:
+def moves_in(fit: FoundPlant) -> bool:
     """Whether the command changes in the rows that count."""
     for run, question in zip(fit.runs, fit._question.each, strict=True):
         used = ~_isnan(run.residuals)
