@@ -20,6 +20,8 @@ from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Between, Question, questions_of
 from deadtime.estimation.evidence._words import (
     CLEAR,
+    LEVELS,
+    ROUNDING,
     TAKEN_AT_REST,
     TOO_EARLY,
     moves_in,
@@ -150,9 +152,11 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
         "plant": None if best is None else best.plant,
         "parameters": {} if best is None else dict(best.parameters),
     }
+    step = _coarse_step(runs)
+    verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
-        verdict=cast(Verdict, found.verdict),
-        reason=reason_of(found.reason, found, _is_one_step(question)),
+        verdict=cast(Verdict, verdict),
+        reason=reason_of(found.reason, found, _is_one_step(question), step),
         **numbers,
         crossover=found.crossover,
         largest_gain=found.largest_gain,
@@ -184,6 +188,22 @@ def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
 def _is_one_step(question: Question) -> bool:
     """Whether the command changes once, in one recording."""
     return not question.others and np.count_nonzero(np.diff(question.command)) == 1
+
+
+def _coarse_step(runs: Sequence[FittedRecording]) -> float:
+    """Step of a sensor that is coarse for how far it moves, and more than its noise; zero of others."""
+    for run in runs:
+        output = run.recording.output
+        output = output[np.isfinite(output)]
+        span = float(np.ptp(output)) if output.size else 0.0
+        moves = np.abs(np.diff(output))
+        moves = moves[moves > 1e-9 * span]
+        step = float(moves.min()) if moves.size else 0.0
+        multiples = moves / step
+        are_whole = np.allclose(multiples, np.round(multiples), atol=0.01)
+        if are_whole and span < LEVELS * step and run.noise_std < ROUNDING * step:
+            return step
+    return 0.0
 
 
 def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:

@@ -95,13 +95,29 @@ def _python(value: Any) -> str:
 TOO_EARLY = "the command moves only before the rows that count"
 TAKEN_AT_REST = "the plant is taken to be at rest at the first row, which nothing shows"
 
+#: The kernel's reason where residuals are no noise of a sensor.
+NOT_WHITE = "residuals not white"
+
+#: Deviation of the residuals, in steps of a sensor, below which they are mostly rounding, whose own is
+#: 0.29. Larger: noise of a sensor is taken for rounding.
+ROUNDING = 0.5
+
+#: Readings between the least and the largest value of a sensor from which on its rounding acts like
+#: noise. Fewer: rounding is correlated with the output, and intervals do not hold.
+LEVELS = 32
+
 #: Reasons that are those of one step, if the command is one.
 FEW_NUMBERS = ("too few told", "classes contradict", "crossover not told")
 
 
-def reason_of(code: str, found: native.FamilyFit, is_one_step: bool) -> str:
-    """Why an estimate is not reliable, in a sentence."""
+def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float) -> str:
+    """Why an estimate is not reliable; `step` is that of a coarse sensor, or zero."""
     size, determined, asked = found.reason_size, found.told, found.asked
+    if step and code in ("", NOT_WHITE, "no response"):
+        return (
+            f"the sensor reads in steps of {step:.4g}, too coarse for how far the output moves: "
+            "what is left unexplained is mostly rounding"
+        )
     if is_one_step and code in FEW_NUMBERS:
         return (
             "one step does not distinguish two lags from a dead time and a lag, and the largest "
@@ -115,7 +131,7 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool) -> str:
         else "the command is one sine, which determines gain and phase at its frequency alone",
         "classes contradict": "plants of different kinds explain the recording alike and differ "
         "where a loop crosses over",
-        "residuals not white": "what the plant leaves unexplained is no noise of a sensor: there "
+        NOT_WHITE: "what the plant leaves unexplained is no noise of a sensor: there "
         "is a disturbance, or the plant is of another kind",
         "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
         "2 ln L), and was moved",
@@ -258,6 +274,8 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
             words += f"; or name the plant, if you know that it is {known[0].in_words()}"
             return Advice(words, {"plant": known[0].name}, given)
         return Advice(words)
+    if fit.reason.startswith("the sensor reads in steps"):
+        return Advice("let the command move further, or read the sensor in finer steps")
     if fit._code == "no response":
         return Advice("look whether these are the right columns", draw=True)
     window = None if fit.others else _reliable_part(fit._question)
