@@ -191,7 +191,7 @@ def _is_one_step(question: Question) -> bool:
 
 
 def _coarse_step(runs: Sequence[FittedRecording]) -> float:
-    """Step of a sensor that is coarse for how far it moves, and more than its noise; zero of others."""
+    """Step of a sensor that is coarse for how far it moves and beside its noise; zero of others."""
     for run in runs:
         output = run.recording.output
         output = output[np.isfinite(output)]

@@ -98,8 +98,8 @@ TAKEN_AT_REST = "the plant is taken to be at rest at the first row, which nothin
 #: The kernel's reason where residuals are no noise of a sensor.
 NOT_WHITE = "residuals not white"
 
-#: Deviation of the residuals, in steps of a sensor, below which they are mostly rounding, whose own is
-#: 0.29. Larger: noise of a sensor is taken for rounding.
+#: Deviation of the residuals, in steps of a sensor, below which they are mostly rounding, whose own
+#: is 0.29. Larger: noise of a sensor is taken for rounding.
 ROUNDING = 0.5
 
 #: Readings between the least and the largest value of a sensor from which on its rounding acts like
