@@ -3,7 +3,7 @@
 `design` looks for gains that are best in the worst case over delay and gain of the plant and keep
 their margins there, and `design_filter` chooses the filter of the derivative. `adaptive_gains`
 makes a list of gains for a delay that moves, with a proof. `settings_of` writes gains in the forms
-that people type in, `controller_of` reads them.
+that people type in, `controller_of` reads them. `tune` goes from a recording to such gains.
 """
 
 # The files. `_problem` holds what is free and what is not known, `_region` the region of an
@@ -39,6 +39,7 @@ from deadtime.tuning.forms import (
     proportional_band,
     settings_of,
 )
+from deadtime.tuning.proposal import Prediction, Proposal, tune
 
 __all__ = [
     "Choice",
@@ -51,6 +52,8 @@ __all__ = [
     "IdealForm",
     "LeastMargins",
     "ParallelForm",
+    "Prediction",
+    "Proposal",
     "SeriesForm",
     "Settings",
     "SwitchingProof",
@@ -63,4 +66,5 @@ __all__ = [
     "one_pole_filter",
     "proportional_band",
     "settings_of",
+    "tune",
 ]

@@ -11,6 +11,7 @@ from deadtime.tuning.forms._classical import IdealForm, ParallelForm, SeriesForm
 from deadtime.tuning.forms._convert import (
     LOOPS_OF_FORMS as LOOPS_OF_FORMS,
     Form,
+    check_form as check_form,
     controller_of,
     settings_of,
 )

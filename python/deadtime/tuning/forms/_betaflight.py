@@ -123,6 +123,13 @@ def write(controller: Controller, loop: str, version: tuple[int, ...] | None) ->
     return Settings("betaflight", loop, values, tuple(lines), typed, rounding, tuple(notes), SOURCE)
 
 
+def check(controller: Controller) -> None:
+    """Refuse a filter that the firmware lacks."""
+    smooth = parts_of(controller)[3]
+    if smooth is not None:
+        _low_pass(smooth)
+
+
 def read(given: Mapping[str, float] | str, loop: str) -> Controller:
     """The controller of settings or of lines of the command line."""
     axis = loop.removesuffix(" rate")

@@ -72,12 +72,23 @@ def settings_of(
         raise ValueError(f"spans={spans}: a proportional band is for ideal, series and parallel")
     if form == "betaflight":
         return _betaflight.write(controller, loop, _numbers(version))
-    if form == "ardupilot":
-        found = _ardupilot.loops(_numbers(version))[loop]
-        line, source = _ardupilot.WRITTEN, _ardupilot.SOURCE
-    else:
-        found, line, source = _px4.LOOPS[loop], _px4.WRITTEN, _px4.SOURCE
-    return _firmware.written(controller, found, form, loop, line, source)
+    where = _ardupilot if form == "ardupilot" else _px4
+    found = _loop_of(form, loop, version)
+    return _firmware.written(controller, found, form, loop, where.WRITTEN, where.SOURCE)
+
+
+def check_form(controller: Controller, form: Form, loop: str, version: str = "") -> None:
+    """Refuse a form that cannot express a controller of this kind, before its gains are known."""
+    _check(form, loop)
+    if form == "betaflight":
+        _betaflight.check(controller)
+    elif form not in _classical.FORMS:
+        _firmware.check(controller, _loop_of(form, loop, version), form, loop)
+
+
+def _loop_of(form: Form, loop: str, version: str) -> _firmware.FirmwareLoop:
+    loops = _ardupilot.loops(_numbers(version)) if form == "ardupilot" else _px4.LOOPS
+    return loops[loop]
 
 
 def controller_of(
@@ -120,8 +131,8 @@ def controller_of(
     if form == "betaflight":
         return _betaflight.read(settings, loop)
     pattern = _ardupilot.LINE if form == "ardupilot" else _px4.LINE
-    loops = _ardupilot.loops(_numbers(version)) if form == "ardupilot" else _px4.LOOPS
-    return _firmware.controller_of(numbers_from(settings, form, pattern), loops[loop])
+    found = _loop_of(form, loop, version)
+    return _firmware.controller_of(numbers_from(settings, form, pattern), found)
 
 
 #: The loops of each firmware.

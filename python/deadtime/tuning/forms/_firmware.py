@@ -22,9 +22,9 @@ from deadtime.tuning.forms._settings import (
     rounding_of,
 )
 
-#: Digits that are written. A parameter is a number of 32 bits, which holds seven: six come back as
-#: they were written, and change no gain by more than half a millionth of ten.
-DIGITS = 6
+#: Digits that are written, of the seven that a parameter of 32 bits holds. More: long numbers to
+#: type; fewer: gains move by over 0.05 %.
+DIGITS = 4
 
 NO_FILTER = (
     "The derivative was taken without a filter. The vehicle filters it, so that the loop has less "
@@ -88,20 +88,16 @@ def written(
     controller: Controller, found: FirmwareLoop, form: str, loop: str, line: str, source: str
 ) -> Settings:
     """The parameters of a controller in this loop; `line` makes one line of name and value."""
+    check(controller, found, form, loop)
     proportional, integral, derivative, smooth = parts_of(controller)
     gains = {"proportional": proportional, "integral": integral, "derivative": derivative}
     for part, gain in gains.items():
-        if gain and part not in found.names:
-            raise ValueError(
-                f"{type(controller).__name__}: the {loop} loop of {form} has no {part} gain, only "
-                f"{', '.join(found.names.values())}"
-            )
         if gain < 0.0:
             raise ValueError(
                 f"{part} gain {gain:g}: the gains of {form} are positive; check the sign of the "
                 "plant, or reverse the actuator in the vehicle's set-up"
             )
-    notes = _notes(controller, found, loop, form)
+    notes = _notes(controller, found)
     values = {found.overall: 1.0} if found.overall else {}
     values |= {
         found.names[part]: _typed(gain / found.scale)
@@ -131,13 +127,26 @@ def written(
     )
 
 
-def _notes(controller: Controller, found: FirmwareLoop, loop: str, form: str) -> list[str]:
-    """What the firmware does otherwise; refused where a step of the set point would kick."""
+def check(controller: Controller, found: FirmwareLoop, form: str, loop: str) -> None:
+    """Refuse a controller that this loop cannot have, whatever the sizes of its gains."""
+    *gains, smooth = parts_of(controller)
+    for part, gain in zip(("proportional", "integral", "derivative"), gains, strict=True):
+        if gain and part not in found.names:
+            raise ValueError(
+                f"{type(controller).__name__}: the {loop} loop of {form} has no {part} gain, only "
+                f"{', '.join(found.names.values())}"
+            )
     if isinstance(controller, PV) and controller.gains["Kv"] and found.derivative_of == "error":
         raise ValueError(
             f"PV: the {loop} loop of {form} takes the derivative of the error, so that a step of "
             "the set point kicks: take PD or PID"
         )
+    if smooth is not None:
+        _corner(smooth, form)
+
+
+def _notes(controller: Controller, found: FirmwareLoop) -> list[str]:
+    """What the firmware does otherwise than the controller."""
     notes = [found.note] if found.note else []
     _, _, derivative, smooth = parts_of(controller)
     if derivative and isinstance(controller, (PD, PID)) and found.derivative_of == "measurement":
