@@ -49,8 +49,8 @@ def test_a_record_without_a_plant_gives_none(folder):
 def test_a_log_gives_the_parameters_of_its_firmware(folder):
     told = found("tune", "flown.bin", "--loop", "roll rate", cwd=folder)
     assert told["flown"] == pytest.approx({"Kp": 0.9})
-    (line,) = told["settings"]["lines"]
-    assert line.startswith("ATC_RAT_RLL_P,")
+    names = [line.partition(",")[0] for line in told["settings"]["lines"]]
+    assert names == ["ATC_RAT_RLL_P", "ATC_RAT_RLL_I", "ATC_RAT_RLL_D"]
     # Seen: the plant is GAIN/(s (LAG s + 1)) behind 30 ms; half to twice 0.9 is allowed.
     assert 0.45 <= told["gains"]["Kp"] <= 1.8
     assert told["margins"]["gain_margin"] > 2.0
