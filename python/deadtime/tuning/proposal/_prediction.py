@@ -18,8 +18,6 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import ControlLoop
 from deadtime.recordings import Recording
-from deadtime.roots import delay
-from deadtime.systems import feedback
 
 #: Standard deviations of the unexplained noise on either side of a band: 95 % of it.
 NOISE = 2.0
@@ -122,7 +120,7 @@ def predicted_load(fit: PlantEstimate, loops: Sequence[ControlLoop]) -> tuple[Pr
     time = np.linspace(start, _end(record, start, end) if seen else end, POINTS)
     before = record.time <= start
     level = float(np.nanmedian(record.output[before][-_few(before) :]))
-    outputs = [level + size * load_step(loop, time - start) for loop in loops]
+    outputs = [level + _after_load(loop, time - start, size) for loop in loops]
     low, high = banded(outputs, fit.noise_std)
     target = np.full(POINTS, level)
     return Prediction("load", size, start, time, target, outputs[0], low, high), seen
@@ -136,17 +134,14 @@ def _end(record: Recording, start: float, end: float) -> float:
     return float(min([end, *moves[moves > start]]))
 
 
-def load_step(loop: ControlLoop, time: Array) -> Array:
-    """Output after a unit load beside the command, from rest at zero."""
-    late = 0.0 if loop.delay is None else loop.delay
-    back = loop.controller.transfer_function() * delay(late)
-    moved = feedback(loop.plant.transfer_function(), back)
-    since = time - time[0] - late
-    after = since > 0.0
-    outputs = np.zeros(time.size)
+def _after_load(loop: ControlLoop, since: Array, size: float) -> Array:
+    """The output's deviation after a load that goes through the dead time, as a command does."""
+    late = since - (loop.delay or 0.0)
+    after = late > 0.0
+    outputs = np.zeros(since.size)
     if np.any(after):
-        times = since[after]
-        outputs[after] = moved.step_response(np.concatenate([[0.0], times])).outputs[1:]
+        times = np.concatenate([[0.0], late[after]])
+        outputs[after] = loop.load_response(times, size).outputs[1:]
     return outputs
 
 

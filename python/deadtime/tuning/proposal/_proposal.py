@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite, isinf
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -197,8 +198,13 @@ class Proposal(ReadOnlyArrays, Pictured):
                 f"{info['settling_time']:.3g} s"
             )
         if self.load is not None:
-            moved = self.load.peak
-            said.append(f"load of {self.load.size:.3g}: the output moves by at most {moved:.3g}")
+            met = self.loop.load_response(size=self.load.size)
+            words = f"load of {self.load.size:.3g}: the output moves by {met.peak:.3g}"
+            if isfinite(met.recovery_time):
+                words += f", and is back after {met.recovery_time:.3g} s"
+            if isinf(met.iae) and isinstance(met.steady_state, float):
+                words += f", and stays {abs(met.steady_state):.3g} away"
+            said.append(words)
         return said
 
     def summary(self) -> str:
@@ -214,6 +220,7 @@ class Proposal(ReadOnlyArrays, Pictured):
         """The proposal as plain values for JSON, without the arrays."""
         info = None if self.settings is None else self.loop.step_response().info()
         steps = ("overshoot", "settling_time")
+        met = None if self.load is None else self.loop.load_response(size=self.load.size)
         moves = {"set_point": self.set_point, "load": self.load}
         found: dict[str, Any] = {
             "verdict": self.verdict,
@@ -223,6 +230,7 @@ class Proposal(ReadOnlyArrays, Pictured):
             "settings": None if self.settings is None else self.settings.to_dict(),
             "flown": None if self.flown is None else self.flown.gains,
             "margins": None if self.settings is None else self.margins._asdict(),
+            "load_response": None if met is None else met.info(),
             "step": None if info is None else {name: info[name] for name in steps},
             "remarks": self.remarks,
             "estimate": self.fit.to_dict(),
