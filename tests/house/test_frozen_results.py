@@ -5,6 +5,7 @@ import dataclasses
 import json
 import pickle
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import deadtime as dtm
@@ -41,6 +42,11 @@ def estimated():
 def found_plant():
     time, command, output = bump(rows=150)
     return dtm.estimate_delay(dtm.Recording(time, None, output, command), plant="lag")
+
+
+@cache
+def tuned():
+    return dtm.tune(found_plant(), controller=dtm.P)
 
 
 def tracked():
@@ -131,6 +137,8 @@ MADE = {
     "PlantChoice": lambda: dtm.estimation.PlantChoice(
         {"1 lag": estimated()}, {"1 lag": 0.0}, {}, "1 lag"
     ),
+    "Prediction": lambda: tuned().load,
+    "Proposal": tuned,
     "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
     "QuasiPolynomial": lambda: h,
     "PlantWithDelays": lambda: dtm.loops.PlantWithDelays(1.0 / (dtm.s + dtm.delay(1.0))),

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
+from deadtime._base.drawing import Figure
+from deadtime._base.explorer import Explorer
 from deadtime._base.page import page
-from deadtime.loops import explorer_of
-from deadtime.tuning.proposal._plots import figure_of
-
-if TYPE_CHECKING:
-    from deadtime._base.explorer import Explorer
-    from deadtime.tuning.proposal._proposal import Proposal
+from deadtime.estimation import PlantEstimate
+from deadtime.loops import ControlLoop, explorer_of
+from deadtime.tuning.forms import Settings
 
 CAPTION = (
     "Predicted under the gains above. The band holds all plants that the recording leaves "
@@ -18,36 +17,35 @@ CAPTION = (
 )
 
 
-def render(proposal: Proposal) -> str:
+def render(
+    headline: str,
+    fit: PlantEstimate,
+    settings: Settings,
+    expected: Sequence[str],
+    figure: Figure,
+    loop: ControlLoop,
+) -> str:
     """The page as text."""
-    settings = proposal.settings
-    assert settings is not None
-    source = proposal.fit.recording.source or "a recording"
+    rounding = 100.0 * settings.rounding
     return page(
         "tuning/proposal/page.html",
-        title=f"Gains from {source}",
-        described=proposal.fit.headline(),
-        verdict=proposal.headline(),
+        title=f"Gains from {fit.recording.source or 'a recording'}",
+        described=fit.headline(),
+        verdict=headline,
         lines=settings.lines,
-        notes=[_rounding(settings.rounding), *settings.notes],
+        notes=[f"Rounding changes no gain by more than {rounding:.2g} %.", *settings.notes],
         source=settings.source,
-        expected=[*proposal.expected(), *proposal.remarks],
-        figure=figure_of(proposal),
+        expected=expected,
+        figure=figure,
         caption=CAPTION,
-        explorer=_explored(proposal),
+        explorer=_explored(fit, loop),
     )
 
 
-def _rounding(share: float) -> str:
-    return f"Rounding to the digits of the form changes no gain by more than {100.0 * share:.2g} %."
-
-
-def _explored(proposal: Proposal) -> Explorer | None:
+def _explored(fit: PlantEstimate, loop: ControlLoop) -> Explorer | None:
     """The explorer of the proposed loop; None where it has no such loop."""
-    low, high = proposal.fit.ci(0.95, "delay")
+    low, high = fit.ci(0.95, "delay")
     try:
-        return explorer_of(
-            proposal.loop.specification, interval=(low, high) if low < high else None
-        )
+        return explorer_of(loop.specification, interval=(low, high) if low < high else None)
     except ValueError:
         return None

@@ -23,6 +23,7 @@ from deadtime.estimation import PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 from deadtime.tuning._result import Design, LeastMargins
 from deadtime.tuning.forms import Settings
+from deadtime.tuning.proposal._page import render
 from deadtime.tuning.proposal._prediction import Prediction, banded
 
 
@@ -303,10 +304,10 @@ class Proposal(ReadOnlyArrays, Pictured):
         ImportError
             If matplotlib or jinja2 are not installed.
         """
-        from deadtime.tuning.proposal._page import render
-
-        self._made()
-        return write_page(render(self), Path(path))
+        settings, expected = self._made(), [*self.expected(), *self.remarks]
+        figure = self.figure()
+        text = render(self.headline(), self.fit, settings, expected, figure, self.loop)
+        return write_page(text, Path(path))
 
     def _picture(self) -> Figure | None:
         return None if self.settings is None else self.figure()
