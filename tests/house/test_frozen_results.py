@@ -104,7 +104,7 @@ MADE = {
     "GainSet": lambda: adapted().robust,
     "Identifiability": planned,
     "Integrator": dtm.Integrator,
-    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
+    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1, 1.6, 1.2),
     "Log": logged,
     "LogLoop": lambda: logged().loops["roll"],
     "Margins": CONTINUOUS.margin,
