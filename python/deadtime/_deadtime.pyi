@@ -343,7 +343,14 @@ class _LoopEquations(_EquationsWithReference, Protocol):
 
 #: As `deadtime.loops._runs.LoopRun`.
 _LoopRun: TypeAlias = tuple[
-    _Reals, float, float, float | _Reals, _Reals | None, _Reals | None, float
+    _Reals,
+    float,
+    float,
+    float | _Reals,
+    _Reals | None,
+    _Reals | None,
+    float,
+    tuple[_Reals, list[int], _Reals] | None,
 ]
 
 @final
@@ -1280,6 +1287,42 @@ class HeldPlane:
     ) -> MapCells: ...
     def boundaries(self, decay: float, damping: _Pair | None) -> list[MapBoundary]: ...
 
+class _DeviationQuestion(Protocol):
+    @property
+    def of(self) -> str: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def band(self) -> float: ...
+    @property
+    def span(self) -> float | None: ...
+
+@final
+class DeviationFigures:
+    peak: Final[float]
+    peak_time: Final[float]
+    iae: Final[float]
+    ie: Final[float]
+    recovery_time: Final[float]
+    rest: Final[float]
+    span: Final[float]
+    is_settled: Final[bool]
+
+@final
+class SweepFigures:
+    figures: Final[_Reals]
+    status: Final[NDArray[np.uint8]]
+
+def driven_loop(of: Loop, inputs: list[tuple[str, int]]) -> LinearLoop: ...
+def deviation_figures(of: Loop, asked: _DeviationQuestion) -> DeviationFigures: ...
+def sweep_deviations(
+    of: Loop,
+    sets: _LoopSets,
+    asked: _DeviationQuestion,
+    *,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> SweepFigures: ...
 def plant_polynomials(
     plant: _PlantForm, numbers: list[float]
 ) -> tuple[list[float], list[float]]: ...

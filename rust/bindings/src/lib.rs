@@ -15,6 +15,7 @@ mod fixed_step;
 mod flight;
 mod flight_plant;
 mod frequency;
+mod inputs;
 mod judgement;
 mod least_squares;
 mod literature;
@@ -72,6 +73,10 @@ mod _deadtime {
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
         end_of_gain, gain_range, hinf_norm, loop_margins, ratio,
+    };
+    #[pymodule_export]
+    use super::inputs::{
+        DeviationFigures, SweepFigures, deviation_figures, driven_loop, sweep_deviations,
     };
     #[pymodule_export]
     use super::judgement::{FlightFinding, FlightJudgement, whiteness};
