@@ -114,7 +114,7 @@ MADE = {
     "ParallelForm": lambda: dtm.tuning.ParallelForm(2.0, 8.0),
     "Settings": lambda: dtm.tuning.settings_of(dtm.PI(2.0, 0.1), "ideal"),
     "Integrator": dtm.Integrator,
-    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
+    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1, 1.6, 1.2),
     "Log": logged,
     "LogLoop": lambda: logged().loops["roll"],
     "Margins": CONTINUOUS.margin,
