@@ -130,9 +130,7 @@ def test_the_sensitivity_of_an_integrator_in_closed_form():
     K, T = 2.0, 0.36
 
     def slope(w):
-        return (
-            -2 * K * (T * math.cos(w * T) / w - math.sin(w * T) / w**2) - 2 * K**2 / w**3
-        )
+        return -2 * K * (T * math.cos(w * T) / w - math.sin(w * T) / w**2) - 2 * K**2 / w**3
 
     omega = brentq(slope, 2.0, 6.0, xtol=1e-15)
     least = 1 - 2 * K * math.sin(omega * T) / omega + (K / omega) ** 2

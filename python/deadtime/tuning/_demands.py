@@ -12,6 +12,7 @@ from deadtime.tuning._margins import RequiredMargins
 #: Bandwidth of the noise of a continuous loop, as a multiple of one over delay and lag, rad/s.
 _BANDWIDTH = 100.0
 
+
 @dataclass(frozen=True)
 class Demands:
     """What must hold in every scenario; None where nothing is demanded."""

@@ -94,9 +94,7 @@ class Wanted:
         gains, middle = found.gains, problem.at(found.gains)
         judged = problem.candidates(corners)
         point = np.array([gains])
-        worst = max(
-            range(len(every)), key=lambda place: found.margins[place].max_sensitivity
-        )
+        worst = max(range(len(every)), key=lambda place: found.margins[place].max_sensitivity)
         margins = _least(found)
         return Design(
             loop=middle,
@@ -116,7 +114,9 @@ class Wanted:
             proved=() if self.others else proved(problem, point[0], self.demands.margins),
             traded=self._trades(found, margins, every, len(corners)),
             region=problem.region,
-            noise_gain=noise_gain(middle.specification.kernel, white_to(middle, self.demands.bandwidth)),
+            noise_gain=noise_gain(
+                middle.specification.kernel, white_to(middle, self.demands.bandwidth)
+            ),
             _problem=problem,
         )
 
@@ -148,9 +148,7 @@ class Wanted:
                 "not knowing the numbers of the plant: were they in the middle of their "
                 f"intervals, {figure_in_words(self.objective, without)} could be had"
             )
-            made.append(
-                Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words)
-            )
+            made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
         return tuple(made)
 
     def _is_active(self, name: str, asked: float, had: float) -> bool:
