@@ -84,7 +84,9 @@ def _beside_all(fit: PlantEstimate, found: native.FamilyFit) -> PlantEstimate:
         return fit
     better = candidate_of(best, least)
     named = replace(fit, _better=better)
-    if named.verdict != "reliable" or not is_outside(whole, partial(_ends, found)):
+    # A cause may imitate the lag that the plant lacks.
+    is_open = bool(fit.causes) or is_outside(whole, partial(_ends, found))
+    if named.verdict != "reliable" or not is_open:
         return named
     reason = f"{better.in_words()}, explains the recording clearly better"
     return replace(named, verdict="indication", reason=reason)
