@@ -55,7 +55,7 @@ html_theme_options = {
 copybutton_prompt_text = ">>> "
 
 # The examples are run by the build, which ends at the first that fails.
-_SECTIONS = "roots maps loops design estimation vehicles delay_equations paper"
+_SECTIONS = "problems roots maps loops design estimation vehicles delay_equations paper"
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "examples",

@@ -151,8 +151,15 @@ class Margins:
     gain_margins: Final[_Reals]
     searched: Final[_Pair]
     hidden: Final[_Complexes]
+    max_sensitivity: Final[float]
+    max_sensitivity_omega: Final[float]
+    max_complementary_sensitivity: Final[float]
+    max_complementary_sensitivity_omega: Final[float]
+    disk_margin: Final[float]
+    disk_margin_omega: Final[float]
 
 def loop_margins(n: QuasiPolynomial, d: QuasiPolynomial, all_modes: bool) -> Margins: ...
+def hinf_norm(n: QuasiPolynomial, d: QuasiPolynomial) -> _Pair: ...
 def end_of_gain(n: QuasiPolynomial, d: QuasiPolynomial, level: float) -> float: ...
 def ratio(n: QuasiPolynomial, d: QuasiPolynomial, points: _Complexes) -> _Complexes: ...
 
@@ -336,7 +343,14 @@ class _LoopEquations(_EquationsWithReference, Protocol):
 
 #: As `deadtime.loops._runs.LoopRun`.
 _LoopRun: TypeAlias = tuple[
-    _Reals, float, float, float | _Reals, _Reals | None, _Reals | None, float
+    _Reals,
+    float,
+    float,
+    float | _Reals,
+    _Reals | None,
+    _Reals | None,
+    float,
+    tuple[_Reals, list[int], _Reals] | None,
 ]
 
 @final
@@ -391,6 +405,28 @@ class Candidates:
     ) -> _Pair: ...
     def margins(self, gains: list[float], delay_margin: bool) -> _Reals: ...
     def dominant(self, gains: list[float]) -> _Reals: ...
+
+@final
+class RobustGains:
+    gains: Final[list[float]]
+    value: Final[float]
+    margins: Final[list[Margins]]
+
+def robust_gains(
+    loops: list[Loop],
+    first: int,
+    free: list[int],
+    wish: tuple[float, bool, bool],
+    demands: tuple[float, float, float, float, float, float, float],
+    bounds: list[_Pair] | None = None,
+) -> RobustGains: ...
+def noise_gain(of: Loop, bandwidth: float) -> float: ...
+def response_figures(of: Loop, of_load: bool) -> tuple[float, float, float, float]: ...
+def lasting_load(of: Loop) -> float: ...
+def tuning_rules(
+    of: Loop,
+) -> list[tuple[str, list[float] | None, float, float, float, float]]: ...
+def half_rule(of: Loop, with_second: bool) -> tuple[float, float, float, float] | None: ...
 
 @final
 class LinearLoop:
@@ -1251,6 +1287,42 @@ class HeldPlane:
     ) -> MapCells: ...
     def boundaries(self, decay: float, damping: _Pair | None) -> list[MapBoundary]: ...
 
+class _DeviationQuestion(Protocol):
+    @property
+    def of(self) -> str: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def band(self) -> float: ...
+    @property
+    def span(self) -> float | None: ...
+
+@final
+class DeviationFigures:
+    peak: Final[float]
+    peak_time: Final[float]
+    iae: Final[float]
+    ie: Final[float]
+    recovery_time: Final[float]
+    rest: Final[float]
+    span: Final[float]
+    is_settled: Final[bool]
+
+@final
+class SweepFigures:
+    figures: Final[_Reals]
+    status: Final[NDArray[np.uint8]]
+
+def driven_loop(of: Loop, inputs: list[tuple[str, int]]) -> LinearLoop: ...
+def deviation_figures(of: Loop, asked: _DeviationQuestion) -> DeviationFigures: ...
+def sweep_deviations(
+    of: Loop,
+    sets: _LoopSets,
+    asked: _DeviationQuestion,
+    *,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> SweepFigures: ...
 def plant_polynomials(
     plant: _PlantForm, numbers: list[float]
 ) -> tuple[list[float], list[float]]: ...

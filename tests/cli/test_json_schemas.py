@@ -70,6 +70,7 @@ CONTINUOUS = ("estimate", "step.csv", "--kp", 2.4)
         ("watch", ("watch", "moved.csv", "--noise", 0.005)),
         ("report", ("report", *LOOP, "--out", "pages/report.html")),
         ("plant-estimate", ("estimate", "moved.csv")),
+        ("tune", ("tune", "moved.csv", "--controller", "P")),
         ("estimate", (*CONTINUOUS, "--method", "auto")),
         ("comparison", (*STEP, "--method", "all")),
         ("plant-choice", (*CONTINUOUS, "--plant", "auto/s")),

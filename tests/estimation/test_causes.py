@@ -152,3 +152,44 @@ def test_equal_readings_of_a_coarse_sensor_are_readings() -> None:
         rounded = np.round(clean.output / step) * step
         fit = dtm.estimate_delay(dtm.Recording(clean.time, clean.reference, rounded, clean.command))
         assert fit.sensor_faults == ()
+
+
+def test_outliers_beside_one_another_are_left_out_and_pulses_are_not():
+    random = np.random.default_rng(5)
+    time = np.arange(600.0)
+    command = np.where(time < 60, 40.0, np.where(time < 300, 45.0, 42.0))
+    level = np.zeros(600)
+    for at in range(13, 600):
+        level[at] = level[at - 1] + (1.8 * (command[at - 13] - 40.0) - level[at - 1]) / 40.0
+    level += random.normal(0.0, 0.05, 600)
+    level[[0, 100, 106, 111, 350, 599]] += 8.0
+    fit = dtm.estimate_delay(dtm.Recording(time, None, level, command))
+    assert fit.verdict == "reliable"
+    assert [(one.name, one.rows) for one in fit.sensor_faults] == [("glitch", 6)]
+    low, high = fit.ci()
+    assert low < 12.0 < high
+    # A lag of two rows answers pulses of three.
+    pulses = np.zeros(600)
+    for start in range(40, 560, 60):
+        pulses[start : start + 3] = random.uniform(0.7, 1.3)
+    answer = np.zeros(600)
+    for at in range(5, 600):
+        answer[at] = answer[at - 1] + (1.0 - np.exp(-0.5)) * (pulses[at - 5] - answer[at - 1])
+    answer += random.normal(0.0, 0.01, 600)
+    fit = dtm.estimate_delay(dtm.Recording(time, None, answer, pulses))
+    assert fit.sensor_faults == ()
+    assert fit.verdict == "reliable"
+    assert fit.delay == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize("step", [0.7, 1.3])
+def test_the_rounding_of_a_coarse_sensor_is_named(step: float) -> None:
+    time = np.arange(900.0)
+    command = np.select([time < 100, time < 400, time < 650], [50.0, 55.0, 48.0], 52.0)
+    level = np.zeros(900)
+    for at in range(13, 900):
+        level[at] = level[at - 1] + (1.5 * (command[at - 13] - 50.0) - level[at - 1]) / 40.0
+    fit = dtm.estimate_delay(dtm.Recording(time, None, step * np.round(level / step), command))
+    assert fit.verdict != "reliable"
+    assert f"in steps of {step:g}" in fit.reason
+    assert "finer" in fit.advice().words

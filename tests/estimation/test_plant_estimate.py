@@ -251,3 +251,27 @@ def test_the_picture_has_the_verdict(fit):
     upper, lower = fit.plot()
     assert upper.get_title().startswith("reliable")
     assert lower.get_xlabel() == "time / s"
+
+
+def step_at_the_second_row(seed=3):
+    """A process with 12 s of dead time and 60 s of time constant, from rest, over 600 s."""
+    time = np.arange(600.0)
+    level = 1.8 * 5.0 * (1.0 - np.exp(-np.maximum(time - 13.0, 0.0) / 60.0))
+    level += np.random.default_rng(seed).normal(0.0, 0.05, time.size)
+    return dtm.Recording(time, None, level, np.where(time < 1.0, 0.0, 5.0))
+
+
+def test_a_command_that_moves_at_the_beginning_alone_takes_the_plant_at_rest():
+    record = step_at_the_second_row()
+    fit = dtm.estimate_delay(record)
+    assert fit.verdict == "indication"
+    assert "taken to be at rest at the first row" in fit.reason
+    assert fit.delay + fit.value("lag") == pytest.approx(72.0, rel=0.05)
+    assert "at_rest=True" in fit.advice().statement
+    said = dtm.estimate_delay(record, at_rest=True)
+    assert said.candidates[0].name == fit.candidates[0].name
+    assert said.delay == fit.delay
+    unknown = dtm.estimate_delay(record, at_rest=False)
+    assert unknown.verdict == "none"
+    assert "before the rows that count" in unknown.reason
+    assert "at_rest=True" in unknown.advice().statement

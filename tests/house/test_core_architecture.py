@@ -12,7 +12,17 @@ WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 
 # What each package of the core may use besides itself; every package may use the foundation.
-FOUNDATION = {"error", "memory", "order", "parallel", "simd", "simplex", "status", "task"}
+FOUNDATION = {
+    "between",
+    "error",
+    "memory",
+    "order",
+    "parallel",
+    "simd",
+    "simplex",
+    "status",
+    "task",
+}
 CORE_ARROWS = {
     "linear_algebra": set(),
     "lambertw": set(),
@@ -22,7 +32,7 @@ CORE_ARROWS = {
     # Loops with a hold are stepped in `dde`.
     "stability": {"linear_algebra", "elementary", "lambertw", "quasipoly", "roots", "dde"},
     "frequency": {"elementary", "quasipoly", "roots", "dde", "stability"},
-    "tuning": {"quasipoly", "roots", "dde", "stability", "frequency"},
+    "tuning": {"elementary", "quasipoly", "roots", "dde", "stability", "frequency", "loops"},
     "dde": {"linear_algebra", "elementary"},
     "loops": {"elementary", "linear_algebra", "quasipoly", "dde", "stability", "frequency"},
     "estimation": {"linear_algebra", "elementary", "quasipoly", "frequency", "dde", "loops"},
@@ -69,6 +79,8 @@ ORDER = {
         "ratio",
         "argument",
         "chains",
+        "peaks",
+        "norms",
         "margins",
         "gain_crossovers",
         "circle",
@@ -76,6 +88,7 @@ ORDER = {
         "held_gain_range",
         "held_range",
         "further_delay",
+        "held_peaks",
         "held",
         "equation",
         "passage",
@@ -84,7 +97,17 @@ ORDER = {
         "crossings",
         "ranges",
     ],
-    "tuning": ["between", "simplices", "candidates", "goal", "search"],
+    "tuning": [
+        "simplices",
+        "candidates",
+        "goal",
+        "search",
+        "open",
+        "responses",
+        "demands",
+        "robust",
+        "rules",
+    ],
     "dde": ["scalar", "limits", "rate_limits", "propagator", "control_loop", "system", "spectral"],
     "loops": [
         "entry",

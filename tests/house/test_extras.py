@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from functools import cache
 
 import deadtime as dtm
 import numpy as np
@@ -28,6 +29,11 @@ def estimated():
 
 def planned():
     return dtm.identifiability(LOOP, Experiment.step(1.0, 5.0), noise=0.01)
+
+
+@cache
+def tuned():
+    return dtm.tune(found_plant(), controller=dtm.P)
 
 
 def tracked():
@@ -75,6 +81,7 @@ DRAWN = {
     "Identifiability.plot": lambda: planned().plot(),
     "PlantEstimate.plot": lambda: found_plant().plot(),
     "Latency.plot": lambda: told().plot(),
+    "Proposal.plot": lambda: tuned().plot(),
     "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),
     "Response.plot": lambda: LOOP.step_response().plot(),
     "RobustMap.plot": lambda: dtm.robust_map(

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import pickle
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import deadtime as dtm
@@ -41,6 +42,11 @@ def estimated():
 def found_plant():
     time, command, output = bump(rows=150)
     return dtm.estimate_delay(dtm.Recording(time, None, output, command), plant="lag")
+
+
+@cache
+def tuned():
+    return dtm.tune(found_plant(), controller=dtm.P)
 
 
 def tracked():
@@ -103,8 +109,12 @@ MADE = {
     "GainSchedule": adapted,
     "GainSet": lambda: adapted().robust,
     "Identifiability": planned,
+    "IdealForm": lambda: dtm.tuning.IdealForm(2.0, 8.0),
+    "SeriesForm": lambda: dtm.tuning.SeriesForm(2.0, 8.0),
+    "ParallelForm": lambda: dtm.tuning.ParallelForm(2.0, 8.0),
+    "Settings": lambda: dtm.tuning.settings_of(dtm.PI(2.0, 0.1), "ideal"),
     "Integrator": dtm.Integrator,
-    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1),
+    "LeastMargins": lambda: dtm.tuning.LeastMargins(2.0, 45.0, 0.1, 1.6, 1.2),
     "Log": logged,
     "LogLoop": lambda: logged().loops["roll"],
     "Margins": CONTINUOUS.margin,
@@ -127,6 +137,8 @@ MADE = {
     "PlantChoice": lambda: dtm.estimation.PlantChoice(
         {"1 lag": estimated()}, {"1 lag": 0.0}, {}, "1 lag"
     ),
+    "Prediction": lambda: tuned().load,
+    "Proposal": tuned,
     "ProvedBoxes": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3),
     "QuasiPolynomial": lambda: h,
     "PlantWithDelays": lambda: dtm.loops.PlantWithDelays(1.0 / (dtm.s + dtm.delay(1.0))),

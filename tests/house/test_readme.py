@@ -5,15 +5,19 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 from command_line import run
+from made_processes import bump
 
 README = Path(__file__).resolve().parents[2] / "README.md"
 
 
 def test_the_python_of_the_readme_runs(tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 2
-    assert run("demo", cwd=tmp_path).returncode == 0
+    assert len(blocks) == 3
+    time, valve, level = bump()
+    rows = np.column_stack([time, level, valve])
+    np.savetxt(tmp_path / "bump.csv", rows, delimiter=",", header="time,PV,OP", comments="")
     result = subprocess.run(
         [sys.executable, "-c", "\n".join(blocks)],
         cwd=tmp_path,
@@ -23,5 +27,14 @@ def test_the_python_of_the_readme_runs(tmp_path):
         timeout=120,
     )
     assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("reliable: dead time")
+    assert "reliable: PI with Kp" in result.stdout
     assert "neutral" in result.stdout
-    assert "-3.3168" in result.stdout or "-3.31678" in result.stdout
+    assert "-3.31678" in result.stdout
+
+
+def test_the_first_command_of_the_readme_is_the_demo(tmp_path):
+    first = re.search(r"```sh\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert first is not None
+    assert first[1].rstrip().endswith("deadtime demo")
+    assert run("demo", cwd=tmp_path).returncode == 0

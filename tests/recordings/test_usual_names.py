@@ -72,8 +72,10 @@ def test_milliseconds_are_not_taken_for_seconds(tmp_path):
 
 def test_a_reference_or_a_command_has_to_be_there(tmp_path):
     assert not read(tmp_path, table("t,u,y")).has_reference
+    # Where there is no reference the command is read unasked.
+    assert read(tmp_path, table("t,u,y"), command=None).command is not None
     with pytest.raises(dtm.RecordingError, match="usual name for the reference"):
-        read(tmp_path, table("t,u,y"), command=None)
+        read(tmp_path, table("t,Q1,y"), command=None)
 
 
 @pytest.mark.parametrize(

@@ -140,7 +140,9 @@ class Tlog:
 DELAY, LAG, GAIN = 0.012, 0.030, 8.0
 
 
-def flown_copter(seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=True, Kp=0.9):
+def flown_copter(
+    seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=True, Kp=0.9, parameters=()
+):
     """A DataFlash log in which the roll rate follows doublets under a P controller.
 
     The vehicle is gain/(s (lag s + 1)) behind a delay, exact where that is a multiple of 0.5 ms.
@@ -154,7 +156,8 @@ def flown_copter(seconds=12.0, rate=200, noise=0.02, delay=DELAY, seed=4, steps=
     log.define("RATE", 5, "Qfff", "TimeUS,RDes,R,ROut")
     log.add("MSG", 0, "ArduCopter V4.5.7 (01234567)")
     log.add("MSG", 0, "Frame: QUAD/X")
-    for name, value in (("INS_GYRO_FILTER", 20.0), ("SCHED_LOOP_RATE", float(rate))):
+    own = (("INS_GYRO_FILTER", 20.0), ("SCHED_LOOP_RATE", float(rate)))
+    for name, value in (*own, *parameters):
         log.add("PARM", 0, name, value)
     log.add("MODE", 1000, 2, 2)
     log.add("EV", 1000, 10)

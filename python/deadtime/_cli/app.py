@@ -30,6 +30,8 @@ COMMANDS = {
     "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
     "explore": "Look at a loop live in the browser: its map of gains, roots, margins, responses.",
     "design": "Find the gains that are best in the worst case, within margins.",
+    "tune": "Propose gains from a recording, in the form that they are typed in, with what they "
+    "will do.",
     "reproduce": "Reproduce the paper on delays in quadrotor control: each printed number beside "
     "ours.",
     "fly": "Fly steps under P control, learn the delay, design PV for it, fly that; land.",

@@ -5,6 +5,7 @@ from deadtime.logs._link import Link
 from deadtime.logs._log import Log, LogLoop
 from deadtime.logs._open import open_log
 from deadtime.logs._series import Series
+from deadtime.logs._tuned import tune_loop
 from deadtime.logs.bags import Bag, BagTopic, is_bag, open_bag
 from deadtime.logs.latencies import (
     Advice,
@@ -68,4 +69,5 @@ __all__ = [
     "plain_times",
     "promises_of",
     "spread_of",
+    "tune_loop",
 ]

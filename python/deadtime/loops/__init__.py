@@ -7,7 +7,8 @@ imitates block diagrams that are run in fixed steps.
 
 # The files. `_control_loop` is the loop, `_plants`, `_controllers` and `_derivative_filter` are its
 # parts. `_specification` checks them and hands them to the kernel; `_in_time`, `_poles` and `_gain`
-# hold the questions that a loop answers. `_held` makes maps of sampled loops, `_sweep` runs many
+# hold the questions that a loop answers, `_inputs` its loads and noise, `_load_response` the response
+# to a step of one. `_held` makes maps of sampled loops, `_sweep` runs many
 # loops, `_fixed_step` imitates block diagrams in fixed steps.
 
 from deadtime._base.explorer import Explorer
@@ -23,6 +24,7 @@ from deadtime.loops._factored_plant import PAIR, FactoredPlant
 from deadtime.loops._fixed_step import simulate_fixed_step
 from deadtime.loops._given_plants import PlantWithDelays
 from deadtime.loops._held import Question as Question, held_plane as held_plane
+from deadtime.loops._load_response import LoadResponse
 from deadtime.loops._model import LoopModel as LoopModel
 from deadtime.loops._open_run import open_response as open_response
 from deadtime.loops._parametric_plant import ParametricPlant
@@ -60,6 +62,7 @@ __all__ = [
     "FactoredPlant",
     "FirstOrder",
     "Integrator",
+    "LoadResponse",
     "P",
     "ParametricPlant",
     "Plant",

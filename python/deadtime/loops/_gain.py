@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,9 @@ from deadtime._base.drawing import Axes, shown_rows
 from deadtime._base.validation import real_array
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Margins, TransferFunction, margins, margins_of
+
+#: Transfer functions of a closed loop.
+_TRANSFERS: TypeAlias = Literal["sensitivity", "complementary", "output", "command"]
 
 
 class LoopGain:
@@ -108,6 +112,51 @@ class LoopGain:
             return margins(gain.num, gain.den, all_modes=True)
         _ = loop.known_delay
         return margins_of(loop.native.held_margins(delay_margin))
+
+    def hinf_norm(self, of: _TRANSFERS = "sensitivity") -> float:
+        """Return the largest gain over frequency of a transfer function of the closed loop.
+
+        Parameters
+        ----------
+        of : {"sensitivity", "complementary", "output", "command"}
+            S = 1/(1 + L), T = L/(1 + L), or from the reference to the output or the command; the
+            limit left out.
+
+        Returns
+        -------
+        float
+            As of `TransferFunction.hinf_norm`, infinite of a loop that is not stable. Of a sampled
+            loop that of S or T from sample to sample, on the unit circle.
+
+        Raises
+        ------
+        ValueError
+            If the delay is None; of a sampled loop for "output" or "command", which are no
+            functions of one frequency.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.36)
+        >>> round(loop.hinf_norm(), 4), loop.hinf_norm("output")
+        (1.4526, 1.0)
+        """
+        chosen = get_args(_TRANSFERS)
+        if of not in chosen:
+            raise ValueError(f"of={of!r}: give one of {', '.join(map(repr, chosen))}")
+        if of in ("output", "command"):
+            if self.specification.sample_time is not None:
+                raise ValueError(
+                    f"of={of!r}: between the samples a loop answers one frequency with many; ask "
+                    "for 'sensitivity' or 'complementary', or the continuous() loop"
+                )
+            return self.specification.transfer(of).hinf_norm()
+        found = self._margin(delay_margin=False)
+        if not found.stable:
+            return np.inf
+        if of == "sensitivity":
+            return found.max_sensitivity
+        return found.max_complementary_sensitivity
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Return the loop gain, cut at the command, at frequencies; its limit left out.

@@ -6,16 +6,24 @@ delay, so outputs are asked for that much later and their breaks are moved back.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, one_dimensional
-from deadtime.loops._native import LoopResponse, on_samples
+from deadtime.loops._inputs import Input, SampledNoise, at_samples, driven
+from deadtime.loops._load_response import (
+    LoadResponse,
+    asked,
+    figures_of,
+    load_response_of,
+    shown_times,
+)
+from deadtime.loops._native import LoopResponse, driven_loop, on_samples
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._runs import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
@@ -35,8 +43,12 @@ class LoopInTime:
     def simulate(
         self,
         time: ArrayLike,
-        reference: ArrayLike = 1.0,
+        reference: ArrayLike | Callable[[Any], Any] = 1.0,
         *,
+        load: Input | None = None,
+        output_disturbance: Input | None = None,
+        noise: Input | SampledNoise | None = None,
+        seed: int | np.random.SeedSequence = 0,
         initial_output: float = 0.0,
         reference_before: float | None = None,
         reference_time: ArrayLike | None = None,
@@ -44,7 +56,7 @@ class LoopInTime:
         sample_phase: float = 0.0,
         sensitivities: Sequence[str] = (),
     ) -> Response:
-        """Response to a reference that is constant between jumps, exact to rounding.
+        """Response to a reference, loads and noise, exact to rounding.
 
         The run starts at ``time[0]`` with the plant at rest at `initial_output`, under the command
         that keeps it there.
@@ -53,9 +65,23 @@ class LoopInTime:
         ----------
         time : array_like, shape (n,)
             Output times in s, increasing.
-        reference : float or array_like, shape (m,)
+        reference : float, array_like of shape (m,), or callable
             A number: a step to it at the start. An array: values that hold from the times in
-            `reference_time` on.
+            `reference_time` on. A function of an array of times in s; a sampled loop reads it at
+            its samples.
+        load : float, array_like of shape (n,), (times, values), or callable, optional
+            Added to the command where it reaches the plant, after its limit. A number: a step to it
+            at the start. An array: values that hold from each element of `time` on. A pair: values
+            that hold from these times on, zero before. A function of an array of times in s.
+        output_disturbance : as `load`, optional
+            Added to the output of the plant.
+        noise : float, array_like, (times, values), callable, or noise model, optional
+            Added to the output that the controller sees. A number: the standard deviation of
+            independent normal values, drawn at the samples of the loop, in continuous time at the
+            elements of `time`, each held until the next. A noise model, such as
+            `deadtime.experiments.FlightNoise`, is drawn at the same times. All else as `load`.
+        seed : int or numpy.random.SeedSequence
+            Of the noise that is drawn.
         initial_output : float
             Output at the start.
         reference_before : float, optional
@@ -94,6 +120,9 @@ class LoopInTime:
         response jumps, the derivative is that of what follows the jump; where the delay is a
         whole number of samples, that for a longer delay.
 
+        A function is taken as polynomials of degree 7, each as good as rounding; where it jumps,
+        the jump is located to 1e-11 of the run.
+
         A loop whose plant has delays inside is simulated by its transfer functions; it starts at
         rest under `reference_before`, and has no sensitivities.
 
@@ -111,6 +140,12 @@ class LoopInTime:
         >>> response = loop.simulate([0.0, 0.5, 1.0], sensitivities=("delay", "Kp"))
         >>> print(response.sensitivities["delay"])       # before 2 delays: y = Kp (t - delay)
         [ 0.         -1.31       -0.348984]
+
+        A load leaves an offset under P control, load/Kp:
+
+        >>> response = loop.simulate([0.0, 1.0, 40.0], 0.0, load=0.5)
+        >>> print(response.outputs.round(6))
+        [0.       0.368995 0.381679]
         """
         loop = self.specification
         respond = loop.respond
@@ -122,16 +157,20 @@ class LoopInTime:
             and initial_output == sample_phase == 0.0
             and reference_before is reference_time is None
             and command_history is _NONE
+            and load is output_disturbance is noise is None
         ):
             times, run, past = one_dimensional("time", time), reference, 0.0
         else:
             given = RunArguments(
                 time, reference, initial_output, reference_before, reference_time,
                 command_history, sample_phase, sensitivities,
+                {"load": load, "output": output_disturbance, "noise": noise}, seed,
             )  # fmt: skip
             if respond is None:
                 return simulate_with_delays(loop, given)
             times = one_dimensional("time", time)
+            if callable(reference) or any(x is not None for x in (load, output_disturbance, noise)):
+                return _driven_response(loop, times, given)
             run, past = _run_of(loop, times, given)
         response = response_of(_Again(loop, run, respond(times, run)))
         if not sensitivities:
@@ -176,6 +215,65 @@ class LoopInTime:
             return settled_step_with_delays(loop, amplitude)
         longest = loop.known_delay + (loop.sample_time or 0.0)
         return until_settled(lambda times: self.simulate(times, amplitude), loop.model.A, longest)
+
+    def load_response(
+        self,
+        time: ArrayLike | None = None,
+        size: float = 1.0,
+        *,
+        at: Literal["input", "output"] = "input",
+        settling: float = 0.02,
+    ) -> LoadResponse:
+        """Response to a step of a load from rest at zero, with its figures.
+
+        Parameters
+        ----------
+        time : float or array_like, optional
+            The end in s, or output times, increasing, of which the load steps at the first. By
+            default the response is measured until it rests, and its integrals to infinity.
+        size : float
+            Height of the step, not zero.
+        at : {"input", "output"}
+            Where the load acts: added to the command where it reaches the plant, after its limit,
+            or added to the output of the plant.
+        settling : float
+            The output has recovered within this part of its largest deviation.
+
+        Returns
+        -------
+        LoadResponse
+
+        Raises
+        ------
+        ValueError
+            If the delay is None, an argument is out of its range, the plant has delays inside, or
+            the response grows beyond 1e150.
+
+        Notes
+        -----
+        The integrals are sums of those of the polynomials of the response, between its zeros.
+        Without an end the run goes on until the output is within 1e-7 of its largest deviation from
+        its rest for a fifth of the run. Where no limit acts, the integral of the deviation is also
+        known from the transfer function, for a load at the input and an integrating controller
+        1/Ki, and the run must agree with it to 1e-7: no slow end is missed.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> loop = dtm.ControlLoop(dtm.Integrator(), dtm.PI(Kp=1.0, Ki=0.2), delay=0.3)
+        >>> found = loop.load_response(size=0.5)
+        >>> round(found.ie, 9), round(found.peak, 3)
+        (2.5, 0.428)
+        >>> loop.load_response(20.0, at="output").recovery_time > 3.0
+        True
+        """
+        loop = self.specification
+        question, times = asked(loop, time, size, at, settling)
+        found = figures_of(loop, question)
+        times = shown_times(found) if times is None else times
+        name = "load" if question.of == "load" else "output_disturbance"
+        load: dict[str, Any] = {name: question.size}
+        return load_response_of(self.simulate(times, 0.0, **load), found)
 
     def impulse_response(self, time: ArrayLike | None = None) -> Response:
         """Response to an impulse of the reference of unit area, from rest at zero.
@@ -240,6 +338,40 @@ def _run_of(loop: LoopSpecification, times: Array, given: RunArguments) -> tuple
     return LoopRun(state, command, before, held, held_from, history, phase), past
 
 
+def _driven_response(loop: LoopSpecification, times: Array, given: RunArguments) -> Response:
+    """The response to inputs besides a held reference."""
+    if given.sensitivities:
+        raise ValueError(
+            "sensitivities: a run with loads, noise or a function has none; leave them out"
+        )
+    if times.size == 0:
+        raise ValueError("time is empty: give at least one output time")
+    reference, inputs = given.reference, dict(given.inputs)
+    phase = finite("sample_phase", given.sample_phase)
+    if callable(reference):
+        if given.reference_time is not None:
+            raise ValueError(
+                "reference is a function, so reference_time has no meaning: leave it out"
+            )
+        if loop.sample_time is None:
+            # From its value before the start on.
+            before = given.rest()[1]
+            inputs["reference"] = lambda when: np.asarray(reference(when)) - before
+            given = given._replace(reference=before)
+        else:
+            when, values = at_samples(loop, reference, times, phase)
+            given = given._replace(reference=values, reference_time=when)
+    run, _ = _run_of(loop, times, given)
+    put = driven(loop, times, phase, inputs, given.seed)
+    run = run._replace(state=np.append(run.state, np.zeros(put.states)), kicks=put.kicks)
+    found = driven_loop(loop.kernel, put.names).respond(times, run)
+    again = _Again(loop, run, found, tuple(put.names))
+    if not callable(reference) or loop.sample_time is not None:
+        return response_of(again)
+    shown = np.asarray(reference(times), dtype=float)
+    return replace(response_of(again), reference=np.broadcast_to(shown, times.shape))
+
+
 def _whole(loop: LoopSpecification, run: LoopRun | float) -> LoopRun:
     """A run; a number is the height of a step from rest at zero."""
     if isinstance(run, LoopRun):
@@ -270,18 +402,24 @@ class _Start(NamedTuple):
 class _Again:
     """A run of a loop: its response, and outputs at other times, for which it is repeated."""
 
-    __slots__ = ("found", "loop", "run")
+    __slots__ = ("found", "loop", "run", "states")
 
     def __init__(
-        self, loop: LoopSpecification, run: LoopRun | float, found: LoopResponse | _Start
+        self,
+        loop: LoopSpecification,
+        run: LoopRun | float,
+        found: LoopResponse | _Start,
+        states: tuple[tuple[str, int], ...] = (),
     ) -> None:
-        self.loop, self.run, self.found = loop, run, found
+        self.loop, self.run, self.found, self.states = loop, run, found, states
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _Again, (self.loop, self.run, _Start(cast(float, self.found.start)))
+        return _Again, (self.loop, self.run, _Start(cast(float, self.found.start)), self.states)
 
     def steady_state(self) -> float | None:
         """Output at rest under the last reference, None without such a rest."""
+        if self.states:
+            return None
         return self.loop.steady_state(float(np.ravel(_whole(self.loop, self.run).reference)[-1]))
 
     def stays_settled(self, time: Array, inputs: Array, settled: float) -> bool:
@@ -292,4 +430,7 @@ class _Again:
     def __call__(self, times: Array) -> Array:
         start = cast(float, self.found.start)
         run = _since_start(self.loop, start, _whole(self.loop, self.run))
-        return self.loop.native.outputs(times - start + self.loop.output_lead, run)
+        native = self.loop.native
+        if self.states:
+            native = driven_loop(self.loop.kernel, [*self.states])
+        return native.outputs(times - start + self.loop.output_lead, run)

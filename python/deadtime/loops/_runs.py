@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,19 +26,24 @@ class LoopRun(NamedTuple):
     #: Commands at the samples before the start, the latest one last.
     command_history: Array | None = None
     sample_phase: float = 0.0
+    #: Jumps of inputs: times since the start, which inputs, and to what.
+    kicks: tuple[Array, list[int], Array] | None = None
 
 
 class RunArguments(NamedTuple):
     """The arguments of `ControlLoop.simulate`, as they were given."""
 
     time: ArrayLike
-    reference: ArrayLike
+    reference: Any
     initial_output: float = 0.0
     reference_before: float | None = None
     reference_time: ArrayLike | None = None
     command_history: ArrayLike = ()
     sample_phase: float = 0.0
     sensitivities: Sequence[str] = ()
+    #: Inputs besides a held reference, None where there is none.
+    inputs: Mapping[str, Any] = MappingProxyType({})
+    seed: Any = 0
 
     def rest(self) -> tuple[float, float]:
         """Output and reference before the start."""

@@ -7,11 +7,11 @@ documentation, and the sets and their results are used nowhere else: one file.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +29,8 @@ from deadtime._base.validation import (
     thread_number,
 )
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._native import Loop
+from deadtime.loops._load_response import DeviationQuestion, load_of
+from deadtime.loops._native import Loop, sweep_deviations
 from deadtime.loops._settled import (
     TIME_CONSTANTS,
     counts_as_settled,
@@ -72,6 +73,19 @@ _METRICS = (
     "peak",
     "steady_state",
 )
+
+
+#: Figures of the deviation after a step of the reference, and their rows in the native part.
+_STEP_FIGURES = {"iae": 2}
+
+#: The same after a step of a load.
+_LOAD_FIGURES = {
+    "load_peak": 0,
+    "load_peak_time": 1,
+    "load_iae": 2,
+    "load_ie": 3,
+    "load_recovery_time": 4,
+}
 
 
 class SweepStatus(IntEnum):
@@ -182,6 +196,8 @@ def sweep(
     time: ArrayLike | None = None,
     *,
     responses: bool = False,
+    metrics: Sequence[str] | None = None,
+    load_at: Literal["input", "output"] = "input",
     amplitude: float = 1.0,
     settling: float = 0.02,
     rise: tuple[float, float] = (0.1, 0.9),
@@ -209,6 +225,13 @@ def sweep(
         times that. For responses, the output times, increasing; the step is at the first one.
     responses : bool
         Return outputs instead of metrics.
+    metrics : sequence of str, optional
+        Which metrics; by default those of `Response.info`. There are also ``iae``, the integral of
+        the modulus of the control error after the step of the reference, and of the response to a
+        step of a load of one ``load_peak``, ``load_peak_time``, ``load_iae``, ``load_ie`` and
+        ``load_recovery_time``, as in `LoadResponse`.
+    load_at : {"input", "output"}
+        Where the load acts, as in `ControlLoop.load_response`.
     amplitude : float
         Height of the step, not zero.
     settling : float
@@ -246,6 +269,10 @@ def sweep(
     with its command there: the time constants are then those of plant and controller. This is
     evidence, not a proof; `design` proves the stability of its result.
 
+    Integrals are those to infinity where no time is given: infinite where an offset remains, NaN
+    where the output does not come to rest. The status is that of the step of the reference if one
+    of its metrics of `Response.info` is asked for, otherwise that of the last of the others.
+
     Loops with up to four states are computed with SIMD instructions, several sets at once, if they
     are sampled, or have a delay and a command that does not exceed its limit once it is within it;
     the others one at a time on each thread. The result for a set does not depend on the other sets,
@@ -268,6 +295,7 @@ def sweep(
     {'Kp': 2.0, 'delay': 0.2}
     """
     require_loop(loop)
+    names = _chosen(metrics, responses)
     arrays, shape = _sets(values)
     common = _checked(loop, arrays)
     height = finite("amplitude", amplitude)
@@ -282,9 +310,14 @@ def sweep(
     sets = _Sets(common, arrays, shape, height, band, parts, thread_number(threads))
     times = None if time is None and not responses else _times(time, responses)
     with reported(progress, math.prod(shape)) as report:
-        if times is None:
-            return sets.until_settled(report)
-        return sets.outputs(times, report) if responses else sets.decided(times, report)
+        if responses and times is not None:
+            return sets.outputs(times, report)
+        found = None
+        if metrics is None or not set(_METRICS).isdisjoint(names):
+            found = sets.until_settled(report) if times is None else sets.decided(times, report)
+        if metrics is None and found is not None:
+            return found
+        return sets.with_deviations(found, names, load_of(load_at), times, report)
 
 
 class LoopSets(NamedTuple):
@@ -352,6 +385,38 @@ class _Sets:
         outputs = found.outputs.reshape(*self.shape, len(times))
         status = found.status.reshape(self.shape)
         return Sweep(dict(self.arrays), self.shape, times, status, {}, outputs)
+
+    def with_deviations(
+        self,
+        found: Sweep | None,
+        names: tuple[str, ...],
+        load: str,
+        times: Array | None,
+        progress: Report | None,
+    ) -> Sweep:
+        """The metrics of these names, in their order."""
+        known = {} if found is None else dict(found.metrics)
+        status = None if found is None else found.status
+        end = None if times is None else float(times[-1] - times[0])
+        for of, size, rows in (
+            ("reference", self.amplitude, _STEP_FIGURES),
+            (load, 1.0, _LOAD_FIGURES),
+        ):
+            if set(rows).isdisjoint(names):
+                continue
+            question = DeviationQuestion(of, size, self.settling, end)
+            deviations = sweep_deviations(
+                self.kernel, self.native, question, threads=self.threads, progress=progress
+            )
+            known |= {
+                name: deviations.figures[row].reshape(self.shape) for name, row in rows.items()
+            }
+            if found is None:
+                status = deviations.status.reshape(self.shape)
+        if status is None:
+            status = np.zeros(self.shape, dtype=np.uint8)
+        shown = np.array([0.0, end or 0.0]) if found is None else found.time
+        return Sweep(dict(self.arrays), self.shape, shown, status, {n: known[n] for n in names})
 
     def measured(self, span: float, progress: Report | None = None) -> _Run:
         """Metrics of `span` seconds of each response."""
@@ -468,6 +533,21 @@ class _Sets:
         """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""
         found = self.kernel.sweep_abscissae(self.native, threads=self.threads)
         return -found.reshape(self.shape)
+
+
+def _chosen(metrics: Sequence[str] | None, responses: bool) -> tuple[str, ...]:
+    """Check the names of metrics."""
+    if metrics is None:
+        return _METRICS
+    if responses:
+        raise ValueError("metrics and responses: a sweep gives one of them, leave the other out")
+    if isinstance(metrics, str):
+        raise TypeError(f"metrics={metrics!r}: give a sequence of names, such as ({metrics!r},)")
+    known = (*_METRICS, *_STEP_FIGURES, *_LOAD_FIGURES)
+    unknown = [name for name in metrics if name not in known]
+    if unknown or not metrics:
+        raise ValueError(f"metrics={list(metrics)}: choose from {', '.join(known)}")
+    return tuple(dict.fromkeys(metrics))
 
 
 def _is_open(status: NDArray[np.uint8]) -> Mask:

@@ -231,6 +231,34 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         """
         return self.transfer_function(output, input).margin()
 
+    def hinf_norm(self, output: int = 0, input: int = 0) -> float:  # noqa: A002
+        """Largest gain from one input to one output over all frequencies.
+
+        Parameters
+        ----------
+        output, input : int, default 0
+            Which ones, from zero.
+
+        Returns
+        -------
+        float
+            As of `TransferFunction.hinf_norm`.
+
+        Raises
+        ------
+        ValueError
+            As in `characteristic` and in `TransferFunction.hinf_norm`.
+        IndexError
+            If there is no such input or output.
+
+        Examples
+        --------
+        >>> import deadtime as dtm
+        >>> round(dtm.DelaySystem({0.36: -2.0}, {0.36: 2.0}).hinf_norm(), 4)
+        1.3306
+        """
+        return self.transfer_function(output, input).hinf_norm()
+
     def zeros(
         self,
         re: OpenRange | None = None,

@@ -14,6 +14,7 @@ from deadtime._base.drawing import Axes, shown_axes, shown_rows
 from deadtime._base.validation import real_array
 from deadtime.roots import QuasiPolynomial
 from deadtime.systems._margins import Margins, margins
+from deadtime.systems._native import hinf_norm
 
 
 class FrequencyDomain(ABC):
@@ -148,6 +149,38 @@ class FrequencyDomain(ABC):
         <Margins: none, the closed loop is not stable as it is>
         """
         return margins(self._num, self._den, all_modes=False)
+
+    def hinf_norm(self) -> float:
+        """Largest gain over all frequencies, sup abs(G(j omega)).
+
+        Returns
+        -------
+        float
+            To 5e-11 of itself. Infinite where G is not stable or grows with frequency; modes that
+            numerator and denominator have in common do not count. Of a neutral system the strong
+            norm, which takes any phase for each delay at high frequencies: small changes of the
+            delays do not change it (Gumussoy and Michiels 2011, section 3).
+
+        Raises
+        ------
+        ValueError
+            If several delays are in the highest power of s of both numerator and denominator, so
+            that the gain at high frequencies has no known bound.
+
+        Notes
+        -----
+        At a level just above the largest gain known, all frequencies that reach it are found, as
+        in `margin`, so that there is proof that none does (Boyd and Balakrishnan 1990).
+
+        Examples
+        --------
+        >>> from deadtime import delay, s
+        >>> round((1.0 / (s**2 + 0.2 * s + 1) * delay(0.3)).hinf_norm(), 6)
+        5.025189
+        >>> (1.0 / (s - 1.0)).hinf_norm()
+        inf
+        """
+        return hinf_norm(self._num._native, self._den._native)[0]
 
     def bode(
         self,

@@ -48,6 +48,16 @@ class Margins(ReadOnlyArrays):
     hidden : ndarray of complex
         Roots of the closed loop that are not left of the imaginary axis and do not count for
         `stable`, because numerator and denominator of L have them in common.
+    max_sensitivity, max_sensitivity_omega : float
+        Ms, the largest abs(S) over frequency of the sensitivity S = 1/(1 + L), and where it is, in
+        rad/s; inf where it is only come close to at high frequencies. 1/Ms is the least distance of
+        L from -1.
+    max_complementary_sensitivity, max_complementary_sensitivity_omega : float
+        Mt, the same of T = L/(1 + L).
+    disk_margin, disk_margin_omega : float
+        The disk margin alpha = 1/max abs((S - T)/2) (Seiler, Packard and Gahinet 2020, eq. 13 with
+        skew 0), and where it is least. L may be multiplied by every number of the disk with the
+        diameter from (2 - alpha)/(2 + alpha) to (2 + alpha)/(2 - alpha).
     searched : tuple of float
         Up to which frequencies, in rad/s, the gain crossovers and the phase crossovers are all
         listed; inf if there are no more. In a stable loop abs(L) is smaller beyond the second one
@@ -62,6 +72,8 @@ class Margins(ReadOnlyArrays):
     <Margins: gain 2.182 at 4.363 rad/s, phase 48.75° at 2 rad/s, delay 0.4254 s at 2 rad/s>
     >>> bool(abs(found.delay_margin - (3.141592653589793 / 4 - 0.36)) < 1e-15)
     True
+    >>> round(found.max_sensitivity, 3), round(found.max_sensitivity_omega, 3)
+    (2.041, 3.279)
     """
 
     stable: bool
@@ -80,6 +92,12 @@ class Margins(ReadOnlyArrays):
     gain_margins: Array
     searched: tuple[float, float]
     hidden: NDArray[np.complex128]
+    max_sensitivity: float
+    max_sensitivity_omega: float
+    max_complementary_sensitivity: float
+    max_complementary_sensitivity_omega: float
+    disk_margin: float
+    disk_margin_omega: float
 
     def _delay_margin(self) -> float:
         """The delay margin of a loop that must be stable."""
@@ -91,25 +109,33 @@ class Margins(ReadOnlyArrays):
         if not self.stable:
             return None
         rows = [("margin", "value", "at rad/s"), ("---",) * 3]
-        for name, value, unit, omega in self._four():
+        for name, value, unit, omega in self._listed():
             at = "" if math.isnan(omega) else f"{omega:.6g}"
             rows.append((name, f"{value:.6g}{unit}", at))
         return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
-    def _four(self) -> tuple[tuple[str, float, str, float], ...]:
+    def _listed(self) -> tuple[tuple[str, float, str, float], ...]:
         """Name, value, unit and frequency of each margin."""
         return (
             ("gain", self.gain_margin, "", self.gain_margin_omega),
             ("gain reduction", self.gain_reduction, "", self.gain_reduction_omega),
             ("phase", self.phase_margin, "°", self.phase_margin_omega),
             ("delay", self.delay_margin, " s", self.delay_margin_omega),
+            ("Ms", self.max_sensitivity, "", self.max_sensitivity_omega),
+            (
+                "Mt",
+                self.max_complementary_sensitivity,
+                "",
+                self.max_complementary_sensitivity_omega,
+            ),
+            ("disk", self.disk_margin, "", self.disk_margin_omega),
         )
 
     def __repr__(self) -> str:
         if not self.stable:
             return "<Margins: none, the closed loop is not stable as it is>"
         parts = []
-        for name, value, unit, omega in self._four():
+        for name, value, unit, omega in self._listed()[:4]:
             if name == "gain reduction" and value == 0.0:
                 continue
             where = "" if math.isnan(omega) else f" at {omega:.4g} rad/s"

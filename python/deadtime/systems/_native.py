@@ -5,6 +5,7 @@ from deadtime._deadtime import (
     Margins as Margins,
     Signal as Signal,
     fitted_series as fitted_series,
+    hinf_norm as hinf_norm,
     loop_margins as loop_margins,
     ratio as ratio,
 )

@@ -2,7 +2,8 @@
 
 `design` looks for gains that are best in the worst case over delay and gain of the plant and keep
 their margins there, and `design_filter` chooses the filter of the derivative. `adaptive_gains`
-makes a list of gains for a delay that moves, with a proof.
+makes a list of gains for a delay that moves, with a proof. `settings_of` writes gains in the forms
+that people type in, `controller_of` reads them. `tune` goes from a recording to such gains.
 """
 
 # The files. `_problem` holds what is free and what is not known, `_region` the region of an
@@ -26,6 +27,19 @@ from deadtime.tuning.adaptive import (
     SwitchingProof,
     adaptive_gains,
 )
+from deadtime.tuning.forms import (
+    LOOPS_OF_FORMS as LOOPS_OF_FORMS,
+    Form as Form,
+    IdealForm,
+    ParallelForm,
+    SeriesForm,
+    Settings,
+    controller_of,
+    one_pole_filter,
+    proportional_band,
+    settings_of,
+)
+from deadtime.tuning.proposal import Prediction, Proposal, tune
 
 __all__ = [
     "Choice",
@@ -35,11 +49,22 @@ __all__ = [
     "GainFollower",
     "GainSchedule",
     "GainSet",
+    "IdealForm",
     "LeastMargins",
+    "ParallelForm",
+    "Prediction",
+    "Proposal",
+    "SeriesForm",
+    "Settings",
     "SwitchingProof",
     "Trade",
     "adaptive_gains",
+    "controller_of",
     "critical_gain",
     "design",
     "design_filter",
+    "one_pole_filter",
+    "proportional_band",
+    "settings_of",
+    "tune",
 ]

@@ -152,8 +152,8 @@ def _just_inside(search: Search, required: RequiredMargins, gains: Array) -> Fou
 
 
 def _missing(required: RequiredMargins, each: Array) -> Array:
-    """What margins (scenarios, 3) miss of the requirements at their least."""
-    missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each), 0.0)
+    """What margins (scenarios, 5) miss of the requirements at their least."""
+    missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each[:, :3]), 0.0)
     return np.where(required.vector > 0.0, missing, 0.0)
 
 
@@ -171,7 +171,7 @@ def _unmet(search: Search, required: RequiredMargins, gains: Array) -> ValueErro
     )
     nearest = points[int(np.argmin(search.shortfalls(points)))]
     best = min([gains, nearest], key=search.short)
-    least = least_margins(exact_margins(problem, best, scenarios))
+    least = least_margins(exact_margins(problem, best, scenarios)[:, :3])
     wanted = ", ".join(_with_unit(name, value) for name, value in required.named.items())
     most = ", ".join(
         _with_unit(name, value)

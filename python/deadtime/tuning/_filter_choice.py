@@ -30,6 +30,7 @@ from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._exchange import best_gains, fine
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
+from deadtime.tuning._native import noise_gain as noise_gain_of
 from deadtime.tuning._objectives import Objective, objective_named
 from deadtime.tuning._problem import ObjectiveName, Problem, controller_template, pose
 from deadtime.tuning._result import FilterChoice
@@ -47,10 +48,6 @@ _BEYOND = 10.0
 
 #: Halvings of the interval between two corners: each costs a design and halves the error.
 _HALVINGS = 5
-
-#: Points of the integral over the noise, and its lower end as a fraction of the bandwidth.
-_POINTS = 4000
-_LOWEST = 1e-5
 
 #: Points of the map along each gain, for one, two and three free gains: fewer than for one design,
 #: since many maps are computed.
@@ -214,10 +211,7 @@ def filter_choice(
 
 def noise_gain(loop: ControlLoop, bandwidth: float) -> float:
     """Standard deviation of the command over that of white measurement noise, up to `bandwidth`."""
-    omega = np.geomspace(_LOWEST * bandwidth, bandwidth, _POINTS)
-    feedback = loop.controller.transfer_function().frequency_response(omega)
-    squared = np.abs(feedback / (1.0 + loop.frequency_response(omega))) ** 2
-    return float(np.sqrt(np.trapezoid(squared, omega) / bandwidth))
+    return noise_gain_of(loop.specification.kernel, bandwidth)
 
 
 class _Tried(NamedTuple):

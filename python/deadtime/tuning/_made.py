@@ -9,14 +9,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from deadtime.tuning._demands import white_to
 from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, margin_places, proved
 from deadtime.tuning._margins import UNITS, RequiredMargins, exact_margins
+from deadtime.tuning._native import noise_gain
 from deadtime.tuning._objectives import Objective
 from deadtime.tuning._problem import Problem
 from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
 from deadtime.tuning._search import Search
 from deadtime.tuning._settling import step_info
-from deadtime.tuning._survey import charts_at, surveyed
+from deadtime.tuning._survey import surveyed
 
 #: A margin at most this factor above its requirement limits the design.
 _ACTIVE = 1.0 + 1e-3
@@ -44,7 +46,10 @@ def made(
     value = objective.proved(problem, found.gains, judged)
     middle = problem.at(found.gains)
     places = [*margin_places(search, found.gains), found.worst]
-    margins = LeastMargins(*least_margins(exact_margins(problem, found.gains, places)).tolist())
+    exact = exact_margins(problem, found.gains, places)
+    margins = LeastMargins(
+        *least_margins(exact[:, :3]).tolist(), *exact[:, 3:].max(axis=0).tolist()
+    )
     return Design(
         loop=middle,
         gains=middle.controller.gains,
@@ -63,7 +68,9 @@ def made(
         proved=proved(problem, found.gains, required),
         region=problem.region,
         traded=_trades(search, found, margins, value),
-        charts=charts_at(problem, survey, found.gains),
+        noise_gain=noise_gain(middle.specification.kernel, white_to(middle)),
+        _problem=problem,
+        _survey=survey,
     )
 
 

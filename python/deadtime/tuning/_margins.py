@@ -79,7 +79,7 @@ def exact_margins(
     scenarios: Sequence[Scenario],
     required: RequiredMargins | None = None,
 ) -> Array:
-    """Gain, phase and delay margin in each scenario, shape (scenarios, 3).
+    """Gain, phase and delay margin, Ms and Mt in each scenario, shape (scenarios, 5).
 
     With `required` the delay margin, which takes most of the time, may be NaN where it is not.
     """

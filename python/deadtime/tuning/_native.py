@@ -1,7 +1,15 @@
-"""The native classes that this package uses."""
+"""The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
     Candidates as Candidates,
     Family as Family,
     LinearLoop as LinearLoop,
+    Loop as Loop,
+    RobustGains as RobustGains,
+    half_rule as half_rule,
+    lasting_load as lasting_load,
+    noise_gain as noise_gain,
+    response_figures as response_figures,
+    robust_gains as robust_gains,
+    tuning_rules as tuning_rules,
 )

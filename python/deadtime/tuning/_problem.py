@@ -20,7 +20,16 @@ from deadtime.tuning._native import Candidates
 from deadtime.tuning._region import ConfidenceRegion, region_of
 from deadtime.tuning._stabilising import candidate_ranges
 
-ObjectiveName: TypeAlias = Literal["abscissa", "damping", "settling_time", "overshoot"]
+ObjectiveName: TypeAlias = Literal[
+    "load",
+    "load_ie",
+    "set_point",
+    "set_point_settling",
+    "abscissa",
+    "damping",
+    "settling_time",
+    "overshoot",
+]
 
 #: Most free gains: those of PID. More would need a search without a map.
 _MOST_FREE = 3
@@ -36,8 +45,8 @@ class Problem:
         With the numbers in `intervals` at their middles.
     free : tuple of str
         Gains to be found.
-    spans : tuple of dict of str to (float, float)
-        Where they are looked for, one after the other until some gains are stable.
+    given : dict of str to (float, float) or None
+        Where they are looked for, if that was given.
     intervals : dict of str to (float, float)
         ``delay`` and, where it is not known either, ``gain`` of the plant; of a region those of
         all its numbers.
@@ -50,11 +59,23 @@ class Problem:
 
     loop: ControlLoop
     free: tuple[str, ...]
-    spans: tuple[dict[str, Range], ...]
+    given: dict[str, Range] | None
     intervals: dict[str, Range]
     amplitude: float
     threads: int | None
     region: ConfidenceRegion | None = None
+
+    @cached_property
+    def spans(self) -> tuple[dict[str, Range], ...]:
+        """Where gains are looked for, one after the other until some of them are stable."""
+        if self.given is not None:
+            return (self.given,)
+        if not self.loop.plant.is_rational:
+            raise ValueError(
+                "ranges: where to look for gains is known for plants that are rational but for one "
+                "delay in series; give ranges= for this one"
+            )
+        return candidate_ranges(self.loop, self.free)
 
     def named(self, gains: Sequence[float] | Array) -> dict[str, float]:
         """The free gains by name."""
@@ -161,18 +182,12 @@ def pose(
     whole = loop.replace(controller=template, **middle)
     if held:
         whole = whole.replace(**held)
-    if ranges is None and not whole.plant.is_rational:
-        raise ValueError(
-            "ranges: where to look for gains is known for plants that are rational but for one "
-            "delay in series; give ranges= for this one"
-        )
-    if ranges is None:
-        spans = candidate_ranges(whole, free)
-    else:
+    spans = None
+    if ranges is not None:
         given = _mapping("ranges", ranges)
         if set(given) != set(free):
             raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
-        spans = ({name: interval(f"the range of {name}", given[name]) for name in free},)
+        spans = {name: interval(f"the range of {name}", given[name]) for name in free}
     height = finite("amplitude", amplitude)
     if height == 0.0:
         raise ValueError("amplitude=0: there is no step, give a number other than zero")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import isfinite, nan
 from typing import NamedTuple
 
@@ -14,12 +15,13 @@ from deadtime._base.notebook import Pictured
 from deadtime.loops import ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
 from deadtime.tuning._candidates import Scenario
-from deadtime.tuning._problem import ObjectiveName
+from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._region import ConfidenceRegion
+from deadtime.tuning._survey import Survey, charts_at
 
 
 class LeastMargins(NamedTuple):
-    """Margins at their least over all that is not known; each may have its own worst scenario."""
+    """Margins at their worst over all that is not known; each may have its own worst scenario."""
 
     gain_margin: float
     """Factor on the loop gain."""
@@ -27,6 +29,10 @@ class LeastMargins(NamedTuple):
     """Degrees."""
     delay_margin: float
     """Further delay, s."""
+    max_sensitivity: float
+    """Ms, at its largest."""
+    max_complementary_sensitivity: float
+    """Mt, at its largest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +106,8 @@ class Design(ReadOnlyArrays, Pictured):
         in the intervals; empty for sampled loops, which are checked on the scenarios.
     traded : tuple of Trade
         What each requirement cost.
-    charts : tuple of StabilityMap
-        Maps of the gains: for each of `delays`; of one free gain a single one, over gain and
-        delay.
+    noise_gain : float
+        Standard deviation of the command over that of white measurement noise, with `loop`.
     filter_choice : FilterChoice or None
         Where the filter's corner was chosen, how.
     region : ConfidenceRegion or None
@@ -126,9 +131,22 @@ class Design(ReadOnlyArrays, Pictured):
     checked: int
     proved: tuple[str, ...]
     traded: tuple[Trade, ...]
-    charts: tuple[StabilityMap, ...]
+    noise_gain: float = nan
     filter_choice: FilterChoice | None = None
     region: ConfidenceRegion | None = None
+    _problem: Problem | None = field(default=None, repr=False)
+    _survey: Survey | None = field(default=None, repr=False)
+
+    @cached_property
+    def charts(self) -> tuple[StabilityMap, ...]:
+        """Maps of the gains: for each of `delays`; of one free gain a single one, over gain and delay.
+
+        They are made when they are first asked for.
+        """
+        if self._problem is None:
+            return ()
+        gains = [self.gains[name] for name in self._problem.free]
+        return charts_at(self._problem, self._survey, gains)
 
     def __repr__(self) -> str:
         kind = type(self.loop.controller).__name__
@@ -187,7 +205,8 @@ class Design(ReadOnlyArrays, Pictured):
             f"worst {over}: {figure_in_words(self.objective, self.value)}; spectral abscissa "
             f"{self.abscissa:.4g} 1/s, damping ratio {self.damping:.3g}",
             f"least margins: gain {least.gain_margin:.4g}, phase "
-            f"{least.phase_margin:.4g}°, delay {least.delay_margin:.4g} s "
+            f"{least.phase_margin:.4g}°, delay {least.delay_margin:.4g} s; Ms at most "
+            f"{least.max_sensitivity:.4g} "
             f"({self.checked} scenarios checked{proof})",
             f"step of {self.amplitude:g}: {step}",
         ]
@@ -243,6 +262,10 @@ def figure_in_words(objective: ObjectiveName, value: float) -> str:
         "damping": f"damping ratio {value:.3g}",
         "settling_time": f"settling time {value:.4g} s",
         "overshoot": f"overshoot {value:.3g} %",
+        "load": f"load response {value:.4g}",
+        "load_ie": f"load response {value:.4g}",
+        "set_point": f"set-point response {value:.4g} s",
+        "set_point_settling": f"settling time {value:.4g} s",
     }[objective]
 
 

@@ -23,6 +23,9 @@ _SHAPES = {1: (401,), 2: (61, 61), 3: (21, 21, 9)}
 _CHART_DELAYS = 41
 _BEYOND = 0.5
 
+#: How far a map without a survey reaches, as a multiple of the gains.
+_SHOWN = 3.0
+
 #: Further gains between zero and the first cell, as parts of it, and the points along each other
 #: gain there: an integral gain that small gives steps that no cell shows. Loops with still smaller
 #: ones take hundreds of settling times to come to rest.
@@ -176,27 +179,48 @@ def worst_abscissa(
     return worst
 
 
-def charts_at(problem: Problem, survey: Survey, gains: Array) -> tuple[StabilityMap, ...]:
+def charts_at(
+    problem: Problem, survey: Survey | None, gains: Sequence[float]
+) -> tuple[StabilityMap, ...]:
     """Maps to look at: over two gains, one for each delay; over one gain and the delay, one.
 
     A third gain has the value that was found, the gain of the plant its middle.
     """
     free, middle = problem.free, problem.middle
+    lines = _around(problem, gains) if survey is None else survey.axes
+    maps = {} if survey is None else survey.maps
     if len(free) == 1:
         low, high = problem.intervals["delay"]
         top = (1.0 + _BEYOND) * high or problem.loop.sample_time or 1.0  # a chart has a height
         wide = np.linspace((1.0 - _BEYOND) * low, top, _CHART_DELAYS)
         delays = np.unique(np.append(wide, problem.delays))
-        return (_mapped(problem, middle, {free[0]: survey.axes[0], "delay": delays}),)
+        return (_mapped(problem, middle, {free[0]: lines[0], "delay": delays}),)
     held = problem.named(gains)
-    axes = {name: survey.axes[i] for i, name in enumerate(free[:2])}
+    axes = {name: lines[i] for i, name in enumerate(free[:2])}
     held = {name: held[name] for name in free[2:]}
     charts = []
     for late in problem.delays:
         numbers = middle | {"delay": late} | held
-        known = survey.maps.get(frozenset(numbers.items()))
+        known = maps.get(frozenset(numbers.items()))
         charts.append(_mapped(problem, numbers, axes) if known is None else known)
     return tuple(charts)
+
+
+def _around(problem: Problem, gains: Sequence[float]) -> tuple[Array, ...]:
+    """Axes that hold the gains, where there is no survey."""
+    counts = _SHAPES[len(gains)]
+    if problem.given is not None:
+        ends = [problem.given[name] for name in problem.free]
+    else:
+        # A gain next to zero is shown on the scale of the others.
+        least = 0.1 * max(map(abs, gains))
+        ends = [
+            (-0.5 * least, 3.0 * least) if abs(gain) < least else (0.0, _SHOWN * gain)
+            for gain in gains
+        ]
+    return tuple(
+        np.linspace(min(pair), max(pair), count) for pair, count in zip(ends, counts, strict=True)
+    )
 
 
 def _by_the_rest(

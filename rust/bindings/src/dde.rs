@@ -4,7 +4,7 @@ use std::slice;
 
 use deadtime::dde::sampled;
 use deadtime::dde::{
-    Equations, LinearLoop, RateLimits, Reference, Request, Response, Start, Update, on_sample,
+    Equations, Kick, LinearLoop, RateLimits, Reference, Request, Response, Start, Update, on_sample,
 };
 use deadtime::frequency;
 use deadtime::roots::Region;
@@ -73,14 +73,24 @@ pub(crate) struct LoopRun<'py> {
     reference_time: Option<Floats<'py>>,
     command_history: Option<Floats<'py>>,
     pub(crate) sample_phase: f64,
+    /// Jumps of inputs: times since the start, which inputs, and to what.
+    kicks: Option<(Floats<'py>, Vec<usize>, Floats<'py>)>,
 }
 
 impl<'a, 'py> FromPyObject<'a, 'py> for LoopRun<'py> {
     type Error = PyErr;
 
     fn extract(run: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        let (state, command, reference_before, reference, reference_time, command_history, phase) =
-            run.extract()?;
+        let (
+            state,
+            command,
+            reference_before,
+            reference,
+            reference_time,
+            command_history,
+            phase,
+            kicks,
+        ) = run.extract()?;
         Ok(Self {
             state,
             command,
@@ -89,6 +99,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for LoopRun<'py> {
             reference_time,
             command_history,
             sample_phase: phase,
+            kicks,
         })
     }
 }
@@ -104,6 +115,7 @@ impl LoopRun<'_> {
             command: self.command,
             command_history: self.command_history()?,
             sample_phase: self.sample_phase,
+            kicks: self.kicks()?,
         })
     }
 
@@ -111,6 +123,16 @@ impl LoopRun<'_> {
         self.command_history
             .as_ref()
             .map_or(Ok(Vec::new()), |history| owned(history))
+    }
+
+    fn kicks(&self) -> PyResult<Vec<Kick>> {
+        let Some((times, inputs, values)) = &self.kicks else {
+            return Ok(Vec::new());
+        };
+        let (times, values) = (in_order(times)?, in_order(values)?);
+        let jumps = times.iter().zip(inputs).zip(values.iter());
+        let kick = |((&time, &input), &to)| Kick { time, input, to };
+        Ok(jumps.map(kick).collect())
     }
 
     fn jumps(&self) -> PyResult<Jumps> {
@@ -172,6 +194,7 @@ impl PyLinearLoop {
             c: owned(&equations.c)?,
             d: equations.d,
             impulse: equations.impulse,
+            ..Equations::default()
         };
         let update = match &equations.update {
             Some(update) => Some(Update {

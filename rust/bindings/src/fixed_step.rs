@@ -42,7 +42,7 @@ impl FixedStepSettings {
         Ok(Settings {
             delay: self.delay,
             path,
-            limit: self.limit,
+            bounds: self.limit.map(|limit| (-limit, limit)),
             sample_steps: self.sample_steps,
             solver,
             step: self.step,

@@ -32,6 +32,12 @@ pub(crate) struct PyMargins {
     gain_margins: Floats,
     searched: (f64, f64),
     hidden: Py<PyArray1<Complex64>>,
+    max_sensitivity: f64,
+    max_sensitivity_omega: f64,
+    max_complementary_sensitivity: f64,
+    max_complementary_sensitivity_omega: f64,
+    disk_margin: f64,
+    disk_margin_omega: f64,
 }
 
 impl PyMargins {
@@ -54,6 +60,12 @@ impl PyMargins {
             gain_margins: array(found.gain_margins),
             searched: found.searched,
             hidden: found.hidden.into_pyarray(py).unbind(),
+            max_sensitivity: found.peaks.sensitivity.value,
+            max_sensitivity_omega: found.peaks.sensitivity.omega,
+            max_complementary_sensitivity: found.peaks.complementary.value,
+            max_complementary_sensitivity_omega: found.peaks.complementary.omega,
+            disk_margin: 1.0 / found.peaks.disk.value,
+            disk_margin_omega: found.peaks.disk.omega,
         }
     }
 }
@@ -74,6 +86,17 @@ pub(crate) fn loop_margins(
     };
     let found = run_here(py, |task| margins(&n.core, &d.core, task))?;
     Ok(PyMargins::new(py, found))
+}
+
+/// The largest |n/d| over frequency and where it is, infinite of what is not stable.
+#[pyfunction]
+pub(crate) fn hinf_norm(
+    py: Python<'_>,
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+) -> PyResult<(f64, f64)> {
+    let found = run_here(py, |task| frequency::hinf_norm(&n.core, &d.core, task))?;
+    Ok((found.value, found.omega))
 }
 
 /// A frequency beyond which |n/d| < `level` is certain, rad/s; infinite where there is none.

@@ -15,6 +15,7 @@ mod fixed_step;
 mod flight;
 mod flight_plant;
 mod frequency;
+mod inputs;
 mod judgement;
 mod least_squares;
 mod literature;
@@ -71,7 +72,11 @@ mod _deadtime {
     #[pymodule_export]
     use super::frequency::{
         PyCrossings, PyMargins, corner_range, crossings, damping_range, delay_margin, delay_range,
-        end_of_gain, gain_range, loop_margins, ratio,
+        end_of_gain, gain_range, hinf_norm, loop_margins, ratio,
+    };
+    #[pymodule_export]
+    use super::inputs::{
+        DeviationFigures, SweepFigures, deviation_figures, driven_loop, sweep_deviations,
     };
     #[pymodule_export]
     use super::judgement::{FlightFinding, FlightJudgement, whiteness};
@@ -113,7 +118,10 @@ mod _deadtime {
         FittedSeries, LinearSystemResponse, PyLinearSystem, PySignal, fitted_series,
     };
     #[pymodule_export]
-    use super::tuning::PyCandidates;
+    use super::tuning::{
+        PyCandidates, RobustGains, half_rule, lasting_load, noise_gain, response_figures,
+        robust_gains, tuning_rules,
+    };
     #[pymodule_export]
     use super::ufunc::limit_threads;
     #[pymodule_export]

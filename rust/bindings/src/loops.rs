@@ -184,7 +184,7 @@ impl PyLoop {
     }
 
     /// Work with many loops whose numbers differ.
-    fn swept<T>(
+    pub(crate) fn swept<T>(
         &self,
         sets: &LoopSets<'_>,
         work: impl FnOnce(&SweptLoops<'_>) -> PyResult<T>,

@@ -1,12 +1,17 @@
 //! Bindings of `deadtime::tuning`.
 
 use deadtime::Error;
-use deadtime::tuning::{self, Candidates, Decisive, Goal, Loops, Objective, Scenario, Within};
+use deadtime::loops::{ControlLoop, Input};
+use deadtime::tuning::{
+    self, Candidates, Decisive, Demands, Goal, Loops, Objective, Posed, Scenario, Wish, Within,
+};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays::{converted, rows};
 use crate::dde::PyLinearLoop;
+use crate::frequency::PyMargins;
+use crate::loops::PyLoop;
 use crate::runtime::{run, run_here};
 use crate::stability::PyFamily;
 
@@ -211,7 +216,7 @@ impl PyCandidates {
         })
     }
 
-    /// Gain, phase and delay margin of gains in each scenario, NaN where a loop is not stable.
+    /// Gain, phase and delay margin, Ms and Mt of gains in each scenario, NaN where a loop is not stable.
     fn margins<'py>(
         &self,
         py: Python<'py>,
@@ -220,7 +225,7 @@ impl PyCandidates {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let found = run_here(py, |task| self.inner.margins(&gains, delay_margin, task))?;
         let count = found.len();
-        found.concat().into_pyarray(py).reshape([count, 3])
+        found.concat().into_pyarray(py).reshape([count, 5])
     }
 
     /// Least damping ratio of the dominant poles and spectral abscissa of gains in each scenario.
@@ -251,4 +256,129 @@ impl PyCandidates {
         let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         run(py, threads, None, |task| find(&points, task))
     }
+}
+
+/// Weight of the load, and whether the integral of its error and the settling time of a set point are
+/// what counts.
+#[derive(FromPyObject)]
+pub(crate) struct GivenWish(f64, bool, bool);
+
+/// Bounds on the figures of a loop, in the order of `Demands`.
+#[derive(FromPyObject)]
+pub(crate) struct GivenDemands(f64, f64, f64, f64, f64, f64, f64);
+
+/// Gains with the best response under a largest Ms over many loops.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct RobustGains {
+    gains: Vec<f64>,
+    value: f64,
+    margins: Vec<Py<PyMargins>>,
+}
+
+/// The best of the gains in `free`, of which the search begins with the `first` loops.
+#[pyfunction]
+#[pyo3(signature = (loops, first, free, wish, demands, bounds=None))]
+pub(crate) fn robust_gains(
+    py: Python<'_>,
+    loops: Vec<Bound<'_, PyLoop>>,
+    first: usize,
+    free: Vec<usize>,
+    wish: GivenWish,
+    demands: GivenDemands,
+    bounds: Option<Vec<(f64, f64)>>,
+) -> PyResult<RobustGains> {
+    let loops = loops.iter();
+    let posed = Posed {
+        loops: loops.map(|of| of.get().core().clone()).collect(),
+        first,
+        free,
+        wish: Wish {
+            load: wish.0,
+            by_integral: wish.1,
+            by_settling: wish.2,
+        },
+        demands: Demands {
+            max_sensitivity: demands.0,
+            gain_margin: demands.1,
+            phase_margin: demands.2,
+            delay_margin: demands.3,
+            noise_gain: demands.4,
+            bandwidth: demands.5,
+            settling_time: demands.6,
+        },
+        bounds,
+    };
+    let found = run_here(py, |task| tuning::best(&posed, task))?;
+    let margins = found.margins.into_iter();
+    let margins = margins.map(|each| Py::new(py, PyMargins::new(py, each)));
+    Ok(RobustGains {
+        gains: found.gains,
+        value: found.value,
+        margins: margins.collect::<PyResult<_>>()?,
+    })
+}
+
+/// Standard deviation of the command over that of measurement noise that is white up to a bandwidth.
+#[pyfunction]
+pub(crate) fn noise_gain(py: Python<'_>, of: &PyLoop, bandwidth: f64) -> PyResult<f64> {
+    run_here(py, |task| tuning::noise_gain(of.core(), bandwidth, task))
+}
+
+/// Integral of the modulus, peak and settling time after a unit step of the load or the reference, and
+/// overshoot in %.
+#[pyfunction]
+pub(crate) fn response_figures(
+    py: Python<'_>,
+    of: &PyLoop,
+    of_load: bool,
+) -> PyResult<(f64, f64, f64, f64)> {
+    let input = if of_load {
+        Input::Load
+    } else {
+        Input::Reference
+    };
+    let core: &ControlLoop = of.core();
+    let found = run_here(py, |task| tuning::figures(core, input, task))?;
+    Ok((
+        found.iae,
+        found.peak,
+        found.settling_time,
+        found.overshoot,
+    ))
+}
+
+/// What a unit load leaves: the integral of the error, or without an integral the deviation at rest.
+#[pyfunction]
+pub(crate) fn lasting_load(of: &PyLoop) -> PyResult<f64> {
+    converted(tuning::lasting(of.core()))
+}
+
+/// Name, gains, Ms, integral of the modulus after a load, settling time and overshoot.
+type RuleRow = (&'static str, Option<Vec<f64>>, f64, f64, f64, f64);
+
+/// The gains of a loop and those by rules, with what they give.
+#[pyfunction]
+pub(crate) fn tuning_rules(py: Python<'_>, of: &PyLoop) -> PyResult<Vec<RuleRow>> {
+    let found = run_here(py, |task| tuning::rules(of.core(), task))?;
+    let rows = found.into_iter().map(|row| {
+        (
+            row.rule,
+            row.gains,
+            row.max_sensitivity,
+            row.load_iae,
+            row.settling_time,
+            row.overshoot,
+        )
+    });
+    Ok(rows.collect())
+}
+
+/// Gain, lag, second lag and dead time in s of the plant of a loop by the half rule.
+#[pyfunction]
+pub(crate) fn half_rule(
+    of: &PyLoop,
+    with_second: bool,
+) -> PyResult<Option<(f64, f64, f64, f64)>> {
+    let found = converted(tuning::reduced(of.core(), with_second))?;
+    Ok(found.map(|plant| (plant.gain, plant.lag, plant.second, plant.dead_time)))
 }

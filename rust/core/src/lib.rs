@@ -3,11 +3,12 @@
 //!
 //! This crate holds all numerical methods of the `deadtime` Python package and does not depend on
 //! Python. Dependencies run one way: error, simd ← linear_algebra, lambertw, elementary ← quasipoly
-//! ← roots ← stability ← frequency ← loops, tuning, estimation; linear_algebra ← dde ← stability.
+//! ← roots ← stability ← frequency ← loops ← tuning, estimation; linear_algebra ← dde ← stability.
 
 #[macro_use]
 pub mod error;
 
+mod between;
 pub mod dde;
 pub mod elementary;
 pub mod estimation;

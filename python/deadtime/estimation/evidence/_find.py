@@ -13,12 +13,20 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._candidate import candidate_of
 from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Between, Question, questions_of
-from deadtime.estimation.evidence._words import CLEAR, reason_of
+from deadtime.estimation.evidence._words import (
+    CLEAR,
+    LEVELS,
+    ROUNDING,
+    TAKEN_AT_REST,
+    TOO_EARLY,
+    moves_in,
+    reason_of,
+)
 from deadtime.loops import Controller
 from deadtime.recordings import Recording
 
@@ -54,18 +62,42 @@ def estimate_by_evidence(
     }
     question = questions_of(recording, window, controller, limit, closed_loop, known)
     found = question.answer(progress=progress)
-    if plant is None:
-        return estimate_of(question, found)
+    first = estimate_of(question, found)
+    moves_at_all = any(np.ptp(one.command) > 0.0 for one in question.each)
+    if first.at_rest or moves_in(first) or not moves_at_all:
+        return _beside_all(first, found)
+    if at_rest is False:
+        return replace(first, verdict="none", reason=TOO_EARLY)
+    question = replace(question, at_rest=True)
+    found = question.answer()
+    return _taken_at_rest(_beside_all(estimate_of(question, found), found))
+
+
+def _beside_all(fit: PlantEstimate, found: native.FamilyFit) -> PlantEstimate:
+    """An estimate with a plant that was named, beside all other plants."""
+    question = fit._question
+    if question.plant is None:
+        return fit
     whole = question.of(None).answer()
     best, least = whole.candidates[0], found.candidates[0].bic
     if not least - best.bic > CLEAR:
-        return estimate_of(question, found)
+        return fit
     better = candidate_of(best, least)
-    named = estimate_of(question, found, better)
-    if named.verdict != "reliable" or not is_outside(whole, partial(_ends, found)):
+    named = replace(fit, _better=better)
+    # A cause may imitate the lag that the plant lacks.
+    is_open = bool(fit.causes) or is_outside(whole, partial(_ends, found))
+    if named.verdict != "reliable" or not is_open:
         return named
     reason = f"{better.in_words()}, explains the recording clearly better"
     return replace(named, verdict="indication", reason=reason)
+
+
+def _taken_at_rest(fit: PlantEstimate) -> PlantEstimate:
+    """An estimate from all rows, where nothing shows that the plant was at rest at the first."""
+    if fit.verdict == "none":
+        return fit
+    reason = "; ".join(filter(None, [fit.reason, TAKEN_AT_REST]))
+    return replace(fit, verdict="indication", reason=reason, _code=fit._code or TAKEN_AT_REST)
 
 
 def refit(
@@ -111,9 +143,7 @@ def _ends(found: native.FamilyFit, omega: float) -> list[Ends]:
     return [(float(view[name][1][0]), float(view[name][2][0])) for name in ("gain", "phase")]
 
 
-def estimate_of(
-    question: Question, found: native.FamilyFit, better: PlantCandidate | None = None
-) -> PlantEstimate:
+def estimate_of(question: Question, found: native.FamilyFit) -> PlantEstimate:
     """The answer of the kernel as a result."""
     answering = [one for one in found.candidates if one.values[one.names.index("gain")] != 0.0]
     candidates = tuple(candidate_of(one, answering[0].bic) for one in answering)
@@ -124,9 +154,11 @@ def estimate_of(
         "plant": None if best is None else best.plant,
         "parameters": {} if best is None else dict(best.parameters),
     }
+    step = _coarse_step(runs)
+    verdict = "indication" if step and found.verdict == "reliable" else found.verdict
     return PlantEstimate(
-        verdict=cast(Verdict, found.verdict),
-        reason=reason_of(found.reason, found, _is_one_step(question)),
+        verdict=cast(Verdict, verdict),
+        reason=reason_of(found.reason, found, _is_one_step(question), step),
         **numbers,
         crossover=found.crossover,
         largest_gain=found.largest_gain,
@@ -146,7 +178,6 @@ def estimate_of(
         _own_noise=runs[0].noise_std,
         _code=found.reason,
         _question=question,
-        _better=better,
         _at_crossover=(
             found.gain_at_crossover,
             found.phase_at_crossover,
@@ -159,6 +190,22 @@ def estimate_of(
 def _is_one_step(question: Question) -> bool:
     """Whether the command changes once, in one recording."""
     return not question.others and np.count_nonzero(np.diff(question.command)) == 1
+
+
+def _coarse_step(runs: Sequence[FittedRecording]) -> float:
+    """Step of a sensor that is coarse for how far it moves and beside its noise; zero of others."""
+    for run in runs:
+        output = run.recording.output
+        output = output[np.isfinite(output)]
+        span = float(np.ptp(output)) if output.size else 0.0
+        moves = np.abs(np.diff(output))
+        moves = moves[moves > 1e-9 * span]
+        step = float(moves.min()) if moves.size else 0.0
+        multiples = moves / step
+        are_whole = np.allclose(multiples, np.round(multiples), atol=0.01)
+        if are_whole and span < LEVELS * step and run.noise_std < ROUNDING * step:
+            return step
+    return 0.0
 
 
 def _run(question: Question, first: native.FamilyCandidate | None, place: int) -> FittedRecording:

@@ -91,13 +91,33 @@ def _python(value: Any) -> str:
     return f"dtm.{value!r}" if isinstance(value, Controller) else repr(value)
 
 
+#: Why an estimate is none, or no more than an indication, where the command moves at the beginning.
+TOO_EARLY = "the command moves only before the rows that count"
+TAKEN_AT_REST = "the plant is taken to be at rest at the first row, which nothing shows"
+
+#: The kernel's reason where residuals are no noise of a sensor.
+NOT_WHITE = "residuals not white"
+
+#: Deviation of the residuals, in steps of a sensor, below which they are mostly rounding, whose own
+#: is 0.29. Larger: noise of a sensor is taken for rounding.
+ROUNDING = 0.5
+
+#: Readings between the least and the largest value of a sensor from which on its rounding acts like
+#: noise. Fewer: rounding is correlated with the output, and intervals do not hold.
+LEVELS = 32
+
 #: Reasons that are those of one step, if the command is one.
 FEW_NUMBERS = ("too few told", "classes contradict", "crossover not told")
 
 
-def reason_of(code: str, found: native.FamilyFit, is_one_step: bool) -> str:
-    """Why an estimate is not reliable, in a sentence."""
+def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float) -> str:
+    """Why an estimate is not reliable; `step` is that of a coarse sensor, or zero."""
     size, determined, asked = found.reason_size, found.told, found.asked
+    if step and code in ("", NOT_WHITE, "no response"):
+        return (
+            f"the sensor reads in steps of {step:.4g}, too coarse for how far the output moves: "
+            "what is left unexplained is mostly rounding"
+        )
     if is_one_step and code in FEW_NUMBERS:
         return (
             "one step does not distinguish two lags from a dead time and a lag, and the largest "
@@ -111,7 +131,7 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool) -> str:
         else "the command is one sine, which determines gain and phase at its frequency alone",
         "classes contradict": "plants of different kinds explain the recording alike and differ "
         "where a loop crosses over",
-        "residuals not white": "what the plant leaves unexplained is no noise of a sensor: there "
+        NOT_WHITE: "what the plant leaves unexplained is no noise of a sensor: there "
         "is a disturbance, or the plant is of another kind",
         "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
         "2 ln L), and was moved",
@@ -237,14 +257,13 @@ def _advice_on(fit: FoundPlant) -> Advice:
         return Advice(
             "leave the plant out: another is likelier", {"plant": None}, fit._question.options()
         )
-    if not fit.at_rest and not _moves_in(fit):
-        return Advice(
-            "the command moves only before the rows that count; if the process was at rest at the "
-            "first row, say so",
-            {"at_rest": True},
-            fit._question.options(),
-        )
-    return _advice_by_reason(fit, fit._question.options())
+    if fit._code == TAKEN_AT_REST or fit.reason == TOO_EARLY:
+        words = "if the plant was at rest at the first row, say so"
+        return Advice(words, {"at_rest": True}, fit._question.options())
+    advice = _advice_by_reason(fit, fit._question.options())
+    if advice.options and fit.reason.endswith(TAKEN_AT_REST):
+        return replace(advice, options={"at_rest": True, **advice.options})
+    return advice
 
 
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
@@ -255,6 +274,8 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
             words += f"; or name the plant, if you know that it is {known[0].in_words()}"
             return Advice(words, {"plant": known[0].name}, given)
         return Advice(words)
+    if fit.reason.startswith("the sensor reads in steps"):
+        return Advice("let the command move further, or read the sensor in finer steps")
     if fit._code == "no response":
         return Advice("look whether these are the right columns", draw=True)
     window = None if fit.others else _reliable_part(fit._question)
@@ -278,7 +299,7 @@ def _reliable_part(question: Question) -> OpenRange | None:
     return None
 
 
-def _moves_in(fit: FoundPlant) -> bool:
+def moves_in(fit: FoundPlant) -> bool:
     """Whether the command changes in the rows that count."""
     for run, question in zip(fit.runs, fit._question.each, strict=True):
         used = ~_isnan(run.residuals)

@@ -12,12 +12,10 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 from deadtime._base.digits import stated
+from deadtime.tuning.forms import BIQUAD, PT1, PT2, PT3, pole_in_row
 
 #: Motors of the usual vehicle: Betaflight's head does not name their number.
 MOTORS = 4
-
-#: Types of low-pass filters in Betaflight's header.
-PT1, BIQUAD, PT2, PT3 = 0, 1, 2, 3
 
 
 class FilterDelay(NamedTuple):
@@ -75,8 +73,7 @@ def notch(centre: float, quality: float) -> float:
 
 def poles_in_row(number: int, corner: float) -> float:
     """Delay of poles of one kind in a row whose corner together, at -3 dB, is `corner`."""
-    own = corner / math.sqrt(2.0 ** (1.0 / number) - 1.0)
-    return number * one_pole(own)
+    return number * one_pole(pole_in_row(number, corner))
 
 
 LOW_PASSES: Mapping[int, Callable[[float], float]] = {

@@ -51,7 +51,7 @@ def read_recording(
         command.
     command : str, optional
         Name of the column that holds the command sent to the plant; ``"auto"`` for one of a usual
-        name: command, OP, MV, u. If it is not given, no command is read.
+        name: command, OP, MV, u. If it is not given, a command is read where there is no reference.
     window : (low, high), optional
         Keep only the rows between these times, s; None leaves an end open.
     delimiter : str, optional

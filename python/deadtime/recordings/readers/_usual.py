@@ -61,6 +61,9 @@ def chosen_columns(
         usual = _usual(signal, free) or (_usual(signal, names) if signal == "reference" else None)
         if usual is not None:
             found[signal] = usual
+        elif signal == "reference" and "command" not in given and _usual("command", free):
+            # Of a bump test there is a command alone.
+            found["command"] = str(_usual("command", free))
         elif signal not in optional:
             shown = ", ".join(map(repr, names[:12])) + (", …" if len(names) > 12 else "")
             raise RecordingError(
@@ -68,7 +71,9 @@ def chosen_columns(
                 f"{USUAL[signal][0]!r} or {USUAL[signal][1]!r}: it has {shown}; name the column by "
                 f"{signal}=, on the command line --{signal}"
             )
-    return {signal: found[signal] for signal in given if signal in found}
+    return {
+        signal: found[signal] for signal in dict.fromkeys([*given, "command"]) if signal in found
+    }
 
 
 def _usual(signal: str, names: Sequence[str]) -> str | None:

@@ -18,9 +18,10 @@ pub mod spectral;
 pub mod system;
 
 pub use control_loop::{
-    Criteria, Equations, LinearLoop, Metrics, Reference, Request, Response, Start, Trajectory,
-    Update, ensemble, fixed_step, on_sample, sampled,
+    Bounds, Criteria, Deviation, Equations, Kick, LinearLoop, Metrics, Reference, Request,
+    Response, Start, Trajectory, Update, ensemble, fixed_step, on_sample, sampled,
 };
+pub(crate) use control_loop::{DeviationMetrics, RequestedOutput};
 pub(crate) use limits::countable;
 pub use rate_limits::RateLimits;
 pub use scalar::{Dual, Scalar};

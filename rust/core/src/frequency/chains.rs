@@ -38,7 +38,8 @@ impl Lead {
         }
     }
 
-    fn reserve(&self, k: f64) -> f64 {
+    /// |a_0 + k b_0| − Σ |a_i + k b_i|.
+    pub(super) fn reserve(&self, k: f64) -> f64 {
         let mut sizes = self.pairs.iter().map(|(a, b)| (a + k * b).abs());
         let first = sizes.next().unwrap_or(0.0);
         first * (1.0 - self.room) - sizes.sum::<f64>()
@@ -95,6 +96,28 @@ impl Lead {
             (a + pair.0.abs(), b + pair.1.abs())
         });
         all_b > 0.0 && lead <= (all_a - lead) + all_b
+    }
+
+    /// The largest |Σ b_i z_i|/|Σ a_i z_i| over all |z_i| = 1, where |a_0| > Σ |a_i|; `None` where it
+    /// is not known.
+    ///
+    /// |Σ a_i z_i| is least at z_0 = 1, z_i = −sign(a_i a_0). Where that makes all b_i z_i of one sign
+    /// as well, the ratio is largest there; of two terms it is monotone in Re z_1.
+    pub(super) fn largest_ratio(&self) -> Option<f64> {
+        let first = self.pairs.first().map_or(0.0, |(a, _)| *a);
+        let turn = |place: usize, a: f64| if place > 0 && a * first > 0.0 { -1.0 } else { 1.0 };
+        let shared = self.pairs.iter().enumerate();
+        let shared = shared.filter(|(_, (a, b))| *a != 0.0 && *b != 0.0);
+        let signs: Vec<bool> = shared.map(|(i, (a, b))| turn(i, *a) * b > 0.0).collect();
+        let all: f64 = self.pairs.iter().map(|(_, b)| b.abs()).sum();
+        if signs.iter().all(|sign| Some(sign) == signs.first()) {
+            return Some(all / self.reserve(0.0));
+        }
+        let &[(a, b), (p, q)] = &self.pairs[..] else {
+            return None;
+        };
+        let at = |z: f64| ((b + q * z) / (a + p * z)).abs();
+        Some(at(1.0).max(at(-1.0)))
     }
 
     fn bends(&self) -> impl Iterator<Item = f64> + '_ {

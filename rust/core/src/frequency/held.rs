@@ -5,6 +5,8 @@
 
 use super::circle::is_stable;
 use super::further_delay::further_delay;
+use super::held_peaks::held_peaks;
+use super::norms::Peaks;
 use super::gain_crossovers::{Crossover, FAR, crossovers, is_zero};
 use super::margins::{Margins, degrees, least};
 use crate::order::sort_up;
@@ -100,6 +102,11 @@ fn with_verdict(
     let turned = least(&degrees, &places, |turn| Some(turn.abs()));
     let shown = |pair: (f64, f64)| if stable { pair } else { (f64::NAN, f64::NAN) };
     let [up, down, turned] = [up, down, turned].map(shown);
+    let peaks = if stable {
+        held_peaks(numbers, &[&places[..], &phase_crossovers].concat(), task)?
+    } else {
+        Peaks::UNKNOWN
+    };
     Ok(Margins {
         stable,
         gain_margin: up.0,
@@ -117,5 +124,6 @@ fn with_verdict(
         gain_margins: gains,
         searched: (f64::INFINITY, f64::INFINITY),
         hidden: Vec::new(),
+        peaks,
     })
 }

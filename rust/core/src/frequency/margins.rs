@@ -16,7 +16,8 @@ use num_complex::Complex64;
 
 use super::bounds::{end_of_gain, highest_corner};
 use super::chains::Lead;
-use super::squares::DifferenceOfSquares;
+use super::norms::{Peaks, peaks};
+use super::squares::{DifferenceOfSquares, alike};
 use super::two_sided::TwoSided;
 use super::waves::Waves;
 use super::zeros::zeros_between;
@@ -59,6 +60,7 @@ pub struct Margins {
     pub gain_margins: Vec<f64>,
     pub searched: (f64, f64),
     pub hidden: Vec<Complex64>,
+    pub peaks: Peaks,
 }
 
 /// Margins of the loop gain n/d, all roots of d + n counting for stability.
@@ -188,6 +190,11 @@ fn with_verdict(
     let turned = least(&degrees, &crossovers, |turn| Some(turn.abs()));
     let shown = |pair: (f64, f64)| if stable { pair } else { (f64::NAN, f64::NAN) };
     let [up, down, turned, late] = [up, down, turned, late].map(shown);
+    let largest = if stable {
+        peaks(n, d, &[&crossovers[..], &phase.places].concat(), task)?
+    } else {
+        Peaks::UNKNOWN
+    };
     Ok(Margins {
         stable,
         gain_margin: up.0,
@@ -205,6 +212,7 @@ fn with_verdict(
         gain_margins: factors,
         searched: (all_gain, phase.searched),
         hidden,
+        peaks: largest,
     })
 }
 
@@ -255,19 +263,7 @@ pub(super) fn gain_crossovers(
     d: &QuasiPolynomial,
     task: &Task,
 ) -> Result<(Vec<f64>, f64), Error> {
-    let common = if n.is_zero() {
-        0
-    } else {
-        n.powers_of_s().min(d.powers_of_s())
-    };
-    // A common factor, a power of two, keeps their squares within the range of doubles.
-    let largest = [n, d]
-        .into_iter()
-        .flat_map(|h| h.coefficients().iter().flatten());
-    let largest = largest.fold(f64::MIN_POSITIVE, |most, c| c.abs().max(most));
-    let unit = libm::ldexp(1.0, -libm::ilogb(largest).clamp(-1000, 1000));
-    let n = n.without_powers(common).scale(unit)?;
-    let d = d.without_powers(common).scale(unit)?;
+    let (n, d) = alike(n, d)?;
     let top = end_of_gain(&n, &d, 1.0, 0).min(end_of_gain(&d, &n, 1.0, 0));
     let (top, searched) = if top.is_finite() {
         (top, f64::INFINITY)

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 const STEPS: u32 = 200;
 
 /// The roots of Σ c_k zᵏ; leading coefficients that are zero are left out.
-pub(super) fn roots(ascending: &[Complex64]) -> Vec<Complex64> {
+pub(crate) fn roots(ascending: &[Complex64]) -> Vec<Complex64> {
     let used = ascending.iter().rposition(|c| *c != Complex64::ZERO);
     let degree = used.unwrap_or(0);
     let (Some(first), Some(last)) = (ascending.first(), ascending.get(degree)) else {

@@ -10,6 +10,7 @@ use num_complex::Complex64;
 use super::two_sided::TwoSided;
 use super::waves::Waves;
 use super::zeros::{RealFunction, Taylor};
+use crate::Error;
 use crate::quasipoly::{Probe, QuasiPolynomial};
 
 /// Four roundings, enlarged.
@@ -39,11 +40,38 @@ impl<'a> DifferenceOfSquares<'a> {
         }
     }
 
+    /// A bound on the zeros; infinite where there is none.
+    pub(super) fn last_zero(&self) -> f64 {
+        self.waves.last_zero()
+    }
+
     fn first_two(&mut self, omega: f64) -> [Known; 2] {
         let [d, n] = [&mut self.d, &mut self.n].map(|probe| square(probe, omega));
         let minus = |d: Known, n: Known| (d.0 - n.0, d.1 + n.1 + LAST * (d.0.abs() + n.0.abs()));
         [minus(d[0], n[0]), minus(d[1], n[1])]
     }
+}
+
+/// Both without common powers of s, and with a common factor, a power of two, that keeps their
+/// squares within the range of doubles.
+pub(super) fn alike(
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
+    let common = if n.is_zero() {
+        0
+    } else {
+        n.powers_of_s().min(d.powers_of_s())
+    };
+    let largest = [n, d]
+        .into_iter()
+        .flat_map(|h| h.coefficients().iter().flatten());
+    let largest = largest.fold(f64::MIN_POSITIVE, |most, c| c.abs().max(most));
+    let unit = libm::ldexp(1.0, -libm::ilogb(largest).clamp(-1000, 1000));
+    Ok((
+        n.without_powers(common).scale(unit)?,
+        d.without_powers(common).scale(unit)?,
+    ))
 }
 
 /// |g|² and its derivative by ω.

@@ -119,6 +119,15 @@ impl ControlLoop {
         Ok((times(&b, &f, self.values().delay)?, times(&a, &g, 0.0)?))
     }
 
+    /// b and a.
+    ///
+    /// # Errors
+    /// As [`loop_gain`](Self::loop_gain).
+    pub fn plant_ratio(&self) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
+        let [b, a] = self.ratio(self.values())?;
+        Ok((times(&b, &[1.0], 0.0)?, times(&a, &[1.0], 0.0)?))
+    }
+
     /// The characteristic function.
     ///
     /// # Errors

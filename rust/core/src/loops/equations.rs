@@ -10,7 +10,45 @@ use super::control_loop::{ControlLoop, Values};
 use super::controller::ControllerEquations;
 use super::entry::Number;
 use super::filter::{Sampled, SampledFilter};
+use super::inputs::Drive;
 use super::plant::StateSpace;
+
+/// How an input acts.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Column {
+    /// On x′.
+    pub(super) states: Vec<f64>,
+    /// On u.
+    pub(super) command: f64,
+    /// On y.
+    pub(super) output: f64,
+    /// On what the controller sees of y.
+    pub(super) seen: f64,
+    /// Weight of the impulse in u where it jumps.
+    pub(super) impulse: f64,
+}
+
+/// How the inputs of a loop act.
+#[derive(Debug, Clone)]
+pub(super) struct Columns {
+    reference: Column,
+    load: Column,
+    seen: Column,
+}
+
+impl Columns {
+    pub(super) fn of(&self, drive: Drive) -> Column {
+        match drive {
+            Drive::Reference => self.reference.clone(),
+            Drive::Load => self.load.clone(),
+            Drive::Noise => self.seen.clone(),
+            Drive::Output => Column {
+                output: 1.0,
+                ..self.seen.clone()
+            },
+        }
+    }
+}
 
 /// What moves the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,11 +95,57 @@ impl ControlLoop {
     pub fn linear(&self, input: Input) -> Result<LinearLoop, Error> {
         let values = self.values();
         let (equations, update) = self.on_samples(values, input)?;
+        self.bounded(equations, update, values)
+    }
+
+    /// The loop of these equations, with its delay, its samples and the bounds of its command.
+    pub(super) fn bounded(
+        &self,
+        equations: Equations,
+        update: Option<Update>,
+        values: &Values,
+    ) -> Result<LinearLoop, Error> {
         let plain = LinearLoop::new(equations, values.delay, values.sample_time, values.limit)?;
         match update {
             Some(update) => plain.with_update(update),
             None => Ok(plain),
         }
+    }
+
+    /// How inputs act on the states and signals of the loop.
+    ///
+    /// # Errors
+    /// As [`equations`](Self::equations).
+    pub(super) fn columns(&self, values: &Values) -> Result<Columns, Error> {
+        let controller = self.controller();
+        let sampled = controller.sampled(&values.controller, values.sample_time.as_ref())?;
+        let own = controller.equations(&values.controller, sampled.as_ref());
+        let equations = self.equations(values, Input::Reference, sampled.as_ref())?;
+        let still = vec![0.0; equations.states() - own.b.len()];
+        let on_error = f64::from(u8::from(controller.kind.derivative_of_error()));
+        Ok(Columns {
+            load: Column {
+                states: equations.b,
+                command: equations.l,
+                output: equations.d,
+                seen: equations.d,
+                impulse: 0.0,
+            },
+            seen: Column {
+                states: still.iter().copied().chain(own.b).collect(),
+                command: own.p,
+                output: 0.0,
+                seen: 1.0,
+                impulse: own.q,
+            },
+            reference: Column {
+                states: equations.e,
+                command: equations.m,
+                output: 0.0,
+                seen: -on_error,
+                impulse: equations.impulse,
+            },
+        })
     }
 
     /// The equations for these numbers, and what a sample does to the states.
@@ -207,5 +291,7 @@ fn closed<S: Number>(
         c,
         d,
         impulse,
+        impulses: Vec::new(),
+        excess: Vec::new(),
     }
 }

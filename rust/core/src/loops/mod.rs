@@ -4,7 +4,8 @@
 //!   polynomials in free numbers, `polynomial` those in s.
 //! * `plant`, `filter` and `controller` are the parts, `control_loop` joins them and names their
 //!   numbers.
-//! * `equations` closes the loop for the steppers of `dde`, `rest` is where a run starts,
+//! * `equations` closes the loop for the steppers of `dde`, `inputs` adds what drives it besides the
+//!   reference, `load` measures the response to that, `rest` is where a run starts,
 //!   `settled` how slow its parts are, `slopes` has derivatives of a response, `sweep` many loops.
 //! * `characteristic` has the characteristic function, families of it and transfer functions, `held`
 //!   the rows of a map of a sampled loop, `plane` that map, and `range` the stable values of a number.
@@ -17,6 +18,8 @@ mod entry;
 mod equations;
 mod filter;
 mod held;
+mod inputs;
+mod load;
 mod plane;
 mod plant;
 mod polynomial;
@@ -34,6 +37,8 @@ pub use entry::{Entry, Number};
 pub use equations::Input;
 pub use filter::{Rule, SampledFilter};
 pub use held::{HeldRows, Moving, Polynomials};
+pub use inputs::Drive;
+pub use load::{DeviationAsked, Figures};
 pub use plane::HeldPlane;
 pub use plant::{Factors, Fraction, Plant, StateSpace};
 pub use range::GivenPlant;

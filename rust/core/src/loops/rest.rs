@@ -16,10 +16,15 @@ const NO_REST: f64 = 1e-13;
 /// Output and command at rest under a unit reference, NaN where there is no such rest: with plant b/a,
 /// feedback f/g and reference path r/g they are b r/(a g + b f) and a r/(a g + b f) at s = 0.
 pub(super) fn rest_gains([b, a, f, g, r]: [f64; 5]) -> (f64, f64) {
-    let total = a * g + b * f;
-    let exists = total.abs() > NO_REST * ((a * g).abs() + (b * f).abs());
-    let total = if exists { total } else { f64::NAN };
+    let total = total_at_rest(a * g, b * f);
     (b * r / total, a * r / total)
+}
+
+/// a g + b f at s = 0, NaN where it is zero but for rounding.
+pub(super) fn total_at_rest(own: f64, fed: f64) -> f64 {
+    let total = own + fed;
+    let exists = total.abs() > NO_REST * (own.abs() + fed.abs());
+    if exists { total } else { f64::NAN }
 }
 
 impl ControlLoop {

@@ -5,11 +5,12 @@
 use crate::dde::Criteria;
 use crate::dde::ensemble::{self, Measures, Outcome, Sets};
 use crate::stability::{abscissae, decay};
-use crate::{Error, Task, memory};
+use crate::{Error, Task, memory, parallel};
 
 use super::control_loop::{ControlLoop, Place, Values};
 use super::each::Each;
 use super::equations::Input;
+use super::load::{DeviationAsked, Figures};
 use super::plant::Fraction;
 use super::rest::rest_gains;
 use super::settled::slowest;
@@ -221,6 +222,48 @@ impl<'a> SweptLoops<'a> {
             Ok(())
         })?;
         Ok((outputs, outcomes))
+    }
+
+    /// Figures of the deviation after a step of each loop, and what became of it.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`], [`Error::Memory`].
+    pub fn deviations(
+        &self,
+        asked: &DeviationAsked,
+        task: &Task,
+    ) -> Result<Vec<(Figures, Outcome)>, Error> {
+        let of = |(): &mut (), set: usize| {
+            task.check()?;
+            let found = self.of.with(self.values_of(set)).deviation(asked, task);
+            task.advance(1);
+            match found {
+                Ok(found) if found.is_settled => Ok(Some((found, Outcome::Ok))),
+                Ok(found) => Ok(Some((found, Outcome::Unsettled))),
+                Err(error) if error.ends_all() => Err(error),
+                Err(Error::Diverges { .. }) => Ok(Some((Figures::UNKNOWN, Outcome::Diverged))),
+                Err(_) => Ok(None),
+            }
+        };
+        let found = parallel::results(SWEEP, self.count, || (), of)?;
+        let refused = (Figures::UNKNOWN, Outcome::Refused);
+        memory::collected(
+            SWEEP,
+            found.into_iter().map(|found| found.unwrap_or(refused)),
+        )
+    }
+
+    /// The numbers of one loop.
+    fn values_of(&self, set: usize) -> Values {
+        let number = |each: &Each| at(each, set);
+        let list = |part: &Vec<Each>| part.iter().map(number).collect();
+        Values {
+            given: self.values.given.as_ref().map(|given| Fraction {
+                num: list(&given.num),
+                den: list(&given.den),
+            }),
+            ..self.values.each(&number)
+        }
     }
 
     /// Spectral abscissae without the limits, 1/s; NaN where none is found.

@@ -180,8 +180,8 @@ impl Candidates {
         found_or(found, [0.0; 3])
     }
 
-    /// Gain, phase and delay margin of gains in each scenario, NaN of a loop that is not stable;
-    /// without `delay_margin` that of a sampled loop, which takes long, is NaN.
+    /// Gain, phase and delay margin, Ms and Mt of gains in each scenario, NaN of a loop that is not
+    /// stable; without `delay_margin` that of a sampled loop, which takes long, is NaN.
     ///
     /// # Errors
     /// As [`margins`] and [`held_margins`].
@@ -190,7 +190,7 @@ impl Candidates {
         gains: &[f64],
         delay_margin: bool,
         task: &Task,
-    ) -> Result<Vec<[f64; 3]>, Error> {
+    ) -> Result<Vec<[f64; 5]>, Error> {
         let each = |scenario: &Scenario| {
             let (values, _) = self.values(gains, scenario, None);
             let found = match &self.loops {
@@ -203,7 +203,7 @@ impl Candidates {
                     held_margins(HeldLoop::new(&plant)?, delay_margin, task)?
                 }
             };
-            Ok(three(&found))
+            Ok(figures(&found))
         };
         self.scenarios.iter().map(each).collect()
     }
@@ -217,8 +217,14 @@ fn found_or<T>(found: Result<T, Error>, otherwise: T) -> Result<T, Error> {
     }
 }
 
-fn three(found: &Margins) -> [f64; 3] {
-    [found.gain_margin, found.phase_margin, found.delay_margin]
+fn figures(found: &Margins) -> [f64; 5] {
+    [
+        found.gain_margin,
+        found.phase_margin,
+        found.delay_margin,
+        found.peaks.sensitivity.value,
+        found.peaks.complementary.value,
+    ]
 }
 
 /// n and d.

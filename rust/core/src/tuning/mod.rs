@@ -4,14 +4,22 @@
 //! one number of these. `simplices` and `between` find a minimum of a function with kinks, of several
 //! variables and of one, and `search` looks for the best gains with them.
 
-mod between;
 mod candidates;
+mod demands;
 mod goal;
+mod open;
+mod responses;
+mod robust;
+mod rules;
 mod search;
 mod simplices;
 
 pub use candidates::{Candidates, Dominant, Loops, Scenario};
+pub use demands::{Demands, margins_of, noise_gain};
 pub use goal::{Decisive, Goal, Objective};
+pub use responses::{Figures, figures};
+pub use robust::{Best, Posed, Wish, best, lasting};
+pub use rules::{Reduced, Row, reduced, rules};
 pub use search::{Within, best_within, least, worst_delay};
 
 #[cfg(test)]

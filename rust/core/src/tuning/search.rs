@@ -5,9 +5,8 @@
 
 use super::candidates::Candidates;
 use super::goal::{Decisive, Goal, Objective, UNSTABLE};
-use super::{between, simplices};
-use crate::parallel;
-use crate::{Error, Task};
+use super::simplices;
+use crate::{Error, Task, between, parallel};
 
 /// Accuracy of the gains as a fraction of their ranges, of one gain and of several. Where roots meet
 /// the abscissa has cusps: gains known to 1e-7 leave it known to 1e-3.

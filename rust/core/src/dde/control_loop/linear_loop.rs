@@ -9,7 +9,12 @@
 //! t_{k+1} + Td); controller states see the reference held in the same way. An ideal derivative of
 //! r is zero except for an impulse at each jump of r, which arrives at the plant like the rest of
 //! the command and, where L ≠ 0, returns with weight L. Time counts from the start of the run;
-//! every signal is scalar, x has any length.
+//! every signal is scalar, x has any length. The last states may be inputs that jump ([`Kick`]).
+//!
+//! The command may have unequal bounds and a bound on its rate. With v the command after all bounds, an
+//! integral need not wind up: by back-calculation x′ gains G (v − u), by conditional integration the
+//! integral stops where the command is out of its bounds and the integral would drive it further out
+//! (Åström and Hägglund, Advanced PID Control, 2006, sections 3.5 and 3.6).
 
 use crate::Error;
 use crate::dde::limits::{countable, finite};
@@ -38,6 +43,10 @@ pub struct Equations<S = f64> {
     /// Weight of the impulse in u per unit jump of the reference: the gain of an ideal derivative
     /// of r. A limited or sampled command has none.
     pub impulse: S,
+    /// The same per unit jump of each of the last states, which are inputs.
+    pub impulses: Vec<S>,
+    /// Column G of the back-calculation, n; empty where there is none.
+    pub excess: Vec<S>,
 }
 
 impl<S: Scalar> Equations<S> {
@@ -56,9 +65,40 @@ impl<S: Scalar> Equations<S> {
         dot(&self.c, x) + self.d * w
     }
 
-    /// The change of the states over a time `h` with constant w and r.
+    /// The change of the states over a time `h` with constant w, r and, of a back-calculation, v − u.
     pub(crate) fn over(&self, h: S) -> Propagator<S> {
-        Propagator::new(&self.a, &[&self.b, &self.e], h)
+        if self.excess.is_empty() {
+            Propagator::new(&self.a, &[&self.b, &self.e], h)
+        } else {
+            Propagator::new(&self.a, &[&self.b, &self.e, &self.excess], h)
+        }
+    }
+
+    /// Number of columns that drive the states: B, E and, where it is, G.
+    pub(crate) fn inputs(&self) -> usize {
+        if self.excess.is_empty() { 2 } else { 3 }
+    }
+
+    /// x′ of a state, without back-calculation.
+    pub(crate) fn slope(&self, state: usize, x: &[S], w: S, r: S) -> S {
+        let n = self.states();
+        let row = self.a.get(state * n..(state + 1) * n).unwrap_or_default();
+        let entry = |column: &[S]| column.get(state).copied().unwrap_or_default();
+        dot(row, x) + entry(&self.b) * w + entry(&self.e) * r
+    }
+
+    /// The same with a state that does not move.
+    pub(crate) fn stopped(&self, state: usize) -> Self {
+        let n = self.states();
+        let mut other = self.clone();
+        let row = other.a.iter_mut().skip(state * n).take(n);
+        row.for_each(|entry| *entry = S::default());
+        for column in [&mut other.b, &mut other.e, &mut other.excess] {
+            if let Some(entry) = column.get_mut(state) {
+                *entry = S::default();
+            }
+        }
+        other
     }
 }
 
@@ -82,9 +122,14 @@ pub struct LinearLoop<S = f64> {
     equations: Equations<S>,
     delay: S,
     sample_time: Option<S>,
-    limit: Option<S>,
+    bounds: Option<Bounds<S>>,
+    rate: Option<S>,
+    stops: Option<usize>,
     update: Option<Update>,
 }
+
+/// The least and the greatest command.
+pub type Bounds<S = f64> = (S, S);
 
 /// Initial values of a run, at time 0.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -98,6 +143,19 @@ pub struct Start<S = f64> {
     pub command_history: Vec<f64>,
     /// Sampled loops: time of the first sample, in [0, Ts).
     pub sample_phase: f64,
+    /// Jumps of the states that are inputs, in order of time, none before the start.
+    pub kicks: Vec<Kick>,
+}
+
+/// A jump of a state that is an input: to a value, so that rounding errors of many do not add up.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Kick {
+    /// Since the start, s.
+    pub time: f64,
+    /// Which of the inputs, from the first on.
+    pub input: usize,
+    /// The value to which it jumps.
+    pub to: f64,
 }
 
 impl<S: Scalar> LinearLoop<S> {
@@ -114,6 +172,8 @@ impl<S: Scalar> LinearLoop<S> {
             ("E", equations.e.len(), n),
             ("K", equations.k.len(), n),
             ("C", equations.c.len(), n),
+            ("G", equations.excess.len().max(n), n),
+            ("the inputs", equations.impulses.len().max(n), n),
         ];
         for (name, found, wanted) in lengths {
             refuse_if!(
@@ -126,6 +186,8 @@ impl<S: Scalar> LinearLoop<S> {
         finite("E", &equations.e)?;
         finite("K", &equations.k)?;
         finite("C", &equations.c)?;
+        finite("G", &equations.excess)?;
+        finite("impulses", &equations.impulses)?;
         finite(
             "L, M, D, impulse",
             &[equations.l, equations.m, equations.d, equations.impulse],
@@ -158,9 +220,50 @@ impl<S: Scalar> LinearLoop<S> {
             equations,
             delay,
             sample_time,
-            limit: limit.filter(|limit| limit.is_finite()),
+            bounds: limit
+                .filter(|limit| limit.is_finite())
+                .map(|limit| (-limit, limit)),
+            rate: None,
+            stops: None,
             update: None,
         })
+    }
+
+    /// The same loop with other bounds of its command, which hold zero, infinite where there is none.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where they do not hold zero.
+    pub fn with_bounds(mut self, low: S, high: S) -> Result<Self, Error> {
+        let (least, most) = (low.value(), high.value());
+        refuse_if!(
+            !(least < most && least <= 0.0 && most >= 0.0),
+            "limit=({least}, {most}): give the least and the greatest command, zero between them"
+        );
+        let is_bounded = least.is_finite() || most.is_finite();
+        self.bounds = is_bounded.then_some((low, high));
+        Ok(self)
+    }
+
+    /// The same loop with a bound on the rate of its command, in its unit a second.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where it is not positive.
+    pub fn with_rate(mut self, rate: S) -> Result<Self, Error> {
+        refuse_if!(
+            rate.value().is_nan() || rate.value() <= 0.0,
+            "rate_limit={}: give a positive rate of the command, or none for no limit",
+            rate.value()
+        );
+        self.rate = rate.is_finite().then_some(rate);
+        Ok(self)
+    }
+
+    /// The same loop with an integral, by its state, that stops while it would drive the command further
+    /// out of its bounds.
+    #[must_use]
+    pub fn with_stop(mut self, state: usize) -> Self {
+        self.stops = Some(state);
+        self
     }
 
     /// The same loop with states that change at samples.
@@ -233,17 +336,34 @@ impl<S: Scalar> LinearLoop<S> {
         self.sample_time
     }
 
-    /// Bound of |u|; none where there is no bound.
-    pub fn limit(&self) -> Option<S> {
-        self.limit
+    /// The least and the greatest command; none where there is no bound.
+    pub fn bounds(&self) -> Option<Bounds<S>> {
+        self.bounds
+    }
+
+    /// Bound of |u′|; none where there is no bound.
+    pub fn rate(&self) -> Option<S> {
+        self.rate
+    }
+
+    /// The integral that stops; none where none does.
+    pub fn stops(&self) -> Option<usize> {
+        self.stops
+    }
+
+    /// Does the command at its bounds change how the states move, or is its rate bounded?
+    pub fn is_watched(&self) -> bool {
+        let is_bounded = self.bounds.is_some() || self.rate.is_some();
+        let winds = self.stops.is_some() || !self.equations.excess.is_empty();
+        self.rate.is_some() || (is_bounded && winds)
     }
 }
 
-/// Clip to [−limit, limit].
-pub(crate) fn saturate<S: Scalar>(u: S, limit: Option<S>) -> S {
-    match limit {
-        Some(limit) if u.value() > limit.value() => limit,
-        Some(limit) if u.value() < -limit.value() => -limit,
+/// Clip to bounds.
+pub(crate) fn saturate<S: Scalar>(u: S, bounds: Option<Bounds<S>>) -> S {
+    match bounds {
+        Some((_, high)) if u.value() > high.value() => high,
+        Some((low, _)) if u.value() < low.value() => low,
         _ => u,
     }
 }

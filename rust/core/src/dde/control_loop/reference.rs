@@ -2,6 +2,9 @@
 
 use crate::Error;
 use crate::dde::limits::finite;
+use crate::dde::scalar::Scalar;
+
+use super::linear_loop::{Equations, Kick};
 
 /// A piecewise constant reference, each value holding from its time on.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,12 +63,13 @@ impl Reference {
         }
     }
 
-    /// A reader for times that do not decrease.
-    pub(crate) fn cursor(&self) -> Cursor<'_> {
+    /// A reader for times that do not decrease, of the reference and of the jumps of inputs.
+    pub(crate) fn cursor<'a>(&'a self, kicks: &'a [Kick]) -> Cursor<'a> {
         Cursor {
             reference: self,
             next: 0,
             value: self.before,
+            kicks,
         }
     }
 }
@@ -76,9 +80,43 @@ pub(crate) struct Cursor<'a> {
     reference: &'a Reference,
     next: usize,
     value: f64,
+    /// Those that are still to come.
+    kicks: &'a [Kick],
 }
 
 impl Cursor<'_> {
+    /// Let the inputs jump that do up to `slack` after time `t`. Returns the weight of the
+    /// impulse that they cause in the command; none where no input jumps.
+    pub(crate) fn kick<S: Scalar>(
+        &mut self,
+        t: f64,
+        slack: f64,
+        equations: &Equations<S>,
+        x: &mut [S],
+    ) -> Option<S> {
+        let mut weight = None;
+        let first = x.len().saturating_sub(equations.impulses.len());
+        while let Some((kick, later)) = self.kicks.split_first()
+            && kick.time <= t + slack
+        {
+            self.kicks = later;
+            let Some(state) = x.get_mut(first + kick.input) else {
+                continue;
+            };
+            let to = S::from(kick.to);
+            let by = to - std::mem::replace(state, to);
+            let impulse = equations.impulses.get(kick.input).copied();
+            let before = weight.unwrap_or_default();
+            weight = Some(before + impulse.unwrap_or_default() * by);
+        }
+        weight
+    }
+
+    /// Time of the next jump of an input, infinite if there is none.
+    pub(crate) fn next_kick(&self) -> f64 {
+        self.kicks.first().map_or(f64::INFINITY, |kick| kick.time)
+    }
+
     /// Advance to time `t`, where a jump up to `slack` later counts as reached. Returns the value
     /// there.
     pub(crate) fn advance(&mut self, t: f64, slack: f64) -> f64 {
@@ -100,12 +138,10 @@ impl Cursor<'_> {
         self.value
     }
 
-    /// Time of the next jump, infinite if there is none.
+    /// Time of the next jump of the reference or of an input, infinite if there is none.
     pub(crate) fn next_jump(&self) -> f64 {
-        self.reference
-            .times
-            .get(self.next)
-            .copied()
-            .unwrap_or(f64::INFINITY)
+        let times = &self.reference.times;
+        let jump = times.get(self.next).copied().unwrap_or(f64::INFINITY);
+        jump.min(self.next_kick())
     }
 }

@@ -1,7 +1,6 @@
 //! The requested output of a run: outputs and inputs at given times, breaking points, metrics.
 
 use super::series::{BLOCK, Series};
-use super::step_metrics::StepMetrics;
 use crate::Error;
 use crate::dde::limits::RESPONSE;
 use crate::dde::scalar::Scalar;
@@ -20,6 +19,15 @@ pub struct Trajectory<S = f64> {
     pub input_breaks: Vec<f64>,
 }
 
+/// What measures a response during its run.
+pub(crate) trait Measure: std::fmt::Debug {
+    /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.
+    fn segment(&mut self, start: f64, length: f64, end: f64, y: &Series);
+
+    /// The command is at its limit from `start` to `end`.
+    fn limited(&mut self, start: f64, end: f64);
+}
+
 /// Output and input times of a run, and the values so far.
 #[derive(Debug)]
 pub(crate) struct RequestedOutput<'a, S = f64> {
@@ -29,7 +37,7 @@ pub(crate) struct RequestedOutput<'a, S = f64> {
     ahead: S,
     pub(crate) trajectory: Trajectory<S>,
     /// Measures the output during the run, if metrics are requested.
-    metrics: Option<&'a mut StepMetrics>,
+    metrics: Option<&'a mut dyn Measure>,
 }
 
 impl<'a, S: Scalar> RequestedOutput<'a, S> {
@@ -57,7 +65,7 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
     }
 
     /// Measure the output as well, at least up to the last of the times.
-    pub(crate) fn measured_by(mut self, metrics: &'a mut StepMetrics) -> Self {
+    pub(crate) fn measured_by(mut self, metrics: &'a mut dyn Measure) -> Self {
         self.metrics = Some(metrics);
         self
     }

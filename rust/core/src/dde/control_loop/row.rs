@@ -77,6 +77,7 @@ impl<'a, S: Scalar> Row<'a, S> {
             c: self.c.to_vec(),
             d: self.d,
             impulse: self.impulse,
+            ..Equations::default()
         };
         let sample_time = self.is_sampled().then_some(self.sample_time);
         LinearLoop::new(equations, self.delay, sample_time, Some(self.limit))

@@ -8,6 +8,7 @@
 
 use super::level_crossings::crossings;
 use super::metrics::{Criteria, Levels, Metrics, Record};
+use super::requested_output::Measure;
 use super::series::Series;
 use crate::dde::limits::slack;
 
@@ -57,28 +58,66 @@ impl StepMetrics {
         &self.record
     }
 
-    /// The command is at its limit from `start` to `end`.
-    pub(crate) fn limited(&mut self, start: f64, end: f64) {
+    /// Can an output between `low` and `high` change the record?
+    fn concerns(&self, levels: &Levels, low: f64, high: f64) -> bool {
+        let record = &self.record;
+        let best = if levels.sign > 0.0 { high } else { -low };
+        high > record.top.0
+            || low < record.bottom.0
+            || high > record.after.1
+            || low < record.after.0
+            || (record.risen.1.is_nan() && best >= levels.rise.0)
+    }
+
+    /// The first time at which each level of the rise is reached. `places` divide the response into
+    /// monotone parts.
+    fn rise(&mut self, levels: &Levels, y: &Series, places: &[f64], time: impl Fn(f64) -> f64) {
+        let reached = |sigma: f64, level: f64| levels.sign * y.at(sigma) >= level;
+        let first = |level: f64| -> Option<f64> {
+            let place = places.iter().position(|&sigma| reached(sigma, level))?;
+            let right = *places.get(place)?;
+            let Some(mut left) = place.checked_sub(1).and_then(|p| places.get(p)).copied() else {
+                return Some(right);
+            };
+            let mut right = right;
+            loop {
+                let mid = 0.5 * (left + right);
+                if mid <= left || mid >= right || right - left < 0.5 * f64::EPSILON {
+                    return Some(right);
+                }
+                if reached(mid, level) {
+                    right = mid;
+                } else {
+                    left = mid;
+                }
+            }
+        };
+        if self.record.risen.0.is_nan()
+            && let Some(sigma) = first(levels.rise.0)
+        {
+            self.record.risen.0 = time(sigma).max(0.0);
+        }
+        if self.record.risen.1.is_nan()
+            && let Some(sigma) = first(levels.rise.1)
+        {
+            self.record.risen.1 = time(sigma).max(0.0);
+            let value = y.at(sigma);
+            self.record.after = (value, value);
+        }
+    }
+}
+
+impl Measure for StepMetrics {
+    fn limited(&mut self, start: f64, end: f64) {
         if start <= self.end {
             self.record.limited_until = self.record.limited_until.max(end.min(self.end));
         }
     }
 
-    /// The response is `y` of (t − `start`)/`length`, from 0 to `end`.
-    pub(crate) fn segment(&mut self, start: f64, length: f64, end: f64, y: &Series) {
-        // A polynomial that ends at the start may end in a jump there.
-        if start + end * length <= self.start + slack(self.start, self.start) {
+    fn segment(&mut self, start: f64, length: f64, end: f64, y: &Series) {
+        let Some((from, to)) = part_within((self.start, self.end), (start, length, end)) else {
             return;
-        }
-        let from = ((self.start - start) / length).max(0.0);
-        let mut to = ((self.end - start) / length).min(end);
-        // A polynomial that begins at the end may begin with a jump.
-        if start <= self.end + slack(self.end, self.end) {
-            to = to.max(0.0);
-        }
-        if from > to || from.is_nan() || to.is_nan() {
-            return;
-        }
+        };
         let since = self.start;
         let time = |sigma: f64| start + sigma * length - since;
         let (begin, begins_at) = (y.at(from), time(from).max(0.0));
@@ -141,58 +180,28 @@ impl StepMetrics {
         }
         self.zeros = zeros;
     }
+}
 
-    /// Can an output between `low` and `high` change the record?
-    fn concerns(&self, levels: &Levels, low: f64, high: f64) -> bool {
-        let record = &self.record;
-        let best = if levels.sign > 0.0 { high } else { -low };
-        high > record.top.0
-            || low < record.bottom.0
-            || high > record.after.1
-            || low < record.after.0
-            || (record.risen.1.is_nan() && best >= levels.rise.0)
+/// The part of a polynomial of (t − `start`)/`length`, from 0 to `end`, that lies within a time.
+pub(crate) fn part_within(
+    (first, last): (f64, f64),
+    (start, length, end): (f64, f64, f64),
+) -> Option<(f64, f64)> {
+    // A polynomial that ends at the first time may end in a jump there.
+    if start + end * length <= first + slack(first, first) {
+        return None;
     }
-
-    /// The first time at which each level of the rise is reached. `places` divide the response into
-    /// monotone parts.
-    fn rise(&mut self, levels: &Levels, y: &Series, places: &[f64], time: impl Fn(f64) -> f64) {
-        let reached = |sigma: f64, level: f64| levels.sign * y.at(sigma) >= level;
-        let first = |level: f64| -> Option<f64> {
-            let place = places.iter().position(|&sigma| reached(sigma, level))?;
-            let right = *places.get(place)?;
-            let Some(mut left) = place.checked_sub(1).and_then(|p| places.get(p)).copied() else {
-                return Some(right);
-            };
-            let mut right = right;
-            loop {
-                let mid = 0.5 * (left + right);
-                if mid <= left || mid >= right || right - left < 0.5 * f64::EPSILON {
-                    return Some(right);
-                }
-                if reached(mid, level) {
-                    right = mid;
-                } else {
-                    left = mid;
-                }
-            }
-        };
-        if self.record.risen.0.is_nan()
-            && let Some(sigma) = first(levels.rise.0)
-        {
-            self.record.risen.0 = time(sigma).max(0.0);
-        }
-        if self.record.risen.1.is_nan()
-            && let Some(sigma) = first(levels.rise.1)
-        {
-            self.record.risen.1 = time(sigma).max(0.0);
-            let value = y.at(sigma);
-            self.record.after = (value, value);
-        }
+    let from = ((first - start) / length).max(0.0);
+    let mut to = ((last - start) / length).min(end);
+    // A polynomial that begins at the last time may begin with a jump.
+    if start <= last + slack(last, last) {
+        to = to.max(0.0);
     }
+    (from <= to).then_some((from, to))
 }
 
 /// May the derivative change its sign on [0, 1]?
-fn may_turn(y: &Series) -> bool {
+pub(crate) fn may_turn(y: &Series) -> bool {
     let slopes = y.terms().iter().enumerate().skip(2);
     let others: f64 = slopes.map(|(j, c)| j as f64 * c.abs()).sum();
     y.degree > 1 && others >= y.coefficients[1].abs()

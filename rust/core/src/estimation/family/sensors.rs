@@ -3,6 +3,8 @@
 //! Equal readings of a coarse sensor are none of these: repeats count where readings usually differ by
 //! many steps of the sensor. A glitch leaves for a few rows and comes back.
 
+use std::ops::Range;
+
 use super::rows::Record;
 use super::tolerances::SENSORS;
 
@@ -56,7 +58,7 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
     let values: Vec<f64> = known.iter().map(|row| record.output[*row]).collect();
     // How a sensor reads is seen in all rows; what it did counts in those that are fitted.
     let first = known.partition_point(|row| *row < out.earlier);
-    let mut leave = |kind: SensorKind, runs: &[std::ops::Range<usize>]| {
+    let mut leave = |kind: SensorKind, runs: &[Range<usize>]| {
         let fitted = runs.iter().map(|run| run.start.max(first)..run.end);
         let runs: Vec<_> = fitted.filter(|run| !run.is_empty()).collect();
         let rows = runs.iter().map(ExactSizeIterator::len).sum();
@@ -83,8 +85,43 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
         leave(SensorKind::Frozen, std::slice::from_ref(run));
     }
     leave(SensorKind::Repeated, &short);
-    leave(SensorKind::Glitch, &glitches(&values));
+    let glitches = glitches(&values);
+    let rows: Vec<_> = glitches
+        .iter()
+        .map(|run| known[run.start]..known[run.end - 1] + 1)
+        .collect();
+    if !are_responses(&rows, &record.command) {
+        leave(SensorKind::Glitch, &glitches);
+    }
     (out, faults)
+}
+
+/// Whether most of these runs of rows come one and the same time after pulses of the command that are as
+/// wide, and after most of its pulses comes one of them.
+fn are_responses(runs: &[Range<usize>], command: &[f64]) -> bool {
+    let pulse_at = |at: usize| {
+        let (rest, out) = (command[at - 1], command[at] - command[at - 1]);
+        let latest = (at + SENSORS.longest).min(command.len() - 1);
+        let back = |row: &usize| (command[*row] - rest).abs() < 0.5 * out.abs();
+        (at + 1..=latest).find(back).map(|back| at..back)
+    };
+    let pulses: Vec<Range<usize>> = (1..command.len()).filter_map(pulse_at).collect();
+    let after = |run: &Range<usize>, pulse: &Range<usize>, lag: usize| {
+        run.start.abs_diff(pulse.start + lag) <= 1 && pulse.len().abs_diff(run.len()) <= 1
+    };
+    let answers = |lag: usize| {
+        let answered = |pulse: &&Range<usize>| runs.iter().any(|run| after(run, pulse, lag));
+        let caused = |run: &&Range<usize>| pulses.iter().any(|pulse| after(run, pulse, lag));
+        2 * runs.iter().filter(caused).count() > runs.len()
+            && 2 * pulses.iter().filter(answered).count() > pulses.len()
+    };
+    let first = runs.iter().take(1 + runs.len() / 2);
+    let lags = first.flat_map(|run| {
+        pulses
+            .iter()
+            .map(|pulse| run.start.checked_sub(pulse.start))
+    });
+    lags.flatten().any(|lag| lag > 0 && answers(lag))
 }
 
 /// How many rows a reading usually lasts.
@@ -94,7 +131,7 @@ fn usual_run(values: &[f64]) -> f64 {
 }
 
 /// Readings that repeat the one before them by more than chance.
-fn repeats(values: &[f64]) -> Vec<std::ops::Range<usize>> {
+fn repeats(values: &[f64]) -> Vec<Range<usize>> {
     let steps: Vec<f64> = values
         .windows(2)
         .map(|two| (two[1] - two[0]).abs())
@@ -138,16 +175,31 @@ fn repeats(values: &[f64]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Readings that leave for a few rows and come back, both by far more than those around them move.
-fn glitches(values: &[f64]) -> Vec<std::ops::Range<usize>> {
+fn glitches(values: &[f64]) -> Vec<Range<usize>> {
     let steps: Vec<f64> = values.windows(2).map(|two| two[1] - two[0]).collect();
     let around = |first: usize, last: usize| {
         let before = first.saturating_sub(SENSORS.around)..first;
         let after = last + 1..(last + 1 + SENSORS.around).min(steps.len());
-        let sizes = before.chain(after).map(|at| steps[at].abs());
-        sizes.fold(0.0, f64::max)
+        let mut sizes: Vec<f64> = before.chain(after).map(|at| steps[at].abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        // The largest may be those of other glitches.
+        sizes.truncate(sizes.len() - SENSORS.others.min(sizes.len() / 4));
+        sizes.last().copied().unwrap_or(0.0)
+    };
+    // At either end nothing is seen before or after it.
+    let alone = |at: usize| {
+        let moves = around(at, at);
+        moves > 0.0 && steps[at].abs() > SENSORS.far * moves
     };
     let mut out = Vec::new();
+    if steps.is_empty() {
+        return out;
+    }
     let mut at = 0;
+    if alone(0) && !(steps.len() > 1 && alone(1)) {
+        out.push(0..1);
+        at = 1;
+    }
     while at + 1 < steps.len() {
         // Out by the step `at`, back by the step `back`.
         let comes_back = |back: &usize| {
@@ -165,6 +217,10 @@ fn glitches(values: &[f64]) -> Vec<std::ops::Range<usize>> {
             at = back;
         }
         at += 1;
+    }
+    let last = steps.len() - 1;
+    if at == last && last > 1 && alone(last) && !alone(last - 1) {
+        out.push(last + 1..last + 2);
     }
     out
 }
@@ -210,14 +266,38 @@ mod tests {
         let held = output[200];
         output[200..230].fill(held);
         output[300..303].iter_mut().for_each(|y| *y += 2.0);
-        let (clean, faults) = without_faults(&of(output), 0);
+        let (clean, faults) = without_faults(&of(output.clone()), 0);
         assert_eq!(faults.len(), 2);
         assert_eq!((faults[0].kind, faults[0].rows), (SensorKind::Frozen, 29));
         assert_eq!((faults[1].kind, faults[1].rows), (SensorKind::Glitch, 3));
         assert_eq!(clean.output.iter().filter(|y| y.is_nan()).count(), 32);
+        // Some beside one another, and one at each end.
+        for at in [0, 100, 104, 109, 399] {
+            output[at] += if at % 2 == 0 { 2.0 } else { -2.0 };
+        }
+        assert_eq!(without_faults(&of(output), 0).1[1].rows, 8);
         for step in [0.0, 0.01, 0.1] {
             assert!(without_faults(&of(noisy(400, step)), 0).1.is_empty());
         }
+    }
+
+    #[test]
+    fn responses_to_pulses_of_the_command_are_no_glitches() {
+        let mut record = of(noisy(400, 0.0));
+        for at in [30, 91, 150, 207, 260, 331] {
+            record.output[at..at + 3].iter_mut().for_each(|y| *y += 2.0);
+        }
+        assert_eq!(without_faults(&record, 0).1[0].rows, 18);
+        for at in [30, 91, 150, 207, 260, 331] {
+            record.command[at - 7..at - 4].fill(2.0);
+        }
+        assert!(without_faults(&record, 0).1.is_empty());
+        // What a controller answers to glitches comes after them.
+        record.command.fill(0.0);
+        for at in [30, 91, 150, 207, 260, 331] {
+            record.command[at + 1..at + 4].fill(-2.0);
+        }
+        assert_eq!(without_faults(&record, 0).1[0].rows, 18);
     }
 
     #[test]

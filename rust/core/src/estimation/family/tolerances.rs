@@ -280,10 +280,12 @@ pub(super) struct Sensors {
     /// Rows, and multiples of the usual repeat, from which on a reading is frozen.
     pub(super) frozen: f64,
     pub(super) longer: f64,
-    /// Most rows of a glitch, how many steps before and after it are looked at, and multiples of the largest
-    /// of these by which a glitch leaves and comes back: less takes motion for one.
+    /// Most rows of a glitch, how many steps before and after it are looked at, how many of these may be
+    /// those of other glitches, and multiples of the largest of the rest by which a glitch leaves and comes
+    /// back: less takes motion for one.
     pub(super) longest: usize,
     pub(super) around: usize,
+    pub(super) others: usize,
     pub(super) far: f64,
 }
 
@@ -296,8 +298,9 @@ pub(super) const SENSORS: Sensors = Sensors {
     frozen: 6.0,
     longer: 4.0,
     longest: 5,
-    around: 6,
-    far: 3.0,
+    around: 12,
+    others: 4,
+    far: 4.0,
 };
 
 /// The series that stands for a plant's error.

@@ -56,11 +56,11 @@ pub(super) fn run<S: Scalar>(
 ) -> Result<bool, Error> {
     // A page has no room for a second method; the general one gives the same to rounding.
     let is_page = cfg!(target_family = "wasm");
-    if is_page || S::MOVES || requested.is_measured() || plant.limit().is_some() {
+    if is_page || S::MOVES || requested.is_measured() || plant.bounds().is_some() {
         return Ok(false);
     }
     let delay = plant.delay().value();
-    let mut cursor = reference.cursor();
+    let mut cursor = reference.cursor(&start.kicks);
     let before = cursor.advance(0.0, -slack(0.0, delay));
     let r = cursor.advance(0.0, slack(0.0, delay));
     let jumps_later = cursor.next_jump().is_finite();

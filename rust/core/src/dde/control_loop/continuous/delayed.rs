@@ -1,6 +1,6 @@
 //! Method of steps for a positive delay.
 
-use crate::dde::control_loop::linear_loop::{LinearLoop, Start, saturate};
+use crate::dde::control_loop::linear_loop::{Bounds, LinearLoop, Start, saturate};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::limits::{check_growth, slack};
@@ -26,16 +26,17 @@ pub(super) fn run<S: Scalar>(
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
     let equations = plant.equations();
-    let (delay, limit) = (plant.delay(), plant.limit());
+    let (delay, bounds) = (plant.delay(), plant.bounds());
     let orders = Orders::new(plant);
     let mut pieces = Pieces::new(start.command, delay);
     let mut impulses = Impulses::default();
-    let mut cursor = reference.cursor();
+    let mut cursor = reference.cursor(&start.kicks);
     cursor.advance(0.0, -slack(S::default(), delay));
     let mut x = start.state.clone();
     let mut forcing = vec![S::default(); x.len()];
     let mut expansion = Expansion::new(&equations.a, x.len());
-    let held = limit.map(|limit| [limit, -limit].map(Series::constant));
+    let held = bounds.map(|(low, high)| [high, low].map(Series::constant));
+    let values = bounds.map(|(low, high)| (low.value(), high.value()));
     let mut modes: Vec<Stretch> = Vec::new();
     let mut mode = Mode::Free;
     let mut w = Series::constant(S::default());
@@ -57,13 +58,18 @@ pub(super) fn run<S: Scalar>(
         for (x, &b) in x.iter_mut().zip(&equations.b) {
             *x += b * struck;
         }
-        let made = if limit.is_none() {
-            equations.impulse * S::from(r - before)
+        let kicked = if jumps {
+            cursor.kick(t.value(), tolerance, equations, &mut x)
+        } else {
+            None
+        };
+        let made = if bounds.is_none() {
+            equations.impulse * S::from(r - before) + kicked.unwrap_or_default()
         } else {
             S::default()
         };
         impulses.push(t + delay, made + equations.l * struck);
-        let state_jumps = !struck.is_nothing();
+        let state_jumps = kicked.is_some() || !struck.is_nothing();
         for (forcing, &e) in forcing.iter_mut().zip(&equations.e) {
             *forcing = e * S::from(r);
         }
@@ -107,14 +113,14 @@ pub(super) fn run<S: Scalar>(
         });
         requested.input_blocks(next.value() - tolerance, |times| {
             let values = u.at_each(times.map(|time| (time - t) / h));
-            values.map(|u| saturate(u, limit))
+            values.map(|u| saturate(u, bounds))
         });
 
         modes.clear();
-        match limit {
-            Some(limit) if !is_instant => stretches(&u, limit.value(), &mut modes),
+        match values {
+            Some(values) if !is_instant => stretches(&u, values, &mut modes),
             _ => modes.push(Stretch {
-                mode: at_start(&u, limit),
+                mode: at_start(&u, values),
                 start: 0.0,
                 end: 1.0,
             }),
@@ -158,7 +164,7 @@ pub(super) fn run<S: Scalar>(
     Ok(requested.trajectory)
 }
 
-/// The command after the limit, `held` being those at the limit, the upper one first.
+/// The command after its bounds, `held` being those at the bounds, the upper one first.
 fn clipped<'a, S: Scalar>(
     u: &'a Series<S>,
     mode: Mode,
@@ -172,9 +178,9 @@ fn clipped<'a, S: Scalar>(
 }
 
 /// The mode of the command at σ = 0.
-fn at_start<S: Scalar>(u: &Series<S>, limit: Option<S>) -> Mode {
-    limit.map_or(Mode::Free, |limit| {
-        Mode::of(u.coefficients[0].value(), limit.value())
+fn at_start<S: Scalar>(u: &Series<S>, bounds: Option<Bounds>) -> Mode {
+    bounds.map_or(Mode::Free, |bounds| {
+        Mode::of(u.coefficients[0].value(), bounds)
     })
 }
 

@@ -1,7 +1,7 @@
 //! The response, with or without a delay.
 
 use super::effort::{MOST_ELEMENTS, endless};
-use super::{aligned, delayed, direct};
+use super::{aligned, delayed, modes};
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
@@ -16,12 +16,15 @@ pub(crate) fn run<S: Scalar>(
     mut requested: RequestedOutput<'_, S>,
     task: &Task,
 ) -> Result<Trajectory<S>, Error> {
-    if plant.delay().value() > 0.0 {
+    let is_delayed = plant.delay().value() > 0.0;
+    if is_delayed {
         // No element is longer than the delay, so that a run that would exceed the limit on
         // elements is refused before it starts.
         if requested.last() / plant.delay().value() >= MOST_ELEMENTS as f64 {
             return Err(endless());
         }
+    }
+    if is_delayed && !plant.is_watched() {
         let chosen = Instructions::chosen();
         if aligned::run(chosen, plant, start, reference, &mut requested, task)? {
             return Ok(requested.trajectory);
@@ -30,6 +33,6 @@ pub(crate) fn run<S: Scalar>(
         delayed::run(plant, start, reference, requested, task)
     } else {
         requested.reserve()?;
-        direct::run(plant, start, reference, requested, task)
+        modes::run(plant, start, reference, requested, task)
     }
 }

@@ -1,34 +1,35 @@
-//! Where a polynomial on [0, 1] lies within ±limit, and where beyond.
+//! Where a polynomial on [0, 1] lies within bounds, and where beyond.
 //!
-//! The zeros of p ∓ limit are isolated in the Bernstein basis: the number of sign changes of the
+//! The zeros of p less a bound are isolated in the Bernstein basis: the number of sign changes of the
 //! coefficients bounds the number of zeros and equals it when it is 0 or 1 (Descartes' rule), so an
 //! interval with more is halved (de Casteljau) and one with a single change is bisected to the last
-//! bit. No crossing is missed. A contact that leaves the limit for less than 2⁻⁴⁰ of the interval
-//! is no crossing, and neither are rounding errors around the limit. Crossings are those of the
+//! bit. No crossing is missed. A contact that leaves a bound for less than 2⁻⁴⁰ of the interval
+//! is no crossing, and neither are rounding errors around the bound. Crossings are those of the
 //! values and have no slope: the limited command is continuous there, so that a shift of a crossing
 //! changes the response in second order only.
 
 use crate::dde::scalar::Scalar;
 
 use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use crate::dde::control_loop::linear_loop::Bounds;
 use crate::dde::control_loop::series::Series;
 
-/// Where the command is relative to its limit.
+/// Where the command is relative to its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// |u| ≤ limit.
+    /// Within.
     Free,
-    /// u > limit.
+    /// Above the greatest command.
     High,
-    /// u < −limit.
+    /// Below the least one.
     Low,
 }
 
 impl Mode {
-    pub(super) fn of(u: f64, limit: f64) -> Self {
-        if u > limit {
+    pub(super) fn of(u: f64, (low, high): Bounds) -> Self {
+        if u > high {
             Self::High
-        } else if u < -limit {
+        } else if u < low {
             Self::Low
         } else {
             Self::Free
@@ -45,7 +46,7 @@ pub(super) struct Stretch {
 }
 
 /// The intervals of `u` on [0, 1], in order; neighbours differ in mode.
-pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stretch>) {
+pub(super) fn stretches<S: Scalar>(u: &Series<S>, bounds: Bounds, out: &mut Vec<Stretch>) {
     out.clear();
     let whole = |mode| Stretch {
         mode,
@@ -53,18 +54,21 @@ pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stre
         end: 1.0,
     };
     let (low, high) = u.range();
-    if high <= limit && low >= -limit {
+    if high <= bounds.1 && low >= bounds.0 {
         return out.push(whole(Mode::Free));
     }
-    if low > limit {
+    if low > bounds.1 {
         return out.push(whole(Mode::High));
     }
-    if high < -limit {
+    if high < bounds.0 {
         return out.push(whole(Mode::Low));
     }
     let mut zeros = Vec::new();
-    crossings(u, limit, &mut zeros);
-    crossings(u, -limit, &mut zeros);
+    for bound in [bounds.1, bounds.0] {
+        if bound.is_finite() {
+            crossings(u, bound, &mut zeros);
+        }
+    }
     zeros.sort_by(f64::total_cmp);
     zeros.push(1.0);
     let mut start = 0.0;
@@ -72,7 +76,7 @@ pub(super) fn stretches<S: Scalar>(u: &Series<S>, limit: f64, out: &mut Vec<Stre
         if end <= start {
             continue;
         }
-        let mode = Mode::of(value_at(u, 0.5 * (start + end)), limit);
+        let mode = Mode::of(value_at(u, 0.5 * (start + end)), bounds);
         match out.last_mut() {
             Some(last) if last.mode == mode => last.end = end,
             _ => out.push(Stretch { mode, start, end }),
@@ -100,7 +104,7 @@ mod tests {
 
     fn found(u: &Series, limit: f64) -> Vec<Stretch> {
         let mut out = Vec::new();
-        stretches(u, limit, &mut out);
+        stretches(u, (-limit, limit), &mut out);
         out
     }
 
@@ -186,7 +190,7 @@ mod tests {
                 let value = u.at(sigma);
                 prop_assume!((value.abs() - 1.0).abs() > 1e-9);
                 let here = modes.iter().find(|m| sigma <= m.end).map(|m| m.mode);
-                prop_assert_eq!(here, Some(Mode::of(value, 1.0)));
+                prop_assert_eq!(here, Some(Mode::of(value, (-1.0, 1.0))));
             }
         }
     }

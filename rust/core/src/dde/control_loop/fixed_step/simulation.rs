@@ -1,6 +1,6 @@
 //! Simulation of a loop in fixed steps.
 
-use crate::dde::control_loop::linear_loop::{dot, saturate};
+use crate::dde::control_loop::linear_loop::{Bounds, dot, saturate};
 use crate::dde::control_loop::reference::Reference;
 use crate::dde::limits::{RESPONSE, check_growth};
 use crate::memory::{reserved, room};
@@ -60,8 +60,8 @@ pub struct Settings {
     pub delay: f64,
     /// Its place.
     pub path: Path,
-    /// Bound of |u|; none where there is no limit.
-    pub limit: Option<f64>,
+    /// The least and the greatest command; none where there is no limit.
+    pub bounds: Option<Bounds>,
     /// Whole steps between two samples of the controller; none in continuous time.
     pub sample_steps: Option<usize>,
     /// The formula.
@@ -272,7 +272,7 @@ impl Simulation<'_> {
             + blocks.proportional * v
             + self.since_last(self.differentiated(v, r), since)
             + blocks.reference * r;
-        saturate(u, self.settings.limit)
+        saturate(u, self.settings.bounds)
     }
 
     /// The difference quotient of the input of the derivative, which is now `value`, `since` steps

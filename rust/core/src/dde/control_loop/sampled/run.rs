@@ -1,7 +1,9 @@
 //! Response of a sampled loop: sample by sample, exact, with output at any time.
 
-use crate::dde::control_loop::linear_loop::{LinearLoop, Start, Update, saturate};
-use crate::dde::control_loop::reference::Reference;
+use std::borrow::Cow;
+
+use crate::dde::control_loop::linear_loop::{Equations, LinearLoop, Start, Update, saturate};
+use crate::dde::control_loop::reference::{Cursor, Reference};
 use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
 use crate::dde::limits::{RESPONSE, check_growth, slack};
 use crate::dde::propagator::Propagator;
@@ -10,7 +12,7 @@ use crate::memory::push;
 use crate::{Error, Task};
 
 use super::timing::Timing;
-use super::window::{Window, Windows};
+use super::window::{INPUTS, Window, Windows};
 
 /// Samples between two checks for cancellation.
 const CHECK_EVERY: u64 = 1024;
@@ -29,25 +31,29 @@ pub(crate) fn run<S: Scalar>(
     requested.reserve()?;
     let equations = plant.equations();
     let timing = Timing::new(plant.delay(), sample_time);
+    let is_measured = requested.is_measured();
+    let stopped = plant.stops().filter(|_| plant.is_watched());
     let mut walk = Walk {
         plant,
         timing,
-        early: equations.over(timing.early),
-        late: equations.over(timing.late),
+        fields: [
+            Some(Field::new(Cow::Borrowed(equations), timing, is_measured)),
+            stopped
+                .map(|state| Field::new(Cow::Owned(equations.stopped(state)), timing, is_measured)),
+        ],
+        is_stopped: false,
         commands: Commands::new(start),
+        cursor: reference.cursor(&start.kicks),
         x: start.state.clone(),
         scratch: start.state.clone(),
         held: S::default(),
-        windows: requested
-            .is_measured()
-            .then(|| Windows::new(equations, timing.early, timing.late)),
+        excess: S::default(),
         requested,
     };
     let phase = start.sample_phase;
-    let mut cursor = reference.cursor();
     if phase > 0.0 {
         // The run begins inside the interval after sample −1.
-        walk.held = S::from(cursor.value());
+        walk.held = S::from(walk.cursor.value());
         walk.partial(-1, sample_time - S::from(phase), S::default())?;
     }
     let mut k = 0_u64;
@@ -64,24 +70,32 @@ pub(crate) fn run<S: Scalar>(
             });
         }
         let now = S::from(k as f64).mul_add(sample_time, S::from(phase));
-        walk.held = S::from(cursor.advance(now.value(), slack(now, sample_time)));
-        let index = k as i64;
-        let arrived = walk.commands.at(index - walk.lag() - 1);
-        let u = equations.command(&walk.x, arrived, walk.held.value());
-        check_growth(&walk.x, u, now)?;
-        let issued = saturate(u, plant.limit());
-        if issued.value() != u.value() {
-            walk.requested.limited(now, now + sample_time);
-        }
-        walk.commands.issue(issued)?;
-        if let Some(update) = plant.update() {
-            walk.update(update, arrived);
-        }
-        walk.requested.input_break(now)?;
-        walk.interval(index, now)?;
+        walk.sample(k as i64, now, sample_time)?;
+        walk.interval(k as i64, now)?;
         k += 1;
     }
     Ok(walk.requested.trajectory)
+}
+
+/// How the states move over the parts of a sample.
+struct Field<'a, S: Scalar> {
+    equations: Cow<'a, Equations<S>>,
+    early: Propagator<S>,
+    late: Propagator<S>,
+    /// For metrics, which begin at the first sample.
+    windows: Option<Windows>,
+}
+
+impl<'a, S: Scalar> Field<'a, S> {
+    fn new(equations: Cow<'a, Equations<S>>, timing: Timing<S>, is_measured: bool) -> Self {
+        let Timing { early, late, .. } = timing;
+        Self {
+            early: equations.over(early),
+            late: equations.over(late),
+            windows: is_measured.then(|| Windows::new(&equations, early, late)),
+            equations,
+        }
+    }
 }
 
 /// The commands issued, by sample number; negative numbers are those before the start.
@@ -116,22 +130,33 @@ impl<'a, S: Scalar> Commands<'a, S> {
     }
 }
 
-struct Walk<'a, S> {
+/// The parts of a sample, between the arrivals of commands.
+#[derive(Clone, Copy)]
+enum Part {
+    Early,
+    Late,
+    /// Of any other length.
+    Other,
+}
+
+struct Walk<'a, 'r, S: Scalar> {
     plant: &'a LinearLoop<S>,
     timing: Timing<S>,
-    early: Propagator<S>,
-    late: Propagator<S>,
+    /// While the integral runs, and while it is stopped.
+    fields: [Option<Field<'a, S>>; 2],
+    is_stopped: bool,
     commands: Commands<'a, S>,
+    cursor: Cursor<'a>,
     x: Vec<S>,
     scratch: Vec<S>,
     /// The reference as held since the last sample.
     held: S,
-    /// For metrics, which begin at the first sample.
-    windows: Option<Windows>,
-    requested: RequestedOutput<'a, S>,
+    /// What the bounds add to the command of the last sample.
+    excess: S,
+    requested: RequestedOutput<'r, S>,
 }
 
-impl<S: Scalar> Walk<'_, S> {
+impl<S: Scalar> Walk<'_, '_, S> {
     /// m as a signed number.
     fn lag(&self) -> i64 {
         self.timing.samples as i64
@@ -144,6 +169,47 @@ impl<S: Scalar> Walk<'_, S> {
         [k, k - lag - 1, k - lag].map(|number| self.commands.at(number))
     }
 
+    /// Compute and issue the command of sample `k` at time `now`.
+    fn sample(&mut self, k: i64, now: S, sample_time: S) -> Result<(), Error> {
+        let (plant, equations) = (self.plant, self.plant.equations());
+        let tolerance = slack(now, sample_time);
+        self.held = S::from(self.cursor.advance(now.value(), tolerance));
+        if self.cursor.next_kick() <= now.value() + tolerance {
+            self.kick(now, tolerance)?;
+        }
+        let arrived = self.commands.at(k - self.lag() - 1);
+        let u = equations.command(&self.x, arrived, self.held.value());
+        check_growth(&self.x, u, now)?;
+        let bounded = saturate(u, plant.bounds());
+        let mut issued = bounded;
+        if let Some(rate) = plant.rate() {
+            let (last, reach) = (self.commands.at(k - 1), rate * sample_time);
+            issued = saturate(bounded, Some((last - reach, last + reach)));
+        }
+        if issued.value() != u.value() {
+            self.requested.limited(now, now + sample_time);
+        }
+        self.excess = issued - u;
+        self.is_stopped = plant.stops().is_some_and(|state| {
+            let gain = equations.k.get(state).copied().unwrap_or_default();
+            let drive = gain * equations.slope(state, &self.x, arrived, self.held);
+            (u - bounded).value() * drive.value() > 0.0
+        });
+        self.commands.issue(issued)?;
+        if let Some(update) = plant.update() {
+            self.update(update, arrived);
+        }
+        self.requested.input_break(now)
+    }
+
+    /// Add the jumps of inputs up to `now`.
+    fn kick(&mut self, now: S, tolerance: f64) -> Result<(), Error> {
+        let equations = self.plant.equations();
+        self.cursor
+            .kick(now.value(), tolerance, equations, &mut self.x);
+        self.requested.output_break(now)
+    }
+
     /// Advance from sample `k` at time `now` to the next one.
     fn interval(&mut self, k: i64, now: S) -> Result<(), Error> {
         let Timing { early, late, .. } = self.timing;
@@ -153,21 +219,12 @@ impl<S: Scalar> Walk<'_, S> {
             .inputs_before((now + early + late).value() - tolerance, |_| u);
         // A length that is zero but has a slope counts as well.
         if !early.is_nothing() {
-            self.measure(before, now, |windows| &windows.early);
-            self.serve(before, now, (now + early).value() - tolerance);
-            self.early
-                .apply(&self.x, &[before, self.held], &mut self.scratch);
-            std::mem::swap(&mut self.x, &mut self.scratch);
+            self.go(before, now, early, Part::Early, tolerance)?;
         }
         if before != after {
             self.requested.output_break(now + early)?;
         }
-        self.measure(after, now + early, |windows| &windows.late);
-        self.serve(after, now + early, (now + early + late).value() - tolerance);
-        self.late
-            .apply(&self.x, &[after, self.held], &mut self.scratch);
-        std::mem::swap(&mut self.x, &mut self.scratch);
-        Ok(())
+        self.go(after, now + early, late, Part::Late, tolerance)
     }
 
     /// Change the states that change at samples.
@@ -193,51 +250,86 @@ impl<S: Scalar> Walk<'_, S> {
         let mut at = now;
         if into.value() < early.value() - tolerance {
             let switch = now + (early - into);
-            self.serve(before, at, switch.value() - tolerance);
-            self.jump(switch - at, before);
+            self.go(before, at, switch - at, Part::Other, tolerance)?;
             self.requested.output_break(switch)?;
             at = switch;
         }
-        self.serve(after, at, end.value() - tolerance);
-        self.jump(end - at, after);
+        self.go(after, at, end - at, Part::Other, tolerance)
+    }
+
+    /// Advance over `length` seconds under constant w, input by input that jumps within.
+    fn go(&mut self, w: S, from: S, length: S, part: Part, tolerance: f64) -> Result<(), Error> {
+        let end = from + length;
+        let (mut from, mut part) = (from, part);
+        while self.cursor.next_kick() < end.value() - tolerance {
+            let next = S::from(self.cursor.next_kick().max(from.value()));
+            self.over(w, from, next - from, Part::Other, tolerance);
+            self.kick(next, tolerance)?;
+            (from, part) = (next, Part::Other);
+        }
+        let length = if matches!(part, Part::Other) {
+            end - from
+        } else {
+            length
+        };
+        self.over(w, from, length, part, tolerance);
         Ok(())
     }
 
-    /// Advance x by a step of any length under constant w.
-    fn jump(&mut self, h: S, w: S) {
-        let equations = self.plant.equations();
-        let over = equations.over(h);
-        over.apply(&self.x, &[w, self.held], &mut self.scratch);
-        std::mem::swap(&mut self.x, &mut self.scratch);
-    }
-
-    /// Measure the output over one part of a sample, under constant w.
-    fn measure(&mut self, w: S, from: S, part: impl Fn(&Windows) -> &Window) {
-        if let Some(windows) = &self.windows {
-            let inputs = [w.value(), self.held.value()];
+    /// Measure, store and advance over one part of a sample under constant inputs.
+    fn over(&mut self, w: S, from: S, length: S, part: Part, tolerance: f64) {
+        let [running, stopped] = &self.fields;
+        let Some(field) = stopped
+            .as_ref()
+            .filter(|_| self.is_stopped)
+            .or(running.as_ref())
+        else {
+            return;
+        };
+        let inputs: [S; INPUTS] = [w, self.held, self.excess];
+        if let Some(windows) = &field.windows {
             let equations = windows.equations();
-            part(windows).measure(
+            let values = inputs.map(S::value);
+            let other;
+            let window = match part {
+                Part::Early => &windows.early,
+                Part::Late => &windows.late,
+                Part::Other => {
+                    other = Window::new(equations, length.value());
+                    &other
+                }
+            };
+            window.measure(
                 equations,
                 &self.x,
-                inputs,
+                values,
                 from.value(),
                 &mut self.requested,
             );
         }
-    }
-
-    /// Store the outputs from `from`, where the state is x, to `end` under constant w.
-    fn serve(&mut self, w: S, from: S, end: f64) {
-        let equations = self.plant.equations();
-        let (x, scratch, held) = (&self.x, &mut self.scratch, self.held);
-        self.requested.outputs_before(end, |t| {
-            let h = t - from;
-            let h = h.pinned(h.value().max(0.0));
-            if h.is_nothing() {
-                return equations.output(x, w);
+        let equations = &*field.equations;
+        let columns: &[S] = inputs.get(..equations.inputs()).unwrap_or_default();
+        let (x, scratch) = (&self.x, &mut self.scratch);
+        self.requested
+            .outputs_before((from + length).value() - tolerance, |t| {
+                let h = t - from;
+                let h = h.pinned(h.value().max(0.0));
+                if h.is_nothing() {
+                    return equations.output(x, w);
+                }
+                equations.over(h).apply(x, columns, scratch);
+                equations.output(scratch, w)
+            });
+        let other;
+        let over = match part {
+            Part::Early => &field.early,
+            Part::Late => &field.late,
+            Part::Other => {
+                other = equations.over(length);
+                &other
             }
-            equations.over(h).apply(x, &[w, held], scratch);
-            equations.output(scratch, w)
-        });
+        };
+        over.apply(&self.x, columns, &mut self.scratch);
+        std::mem::swap(&mut self.x, &mut self.scratch);
     }
 }

@@ -1,10 +1,11 @@
 //! The output over one part of a sample as polynomials in local time.
 //!
-//! Under constant w and r, y(σ h) = Σ_j c_j σ^j with
+//! Under constant w, r and v − u, y(σ h) = Σ_j c_j σ^j with
 //!
-//!   c_0 = C x + D w,   c_{j+1} = ρ_j (A x + B w + E r) h/(j + 1),   ρ_0 = C, ρ_{j+1} = ρ_j A h/(j + 1),
+//!   c_0 = C x + D w,   c_{j+1} = ρ_j (A x + B w + E r + G (v − u)) h/(j + 1),
+//!   ρ_0 = C,   ρ_{j+1} = ρ_j A h/(j + 1),
 //!
-//! so that the coefficients are fixed rows times (x, w, r). A part is divided into equal steps on
+//! so that the coefficients are fixed rows times (x, w, r, v − u). A part is divided into equal steps on
 //! which the series falls below rounding errors well before its last term.
 
 use crate::dde::control_loop::linear_loop::{Equations, dot};
@@ -23,13 +24,16 @@ const NEGLIGIBLE: f64 = 1e-18;
 /// Upper limit on the steps of one part.
 const MOST_STEPS: f64 = 1e6;
 
+/// w, r and v − u.
+pub(super) const INPUTS: usize = 3;
+
 /// The rows of one part.
 #[derive(Debug)]
 pub(super) struct Window {
     /// Length of a step, s, and the number of steps.
     step: f64,
     steps: usize,
-    /// Row j, of n + 2 numbers, gives c_{j+1}.
+    /// Row j, of n + 3 numbers, gives c_{j+1}.
     rows: Vec<f64>,
     over_step: Propagator,
 }
@@ -43,7 +47,7 @@ impl Window {
         let step = length / steps as f64;
         let mut rows = Vec::new();
         let mut rho = equations.c.clone();
-        let mut largest = vec![0.0_f64; n + 2];
+        let mut largest = vec![0.0_f64; n + INPUTS];
         for j in 0..DEGREE {
             let factor = step / (j + 1) as f64;
             let column = |i: usize| -> f64 {
@@ -51,7 +55,8 @@ impl Window {
                 rho.iter().zip(entries).map(|(rho, a)| rho * a).sum()
             };
             let mut next: Vec<f64> = (0..n).map(|i| column(i) * factor).collect();
-            let forced = [&equations.b, &equations.e].map(|g| dot(&rho, g) * factor);
+            let columns = [&equations.b, &equations.e, &equations.excess];
+            let forced = columns.map(|g| dot(&rho, g) * factor);
             let mut matters = false;
             for (entry, most) in next.iter().chain(&forced).zip(&mut largest) {
                 matters |= entry.abs() > NEGLIGIBLE * *most;
@@ -76,7 +81,7 @@ impl Window {
         &self,
         equations: &Equations,
         x: &[S],
-        inputs: [f64; 2],
+        inputs: [f64; INPUTS],
         start: f64,
         requested: &mut RequestedOutput<'_, S>,
     ) {
@@ -84,17 +89,18 @@ impl Window {
         let mut x: Vec<f64> = x.iter().map(|x| x.value()).collect();
         let mut scratch = x.clone();
         let mut y = Series::constant(0.0);
-        y.degree = self.rows.len() / (n + 2);
+        y.degree = self.rows.len() / (n + INPUTS);
         for number in 0..self.steps {
             let [first, rest @ ..] = &mut y.coefficients;
             *first = equations.output(&x, inputs[0]);
-            for (c, row) in rest.iter_mut().zip(self.rows.chunks_exact(n + 2)) {
+            for (c, row) in rest.iter_mut().zip(self.rows.chunks_exact(n + INPUTS)) {
                 let (states, forced) = row.split_at(n);
                 *c = dot(states, &x) + dot(forced, &inputs);
             }
             requested.measure(start + number as f64 * self.step, self.step, 1.0, &y);
             if number + 1 < self.steps {
-                self.over_step.apply(&x, &inputs, &mut scratch);
+                self.over_step
+                    .apply(&x, &inputs[..equations.inputs()], &mut scratch);
                 std::mem::swap(&mut x, &mut scratch);
             }
         }
@@ -117,6 +123,7 @@ impl Windows {
             a: values(&equations.a),
             b: values(&equations.b),
             e: values(&equations.e),
+            excess: values(&equations.excess),
             c: values(&equations.c),
             d: equations.d.value(),
             ..Equations::default()

@@ -15,7 +15,7 @@ type Place = (f64, f64);
 ///
 /// # Errors
 /// Those of `cost`.
-pub(super) fn minimum(
+pub(crate) fn minimum(
     mut cost: impl FnMut(f64) -> Result<f64, Error>,
     (mut low, mut high): (f64, f64),
     tolerance: f64,

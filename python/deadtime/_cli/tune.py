@@ -1,0 +1,187 @@
+"""``deadtime tune``: gains from a recording or a log, in the form that they are typed in."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from deadtime._base.page import check_pages
+from deadtime._cli import options as opt
+from deadtime._cli.columns import COLUMNS
+from deadtime._cli.design import CONTROLLERS, Kind
+from deadtime._cli.exit_codes import NONE
+from deadtime._cli.fills import Given, filled
+from deadtime._cli.show import print_json, print_text, save_figure, stages
+from deadtime._cli.windows import files_and_windows
+from deadtime.logs import open_log, tune_loop
+from deadtime.loops import Controller
+from deadtime.recordings import is_table, read_recording
+from deadtime.tuning import Form, ParallelForm, Proposal, one_pole_filter, tune
+
+
+@filled
+def command(
+    *,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="A table with a bump test or a closed loop, FILE or FILE@LOW:HIGH, or the log of "
+            "a vehicle.",
+            show_default=False,
+        ),
+    ],
+    controller: Kind | None = None,
+    form: Form | None = None,
+    loop: str | None = None,
+    firmware: str = "",
+    kp: float | None = None,
+    ki: float = 0.0,
+    kd: float = 0.0,
+    spans: opt.Ends | None = None,
+    filter: float | None = None,  # noqa: A002
+    columns: Annotated[Given, COLUMNS],
+    window: opt.Window = None,
+    sample_time: opt.Sample_time = None,
+    limit: opt.Limit = None,
+    plant: str | None = None,
+    gain_margin: float | None = None,
+    phase_margin: float | None = None,
+    delay_margin: float | None = None,
+    allow_indication: bool = False,
+    flight: opt.Flight = None,
+    plot: opt.Plot = None,
+    out: Path | None = None,
+    as_json: opt.As_json = False,
+) -> None:
+    """Propose gains from a recording, in the form that they are typed in, with what they will do.
+
+    Exit codes: 0 gains; 3 none, with the reason; 1 an error.
+
+    Parameters
+    ----------
+    controller
+        Kind of controller; without: PI, of a log the kind that was flown.
+    form
+        How the gains are typed; without: parallel, of a log as its firmware has them.
+    loop
+        Loop of a vehicle, such as 'altitude' or 'roll rate'; without: the first that the log
+        determines.
+    firmware
+        Version of the firmware, for a table.
+    kp
+        Proportional gain that was in use: new gains differ by at most a factor of two.
+    ki
+        Integral gain that was in use.
+    kd
+        Derivative gain that was in use.
+    spans
+        Spans of measurement and output, for a proportional band.
+    filter
+        Corner of the derivative's filter, one pole, Hz.
+    plant
+        Kind of plant, if it is known, such as 'two lags'.
+    gain_margin
+        Least gain margin, a factor.
+    phase_margin
+        Least phase margin, °.
+    delay_margin
+        Least delay margin, s.
+    allow_indication
+        Propose gains for an estimate that is an indication, too.
+    out
+        Write a page with the gains and what they are expected to do.
+    """
+    if out is not None:
+        check_pages()
+    (path,), (part,) = files_and_windows([file], window)
+    asked = {"gain_margin": gain_margin, "phase_margin": phase_margin, "delay_margin": delay_margin}
+    demands = {name: value for name, value in asked.items() if value is not None}
+    template = _template(controller, filter)
+    is_log = path.is_file() and not is_table(path)
+    with stages(1, quiet=as_json) as begin:
+        begin("estimating and designing")
+        if is_log:
+            own = {"window": part, "plant": plant, "kp": kp, "firmware": firmware, "spans": spans}
+            _refuse({**columns, **own, "sample-time": sample_time, "limit": limit})
+            found = tune_loop(
+                open_log(path, flight=flight),
+                loop,
+                controller=template,
+                form=form,
+                allow_indication=allow_indication,
+                **demands,
+            )
+        else:
+            columns["command"] = columns["command"] or "auto"
+            found = tune(
+                read_recording(path, **columns),
+                controller=template or CONTROLLERS["PI"],
+                form=form or "parallel",
+                loop=loop or "",
+                version=firmware,
+                spans=spans,
+                flown=None if kp is None else ParallelForm(kp, ki, kd).controller(),
+                sample_time=sample_time,
+                limit=limit,
+                allow_indication=allow_indication,
+                window=part,
+                known={"plant": plant},
+                **demands,
+            )
+    _show(found, path, plot, out, as_json)
+
+
+def _template(kind: Kind | None, corner: float | None) -> type[Controller] | Controller | None:
+    """The kind of controller that is asked for, with its filter; None where none is."""
+    if corner is None:
+        return None if kind is None else CONTROLLERS[kind]
+    if kind not in ("PV", "PD", "PID"):
+        raise ValueError("--filter is that of a derivative: give --controller PV, PD or PID")
+    found: Any = CONTROLLERS[kind]
+    gains = [1.0] * (3 if kind == "PID" else 2)
+    made: Controller = found(*gains, filter=one_pole_filter(corner))
+    return made
+
+
+def _refuse(given: Given) -> None:
+    """Refuse what a log says itself."""
+    for name, value in given.items():
+        if value:
+            raise ValueError(f"--{name} is for a table: a log of a vehicle says this itself")
+
+
+def _show(found: Proposal, path: Path, plot: Path | None, out: Path | None, as_json: bool) -> None:
+    following = _next(found, path)
+    made = found.settings is not None
+    if made and plot is not None:
+        save_figure(found.figure(), plot)
+    written = found.report(out) if made and out is not None else None
+    if as_json:
+        print_json("tune", found.to_dict() | {"next": following})
+    else:
+        style: Literal["bold", "yellow"] = "bold" if found.verdict == "reliable" else "yellow"
+        print_text(found.headline(), style)
+        print_text("\n".join(f"  {line}" for line in found.lines()), wrapped=False)
+        if written is not None:
+            print_text(f"report: {written}", wrapped=False)
+        if following:
+            print_text(f"next: {following}", wrapped=False)
+    if not made:
+        raise typer.Exit(NONE)
+
+
+def _next(found: Proposal, path: Path) -> str:
+    """The command for the recording that the gains are tried in."""
+    if found.settings is None:
+        return ""
+    if found.settings.loop:
+        words = ["deadtime", "tune", "NEXT.bin", "--loop", found.settings.loop]
+    else:
+        words = ["deadtime", "tune", f"next{path.suffix}", "--form", found.settings.form]
+        for name, gain in found.controller.gains.items():
+            option = "kd" if name == "Kv" else name.lower()
+            words += [f"--{option}", f"{gain:.6g}"]
+    return f"try them, record a step of the set point, and check: {shlex.join(words)}"

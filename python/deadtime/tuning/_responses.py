@@ -1,0 +1,171 @@
+"""Designs by the responses to a load and a set point, under a largest Ms.
+
+The kernel finds the gains over all scenarios in one call; here the loops of these are made and the
+result is put together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from deadtime.loops import ControlLoop
+from deadtime.tuning._candidates import Scenario
+from deadtime.tuning._demands import Demands, white_to
+from deadtime.tuning._exchange import fine, proved
+from deadtime.tuning._native import Loop, RobustGains, noise_gain, robust_gains
+from deadtime.tuning._problem import ObjectiveName, Problem
+from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
+from deadtime.tuning._settling import step_info
+
+#: Objectives that are responses, and how the kernel names them: whether the integral of the error of
+#: a load counts, and whether the settling time of a set point does.
+RESPONSES: dict[str, tuple[bool, bool]] = {
+    "load": (False, False),
+    "load_ie": (True, False),
+    "set_point": (False, False),
+    "set_point_settling": (False, True),
+}
+
+#: Largest Ms where nothing is asked for: that of SIMC (Skogestad 2003, table 1), and in the middle of
+#: what Astrom and Hagglund (2006, section 4.5) call reasonable, 1.2 to 2.
+MAX_SENSITIVITY = 1.6
+
+#: A figure at most this factor from its demand limits the design.
+_ACTIVE = 1.0 + 1e-3
+
+#: Relative loss that counts as none.
+_NOTHING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """A design by responses."""
+
+    problem: Problem
+    objective: ObjectiveName
+    #: Weight of the load; the rest is that of the set point.
+    weight: float
+    demands: Demands
+    #: Further plants, whose loops must meet the demands as well.
+    others: tuple[ControlLoop, ...] = ()
+
+    def gains(
+        self, scenarios: Sequence[Scenario], corners: int, demands: Demands | None = None
+    ) -> RobustGains:
+        """The best gains over these scenarios, of which the search begins with the corners."""
+        problem, needed = self.problem, demands or self.demands
+        specification = problem.loop.specification
+        loops: list[Loop] = [specification.kernel_at(one) for one in scenarios]
+        template = problem.loop.controller
+        loops[corners:corners] = [
+            other.replace(controller=template).specification.kernel for other in self.others
+        ]
+        names = [*template.gains]
+        by_integral, by_settling = RESPONSES[self.objective]
+        margins = needed.margins
+        spans = problem.given
+        return robust_gains(
+            loops,
+            corners + len(self.others),
+            [names.index(name) for name in problem.free],
+            (self.weight, by_integral, by_settling),
+            (
+                needed.max_sensitivity or MAX_SENSITIVITY,
+                margins.gain_margin,
+                margins.phase_margin,
+                margins.delay_margin,
+                needed.noise_gain or math.inf,
+                white_to(problem.loop, needed.bandwidth),
+                needed.settling_time or math.inf,
+            ),
+            None if spans is None else [spans[name] for name in problem.free],
+        )
+
+    def design(self) -> Design:
+        """The gains, and their properties over all scenarios."""
+        problem = self.problem
+        corners = [problem.middle, *(one for one in problem.corners if one != problem.middle)]
+        every = [*corners, *(one for one in fine(problem) if one not in corners)]
+        found = self.gains(every, len(corners))
+        gains, middle = found.gains, problem.at(found.gains)
+        judged = problem.candidates(corners)
+        point = np.array([gains])
+        worst = max(range(len(every)), key=lambda place: found.margins[place].max_sensitivity)
+        margins = _least(found)
+        return Design(
+            loop=middle,
+            gains=middle.controller.gains,
+            fixed=tuple(name for name in middle.controller.gains if name not in problem.free),
+            abscissa=float(judged.costs(point, "abscissa", problem.threads).max()),
+            damping=float(judged.dominant(gains)[:, 0].min()),
+            margins=margins,
+            delays=problem.delays,
+            gain=problem.intervals.get("gain"),
+            objective=self.objective,
+            value=found.value,
+            step_info=step_info(middle, problem.amplitude),
+            amplitude=problem.amplitude,
+            worst=every[worst],
+            checked=len(every) + len(self.others),
+            proved=() if self.others else proved(problem, point[0], self.demands.margins),
+            traded=self._trades(found, margins, every, len(corners)),
+            region=problem.region,
+            noise_gain=noise_gain(
+                middle.specification.kernel, white_to(middle, self.demands.bandwidth)
+            ),
+            _problem=problem,
+        )
+
+    def _trades(
+        self, found: RobustGains, margins: LeastMargins, every: Sequence[Scenario], corners: int
+    ) -> tuple[Trade, ...]:
+        """The price of each demand, and of the intervals."""
+        made = []
+        for name, asked in self.demands.named.items():
+            had = getattr(margins, name, math.nan)
+            active = self._is_active(name, asked, had)
+            what = f"{name.replace('_', ' ')} of {asked:g}"
+            if not active:
+                made.append(Trade(name, asked, had, False, found.value, f"{what} is met anyway"))
+                continue
+            without = found.value
+            if name != "max_sensitivity":
+                without = self.gains(every, corners, self.demands.without(name)).value
+            lost = (found.value - without) / abs(without)
+            price = f"{100.0 * lost:.2g} % lost" if lost > _NOTHING else "nothing lost"
+            words = f"{what} holds the design back"
+            if name != "max_sensitivity":
+                words += f": without it {figure_in_words(self.objective, without)} ({price})"
+            made.append(Trade(name, asked, had, True, without, words))
+        if len(every) > 1:
+            without = self.gains(every[:1], 1).value
+            lost = (found.value - without) / abs(without)
+            words = (
+                "not knowing the numbers of the plant: were they in the middle of their "
+                f"intervals, {figure_in_words(self.objective, without)} could be had"
+            )
+            made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
+        return tuple(made)
+
+    def _is_active(self, name: str, asked: float, had: float) -> bool:
+        """Does a demand limit the design? Of those that are not in the margins that is not known."""
+        if math.isnan(had):
+            return True
+        return had * _ACTIVE >= asked if name == "max_sensitivity" else had <= asked * _ACTIVE
+
+
+def _least(found: RobustGains) -> LeastMargins:
+    """Each margin at its least, Ms and Mt at their largest; a delay margin only where it is known."""
+    each = found.margins
+    late = [one.delay_margin for one in each if not math.isnan(one.delay_margin)]
+    return LeastMargins(
+        min(one.gain_margin for one in each),
+        min(one.phase_margin for one in each),
+        min(late, default=math.nan),
+        max(one.max_sensitivity for one in each),
+        max(one.max_complementary_sensitivity for one in each),
+    )

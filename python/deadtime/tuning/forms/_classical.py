@@ -1,0 +1,326 @@
+"""The three forms of textbooks and process controllers: ideal, series, parallel.
+
+    ideal       u = Kc (1 + 1/(Ti s) + Td s) e
+    series      u = Kc (1 + 1/(Ti s)) (1 + Td s) e
+    parallel    u = (Kp + Ki/s + Kd s) e
+
+(Åström and Hägglund 2006, section 3.2.) With K', Ti' and Td' those of the series form, the ideal
+one has K = K' (Ti' + Td')/Ti', Ti = Ti' + Td', Td = Ti' Td'/(Ti' + Td'). The way back takes the
+root of 1 - 4 Td/Ti, so that a series form exists for Ti >= 4 Td only. A proportional band in % is
+100/|Kc| in units of the spans of measurement and output.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from deadtime._base.validation import finite
+from deadtime.loops import PV, Controller
+from deadtime.tuning.forms._settings import (
+    Settings,
+    controller_from,
+    numbers_from,
+    one_pole_filter,
+    parts_of,
+    pole_of,
+    rounding_of,
+)
+
+#: Digits that are typed. More: long numbers on a faceplate; fewer: gains move by over 0.05 %.
+DIGITS = 4
+
+SOURCE = "Åström and Hägglund 2006, section 3.2"
+
+#: A line such as ``Ti = 40 s``.
+LINE = re.compile(r"^\s*(\w+)\s*[=:]\s*(\S+)", re.M)
+
+#: Name of the number for an integral or a derivative that is switched off, and a filter's time.
+OFF, FILTER = "off", "Tf"
+
+
+@dataclass(frozen=True)
+class IdealForm:
+    """The ideal form, also called standard or non-interacting: u = Kc (1 + 1/(Ti s) + Td s) e.
+
+    Parameters
+    ----------
+    Kc : float
+        Gain.
+    Ti : float
+        Integral time, s; infinite for none.
+    Td : float
+        Derivative time, s.
+
+    Examples
+    --------
+    >>> from deadtime.tuning import IdealForm
+    >>> IdealForm(Kc=2.0, Ti=8.0, Td=1.0).controller()
+    PID(Kp=2.0, Ki=0.25, Kd=2.0, filter=None)
+    """
+
+    Kc: float
+    Ti: float = math.inf
+    Td: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self.Kc, self.Ti, self.Td)
+
+    def controller(self) -> Controller:
+        """The controller with these numbers.
+
+        Returns
+        -------
+        Controller
+        """
+        return controller_from(self.Kc, self.Kc / self.Ti, self.Kc * self.Td)
+
+    @classmethod
+    def of(cls, controller: Controller) -> IdealForm:
+        """The ideal form of a controller.
+
+        Parameters
+        ----------
+        controller : Controller
+
+        Returns
+        -------
+        IdealForm
+
+        Raises
+        ------
+        ValueError
+            If its proportional gain is zero, which the form cannot express.
+        """
+        proportional, integral, derivative, _ = parts_of(controller)
+        if proportional == 0.0:
+            raise ValueError(
+                f"{controller}: a proportional gain of zero has no ideal form: take parallel"
+            )
+        times = proportional / integral if integral else math.inf
+        return cls(proportional, times, derivative / proportional)
+
+
+@dataclass(frozen=True)
+class SeriesForm:
+    """The series form, also called interacting: u = Kc (1 + 1/(Ti s)) (1 + Td s) e.
+
+    Parameters
+    ----------
+    Kc : float
+        Gain.
+    Ti : float
+        Integral time, s; infinite for none.
+    Td : float
+        Derivative time, s.
+
+    Examples
+    --------
+    >>> from deadtime.tuning import IdealForm, SeriesForm
+    >>> series = SeriesForm(Kc=1.0, Ti=4.0, Td=4.0)
+    >>> IdealForm.of(series.controller())
+    IdealForm(Kc=2.0, Ti=8.0, Td=2.0)
+    """
+
+    Kc: float
+    Ti: float = math.inf
+    Td: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self.Kc, self.Ti, self.Td)
+
+    def controller(self) -> Controller:
+        """The controller with these numbers.
+
+        Returns
+        -------
+        Controller
+        """
+        factor = 1.0 + self.Td / self.Ti
+        return controller_from(self.Kc * factor, self.Kc / self.Ti, self.Kc * self.Td)
+
+    @classmethod
+    def of(cls, controller: Controller) -> SeriesForm:
+        """The series form of a controller.
+
+        Parameters
+        ----------
+        controller : Controller
+
+        Returns
+        -------
+        SeriesForm
+
+        Raises
+        ------
+        ValueError
+            If it has none, because its integral time is below four derivative times.
+        """
+        ideal = IdealForm.of(controller)
+        if math.isinf(ideal.Ti):
+            return cls(ideal.Kc, ideal.Ti, ideal.Td)
+        if ideal.Ti * ideal.Td < 0.0 or ideal.Ti < 4.0 * ideal.Td * (1.0 - 1e-12):
+            raise ValueError(
+                f"Ti = {ideal.Ti:.4g} s and Td = {ideal.Td:.4g} s: the series form has real zeros "
+                "only, which takes Ti >= 4 Td; take ideal or parallel"
+            )
+        root = math.sqrt(max(1.0 - 4.0 * ideal.Td / ideal.Ti, 0.0))
+        # The smaller root by the product of both, which does not cancel.
+        slow = 0.5 * ideal.Ti * (1.0 + root)
+        return cls(0.5 * ideal.Kc * (1.0 + root), slow, ideal.Td * ideal.Ti / slow)
+
+
+@dataclass(frozen=True)
+class ParallelForm:
+    """The parallel form: u = (Kp + Ki/s + Kd s) e.
+
+    Parameters
+    ----------
+    Kp, Ki, Kd : float
+        Gains.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> from deadtime.tuning import ParallelForm
+    >>> ParallelForm.of(dtm.PI(Kp=2.0, Ki=0.5))
+    ParallelForm(Kp=2.0, Ki=0.5, Kd=0.0)
+    """
+
+    Kp: float
+    Ki: float = 0.0
+    Kd: float = 0.0
+
+    def controller(self) -> Controller:
+        """The controller with these numbers.
+
+        Returns
+        -------
+        Controller
+        """
+        return controller_from(self.Kp, self.Ki, self.Kd)
+
+    @classmethod
+    def of(cls, controller: Controller) -> ParallelForm:
+        """The parallel form of a controller.
+
+        Parameters
+        ----------
+        controller : Controller
+
+        Returns
+        -------
+        ParallelForm
+        """
+        return cls(*parts_of(controller)[:3])
+
+
+def proportional_band(gain: float, spans: tuple[float, float]) -> float:
+    """Return the proportional band of a gain, %.
+
+    Parameters
+    ----------
+    gain : float
+        In units of the output by those of the measurement.
+    spans : (float, float)
+        Span of the measurement and of the output, each in its own unit.
+
+    Returns
+    -------
+    float
+        Share of the measurement's span over which the output moves over its whole span.
+
+    Raises
+    ------
+    ValueError
+        If a span is not above zero, or the gain is zero.
+
+    Examples
+    --------
+    >>> from deadtime.tuning import proportional_band
+    >>> proportional_band(0.5, (200.0, 100.0))
+    100.0
+    """
+    measured, given = (finite("a span", one) for one in spans)
+    if min(measured, given) <= 0.0 or gain == 0.0:
+        raise ValueError(f"gain={gain:g}, spans={spans}: give spans above zero and a gain not zero")
+    return 100.0 * given / (abs(gain) * measured)
+
+
+FORMS: dict[str, type[IdealForm] | type[SeriesForm] | type[ParallelForm]] = {
+    "ideal": IdealForm,
+    "series": SeriesForm,
+    "parallel": ParallelForm,
+}
+
+
+def write(controller: Controller, form: str, spans: tuple[float, float] | None) -> Settings:
+    """The numbers of one of the forms."""
+    found = FORMS[form].of(controller)
+    values = {name: _typed(value) for name, value in vars(found).items()}
+    lines = [f"{name} = {_shown(name, value)}" for name, value in values.items()]
+    notes = []
+    smooth = parts_of(controller)[3]
+    if smooth is not None:
+        corner = pole_of(smooth)
+        if corner is None:
+            raise ValueError(
+                f"{smooth}: the filter of a process controller has one pole, this one has two: "
+                "take one_pole_filter(corner)"
+            )
+        values[FILTER] = _typed(0.5 / (math.pi * corner))
+        lines.append(f"{FILTER} = {values[FILTER]:.{DIGITS}g} s")
+    if isinstance(controller, PV):
+        notes.append("The derivative acts on the measurement: switch it off for the set point.")
+    if values.get("Kc", values.get("Kp", 0.0)) < 0.0:
+        notes.append(
+            "The gain is negative: the controller is direct acting, and its output rises with the "
+            "measurement."
+        )
+    typed = read(values, form, isinstance(controller, PV))
+    if spans is not None:
+        band = proportional_band(parts_of(typed)[0] if form == "parallel" else values["Kc"], spans)
+        lines.append(f"PB = {band:.{DIGITS}g} %")
+        notes.append(
+            f"The proportional band is that of spans of {spans[0]:g} (measurement) and "
+            f"{spans[1]:g} (output)."
+        )
+    rounding = rounding_of(controller, typed)
+    return Settings(form, "", values, tuple(lines), typed, rounding, tuple(notes), SOURCE)
+
+
+def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = False) -> Controller:
+    """The controller of typed numbers."""
+    text = given.replace(OFF, "inf") if isinstance(given, str) else given
+    values = numbers_from(text, form, LINE)
+    kind = FORMS[form]
+    names = kind.__dataclass_fields__
+    unknown = [name for name in values if name not in (*names, FILTER, "PB")]
+    if unknown:
+        raise ValueError(f"{unknown[0]!r} is no number of the form {form!r}: {', '.join(names)}")
+    own = {name: value for name, value in values.items() if name in names}
+    if next(iter(names)) not in own:
+        raise ValueError(f"{next(iter(names))} is missing from {own}")
+    time = values.get(FILTER, 0.0)
+    smooth = one_pole_filter(0.5 / (math.pi * time)) if time else None
+    parts = parts_of(kind(**own).controller())
+    return controller_from(*parts[:3], smooth if parts[2] else None, on_measurement)
+
+
+def _typed(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _shown(name: str, value: float) -> str:
+    if math.isinf(value):
+        return OFF
+    return f"{value:.{DIGITS}g}{' s' if name.startswith('T') else ''}"
+
+
+def _check(gain: float, integral: float, derivative: float) -> None:
+    finite("Kc", gain)
+    finite("Td", derivative)
+    if math.isnan(integral) or integral == 0.0:
+        raise ValueError(f"Ti={integral}: give an integral time other than zero, inf for none")

@@ -1,0 +1,51 @@
+"""The page of a proposal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from deadtime._base.drawing import Figure
+from deadtime._base.explorer import Explorer
+from deadtime._base.page import page
+from deadtime.estimation import PlantEstimate
+from deadtime.loops import ControlLoop, explorer_of
+from deadtime.tuning.forms import Settings
+
+CAPTION = (
+    "Predicted under the gains above. The band holds all plants that the recording leaves "
+    "possible, and twice the noise that the plant leaves unexplained on either side."
+)
+
+
+def render(
+    headline: str,
+    fit: PlantEstimate,
+    settings: Settings,
+    expected: Sequence[str],
+    figure: Figure,
+    loop: ControlLoop,
+) -> str:
+    """The page as text."""
+    rounding = 100.0 * settings.rounding
+    return page(
+        "tuning/proposal/page.html",
+        title=f"Gains from {fit.recording.source or 'a recording'}",
+        described=fit.headline(),
+        verdict=headline,
+        lines=settings.lines,
+        notes=[f"Rounding changes no gain by more than {rounding:.2g} %.", *settings.notes],
+        source=settings.source,
+        expected=expected,
+        figure=figure,
+        caption=CAPTION,
+        explorer=_explored(fit, loop),
+    )
+
+
+def _explored(fit: PlantEstimate, loop: ControlLoop) -> Explorer | None:
+    """The explorer of the proposed loop; None where it has no such loop."""
+    low, high = fit.ci(0.95, "delay")
+    try:
+        return explorer_of(loop.specification, interval=(low, high) if low < high else None)
+    except ValueError:
+        return None

@@ -1,0 +1,560 @@
+//! The loop whose command at its bounds changes how its states move, and the loop without a delay.
+//!
+//! In each mode of the command the loop is linear ([`field`](super::field)), and an element ends where a
+//! signal leaves the mode: the command reaches or leaves a bound, its rate reaches the bound on that, a
+//! limited rate has caught up, an integral stops or runs again. Such signals are polynomials, whose zeros
+//! are isolated; a zero counts only if the signal then leaves the mode by more than the rounding errors
+//! of its parts, because these could otherwise change the mode without end. Without a delay and for
+//! L < 1, or any L ≠ 1 without bounds, w = v has one solution.
+//!
+//! An integral that stops makes the right-hand side jump at a bound. Where it would drive the command out
+//! while it runs and lets it back in while it stops, the command stays at the bound: the integral then
+//! follows from that (Filippov 1960).
+
+use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
+use crate::dde::control_loop::reference::{Cursor, Reference};
+use crate::dde::control_loop::requested_output::{RequestedOutput, Trajectory};
+use crate::dde::limits::{check_growth, slack};
+use crate::dde::scalar::{Scalar, is_reached};
+use crate::{Error, Task};
+
+use super::delayed::Orders;
+use super::effort::watch;
+use super::expansion::Expansion;
+use super::field::{Field, Integral, Mode, Side, Signal};
+use super::pieces::{Pieces, REPORTED, SMOOTH};
+use crate::dde::control_loop::level_crossings::{crossings, value_at};
+use crate::dde::control_loop::series::Series;
+
+/// Changes of mode without progress in time after which the mode is kept, because only rounding
+/// errors at a bound cause them.
+const MOST_CHANGES: u32 = 4;
+
+/// Factor on the length of a shortened element.
+const MARGIN: f64 = 0.95;
+
+/// Rounding error of a signal, relative to the sum of its parts.
+const NOISE: f64 = 16.0 * f64::EPSILON;
+
+/// Parts of an interval at which a signal is looked at.
+const PROBES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+
+pub(super) fn run<S: Scalar>(
+    plant: &LinearLoop<S>,
+    start: &Start<S>,
+    reference: &Reference,
+    requested: RequestedOutput<'_, S>,
+    task: &Task,
+) -> Result<Trajectory<S>, Error> {
+    check::<S>(plant)?;
+    let is_delayed = plant.delay().value() > 0.0;
+    let mut z = start.state.clone();
+    if plant.rate().is_some() {
+        z.push(start.command);
+    }
+    let mut cursor = reference.cursor(&start.kicks);
+    cursor.advance(0.0, -slack(S::default(), plant.delay()).max(f64::MIN_POSITIVE));
+    let mut run = Run {
+        plant,
+        fields: Vec::new(),
+        place: 0,
+        pieces: is_delayed.then(|| Pieces::new(start.command, plant.delay())),
+        cursor,
+        z,
+        t: S::default(),
+        w: Series::constant(S::default()),
+        r: 0.0,
+        changes: 0,
+        orders: Orders::new(plant),
+        horizon: 1.0 + 2.0 * requested.last(),
+        requested,
+    };
+    run.enter(Mode::FREE);
+    let mut elements = 0;
+    while !run.requested.is_done() {
+        watch(elements, task)?;
+        run.element(elements == 0)?;
+        elements += 1;
+    }
+    Ok(run.requested.trajectory)
+}
+
+fn check<S: Scalar>(plant: &LinearLoop<S>) -> Result<(), Error> {
+    let l = plant.equations().l;
+    let denominator = 1.0 - l.value();
+    let is_bounded = plant.bounds().is_some() || plant.rate().is_some();
+    refuse_if!(
+        plant.delay().value() == 0.0
+            && (denominator == 0.0 || (denominator < 0.0 && is_bounded)),
+        "without a delay the command depends on itself with gain L = {}, which {}: give \
+         the loop a delay or filter the derivative",
+        l.value(),
+        if denominator == 0.0 {
+            "no command satisfies"
+        } else {
+            "several limited commands satisfy"
+        }
+    );
+    let jumps = plant.stops().is_some() || plant.rate().is_some();
+    refuse_if!(
+        jumps && !l.is_nothing(),
+        "the command passes straight back to itself (L = {}), and its rate is bounded or its integral \
+         stops: give the derivative a DerivativeFilter",
+        l.value()
+    );
+    refuse_if!(
+        S::MOVES && plant.stops().is_some(),
+        "conditional integration in continuous time has no derivatives by numbers of the loop: use \
+         back-calculation or a sample_time"
+    );
+    Ok(())
+}
+
+/// A mode that follows, and where on the element.
+#[derive(Clone, Copy)]
+struct Change {
+    at: f64,
+    mode: Mode,
+}
+
+struct Run<'a, 'r, S: Scalar> {
+    plant: &'a LinearLoop<S>,
+    /// Those of the modes so far, with their expansions.
+    fields: Vec<(Field<S>, Expansion<S>)>,
+    /// The present one.
+    place: usize,
+    /// None without a delay.
+    pieces: Option<Pieces<S>>,
+    cursor: Cursor<'a>,
+    z: Vec<S>,
+    t: S,
+    /// w on the element; zero without a delay.
+    w: Series<S>,
+    r: f64,
+    /// Changes of mode since time went on.
+    changes: u32,
+    orders: Orders,
+    /// An end of time for loops without breaks.
+    horizon: f64,
+    requested: RequestedOutput<'r, S>,
+}
+
+impl<S: Scalar> Run<'_, '_, S> {
+    fn field(&self) -> &Field<S> {
+        &self.fields[self.place].0
+    }
+
+    /// Take up a mode.
+    fn enter(&mut self, mode: Mode) {
+        let known = self.fields.iter().position(|(field, _)| field.mode == mode);
+        self.place = known.unwrap_or_else(|| {
+            let field = Field::new(self.plant, mode, self.pieces.is_some());
+            let expansion = Expansion::new(&field.a, self.z.len());
+            self.fields.push((field, expansion));
+            self.fields.len() - 1
+        });
+    }
+
+    /// Advance over one element of time, or to another mode.
+    fn element(&mut self, is_first: bool) -> Result<(), Error> {
+        let (t, delay) = (self.t, self.plant.delay());
+        let tolerance = slack(t, delay);
+        let arriving = self.pieces.as_mut().map_or(SMOOTH, |pieces| pieces.reach(t));
+        let jumps = is_first || is_reached(S::from(self.cursor.next_jump()), t, tolerance);
+        let mut is_kicked = false;
+        if jumps {
+            is_kicked = self.jump(tolerance);
+        }
+        let stop = self.stop(tolerance);
+        let mut h = stop - t;
+        let mut next = stop;
+        // As without modes: events at one time that move at different speeds.
+        let is_instant = S::MOVES && self.pieces.is_some() && h.value() <= tolerance;
+        if is_instant {
+            h = h.pinned(0.0);
+        }
+        if jumps {
+            let at_start = self.arrives();
+            self.settle(at_start);
+        }
+        let trial = self.fields[self.place].1.trial;
+        if !is_instant && h.value() > trial {
+            h = S::from(trial);
+            next = t + h;
+        }
+        if let Some(pieces) = &self.pieces {
+            pieces.front().in_local_time(t, h, &mut self.w);
+        }
+        let part = self.expand(h);
+        if part < MARGIN && !is_instant {
+            self.fields[self.place].1.shorten(part);
+            self.w.shift(S::default(), S::from(part));
+            h *= S::from(part);
+            next = t + h;
+        }
+        let change = if is_instant { None } else { self.change(h) };
+        let mut end = 1.0;
+        if let Some(change) = change {
+            end = change.at;
+            next = t + S::from(end) * h;
+            if next.value() <= t.value() {
+                self.changes += 1;
+                self.leave(change);
+                return Ok(());
+            }
+        }
+        if next.value() > t.value() {
+            self.changes = 0;
+        }
+        let order = if is_kicked { 0 } else { self.orders.of_command(arriving, jumps) };
+        let order = if change.is_some() || self.changes > 0 { order.min(1) } else { order };
+        if is_kicked || self.orders.of_output(arriving, jumps) <= REPORTED {
+            self.requested.output_break(t)?;
+        }
+        if order <= REPORTED {
+            self.requested.input_break(t)?;
+        }
+        let v = self.emit(h, next, (end, order), is_instant)?;
+        self.fields[self.place].1.end(S::from(end), &mut self.z);
+        if self.plant.rate().is_some()
+            && !is_instant
+            && let Some(place) = self.z.last_mut()
+        {
+            *place = v;
+        }
+        check_growth(&self.z, S::default(), next)?;
+        self.t = next;
+        if let Some(change) = change {
+            self.leave(change);
+            self.requested.input_break(next)?;
+        }
+        Ok(())
+    }
+
+    /// Let reference and inputs jump; does an input?
+    fn jump(&mut self, tolerance: f64) -> bool {
+        let equations = self.plant.equations();
+        let before = self.cursor.value();
+        self.r = self.cursor.advance(self.t.value(), tolerance);
+        let n = equations.states();
+        let states = &mut self.z[..n];
+        let kicked = self.cursor.kick(self.t.value(), tolerance, equations, states);
+        let is_bounded = self.plant.bounds().is_some() || self.plant.rate().is_some();
+        let mut is_kicked = kicked.is_some();
+        if !is_bounded && self.pieces.is_none() {
+            let made = equations.impulse * S::from(self.r - before) + kicked.unwrap_or_default();
+            let struck = made / (S::from(1.0) - equations.l);
+            is_kicked |= !struck.is_nothing();
+            for (z, &b) in self.z.iter_mut().zip(&equations.b) {
+                *z += b * struck;
+            }
+        }
+        is_kicked
+    }
+
+    /// The end of the next element, at the latest.
+    fn stop(&self, tolerance: f64) -> S {
+        let jump = S::from(self.cursor.next_jump());
+        match &self.pieces {
+            Some(pieces) => pieces.front().end.earlier(jump),
+            None => {
+                let end = S::from(self.cursor.next_jump().min(self.horizon));
+                let left = end - self.t;
+                self.t + left.pinned(left.value().max(tolerance))
+            }
+        }
+    }
+
+    /// w at the start of the element.
+    fn arrives(&self) -> S {
+        let Some(pieces) = &self.pieces else {
+            return S::default();
+        };
+        let piece = pieces.front();
+        piece.series.at((self.t - piece.origin) / piece.scale)
+    }
+
+    /// Find the mode after a jump.
+    fn settle(&mut self, w: S) {
+        let mut slew = 0;
+        self.enter(Mode {
+            slew: i8::from(self.plant.rate().is_some()),
+            ..Mode::FREE
+        });
+        let u = self.field().u.at(&self.z, w, self.r).value();
+        let side = self.plant.bounds().map_or(0, |(low, high)| {
+            i8::from(u > high.value()) - i8::from(u < low.value())
+        });
+        if self.plant.rate().is_some() {
+            let aim = match (side, self.plant.bounds()) {
+                (1, Some((_, high))) => high.value(),
+                (-1, Some((low, _))) => low.value(),
+                _ => u,
+            };
+            let v = self.z.last().map_or(0.0, |v| v.value());
+            let noise = NOISE * (aim.abs() + v.abs());
+            slew = i8::from(aim > v + noise) - i8::from(aim < v - noise);
+        }
+        let integral = self.integral(side, slew, w);
+        self.enter(Mode {
+            side,
+            integral,
+            slew,
+        });
+    }
+
+    /// Whether the integral stops beyond a bound.
+    fn integral(&mut self, side: Side, slew: Side, w: S) -> Integral {
+        if side == 0 || self.plant.stops().is_none() {
+            return Integral::Runs;
+        }
+        self.enter(Mode {
+            side,
+            integral: Integral::Runs,
+            slew,
+        });
+        let drive = self.field().drive.at(&self.z, w, self.r).value();
+        if drive * f64::from(side) > 0.0 {
+            Integral::Stops
+        } else {
+            Integral::Runs
+        }
+    }
+
+    /// Expand the states over an element; returns the part on which the series holds.
+    fn expand(&mut self, h: S) -> f64 {
+        let (field, expansion) = &mut self.fields[self.place];
+        let forced: Vec<S> = field.slopes.iter().map(|s| s.forced(self.r)).collect();
+        MARGIN * expansion.expand(&field.a, &field.b, &forced, &self.z, &self.w, h)
+    }
+
+    /// A signal on the element.
+    fn series(&self, signal: &Signal<S>) -> Series<S> {
+        let expansion = &self.fields[self.place].1;
+        expansion.combine(&signal.states, signal.w, &self.w, signal.forced(self.r))
+    }
+
+    /// Rounding errors of a signal on the element.
+    fn noise(&self, signal: &Signal<S>) -> f64 {
+        let expansion = &self.fields[self.place].1;
+        let w: f64 = self.w.terms().iter().map(|c| c.value().abs()).sum();
+        let forced = signal.constant.value().abs() + (signal.r.value() * self.r).abs();
+        NOISE * (expansion.size(&signal.states) + signal.w.value().abs() * w + forced)
+    }
+
+    /// The first change of mode on the element.
+    fn change(&self, h: S) -> Option<Change> {
+        let mode = self.field().mode;
+        let mut first: Option<Change> = None;
+        let mut note = |series: &Series<S>, noise: f64, to: Mode| {
+            if let Some(at) = self.left(series, noise)
+                && first.is_none_or(|known| at < known.at)
+            {
+                first = Some(Change { at, mode: to });
+            }
+        };
+        let field = self.field();
+        let u = self.series(&field.u);
+        let noise = self.noise(&field.u);
+        if let Some((low, high)) = self.plant.bounds() {
+            for (side, bound) in [(1, high), (-1, low)] {
+                if !bound.value().is_finite() || mode.integral == Integral::Slides {
+                    continue;
+                }
+                // Within: the bound less u; beyond: u less the bound.
+                let sign = if mode.side == side { 1.0 } else { -1.0 };
+                if mode.side == side || mode.side == 0 {
+                    let room = against(&u, bound, sign * f64::from(side));
+                    let next = Mode {
+                        side: if mode.side == 0 { side } else { 0 },
+                        integral: Integral::Runs,
+                        ..mode
+                    };
+                    note(&room, noise + NOISE * bound.value().abs(), next);
+                }
+            }
+        }
+        if mode.side != 0 && self.plant.stops().is_some() {
+            self.integrals(f64::from(mode.side), &mut note);
+        }
+        if let Some(rate) = self.plant.rate() {
+            if mode.slew != 0 {
+                let aim = self.aim();
+                let mut left = self.series(&aim);
+                let v = self.series(&field.v);
+                add(&mut left, -1.0, &v);
+                let noise = self.noise(&aim) + self.noise(&field.v);
+                let next = Mode { slew: 0, ..mode };
+                note(&scaled(&left, f64::from(mode.slew)), noise, next);
+            } else if mode.side == 0 {
+                let slope = scaled(&u.derivative(), 1.0 / h.value());
+                let noise = noise * slope.degree.max(1) as f64 / h.value();
+                for slew in [1, -1] {
+                    let room = against(&slope, S::from(f64::from(slew)) * rate, -f64::from(slew));
+                    note(&room, noise + NOISE * rate.value(), Mode { slew, ..mode });
+                }
+            }
+        }
+        first
+    }
+
+    /// Changes of the integral beyond a bound.
+    fn integrals(&self, side: f64, note: &mut impl FnMut(&Series<S>, f64, Mode)) {
+        let field = self.field();
+        let mode = field.mode;
+        let to = |integral| Mode { integral, ..mode };
+        let mut out = field.drift.clone();
+        match mode.integral {
+            Integral::Runs => {
+                let drive = scaled(&self.series(&field.drive), -side);
+                note(&drive, self.noise(&field.drive), to(Integral::Stops));
+            }
+            Integral::Stops => {
+                let drive = scaled(&self.series(&field.drive), side);
+                note(&drive, self.noise(&field.drive), to(Integral::Runs));
+            }
+            Integral::Slides => {
+                let drift = scaled(&self.series(&out), -side);
+                note(&drift, self.noise(&out), to(Integral::Stops));
+                out.add(S::from(1.0), &field.drive);
+                let free = Mode {
+                    side: 0,
+                    integral: Integral::Runs,
+                    ..mode
+                };
+                note(&scaled(&self.series(&out), side), self.noise(&out), free);
+            }
+        }
+    }
+
+    /// What the command would be without a bound on its rate.
+    fn aim(&self) -> Signal<S> {
+        let field = self.field();
+        match (field.mode.side, self.plant.bounds()) {
+            (1, Some((_, high))) => Signal::constant(self.z.len(), high),
+            (-1, Some((low, _))) => Signal::constant(self.z.len(), low),
+            _ => field.u.clone(),
+        }
+    }
+
+    /// Where a signal becomes clearly negative.
+    fn left(&self, series: &Series<S>, noise: f64) -> Option<f64> {
+        let (least, _) = series.range();
+        if least >= -noise {
+            return None;
+        }
+        let mut zeros = vec![0.0];
+        crossings(series, 0.0, &mut zeros);
+        zeros.sort_by(f64::total_cmp);
+        zeros.push(1.0);
+        zeros.windows(2).find_map(|pair| {
+            let (from, to) = (pair[0], pair[1]);
+            let at = |part: f64| value_at(series, from + part * (to - from));
+            let is_left = PROBES.into_iter().any(|part| at(part) < -noise);
+            (is_left && (from > 0.0 || self.changes < MOST_CHANGES)).then_some(from)
+        })
+    }
+
+    /// Go to another mode, at the end of the element.
+    fn leave(&mut self, change: Change) {
+        let w = self.w.at(S::from(change.at));
+        let mut mode = change.mode;
+        let last = self.field().mode;
+        if self.plant.stops().is_some() && mode.side != last.side {
+            mode = self.across(last, mode, w);
+        }
+        self.enter(mode);
+    }
+
+    /// The mode at a bound that the command reaches or leaves, of an integral that may stop.
+    fn across(&mut self, last: Mode, mode: Mode, w: S) -> Mode {
+        let side = if mode.side == 0 { last.side } else { mode.side };
+        let beyond = Mode {
+            side,
+            integral: Integral::Runs,
+            ..mode
+        };
+        self.enter(beyond);
+        let field = self.field();
+        let sign = f64::from(side);
+        let drive = sign * field.drive.at(&self.z, w, self.r).value();
+        let drift = sign * field.drift.at(&self.z, w, self.r).value();
+        let to = |integral| Mode { integral, ..beyond };
+        if last.integral == Integral::Slides {
+            mode
+        } else if drive <= 0.0 {
+            if mode.side == 0 { mode } else { beyond }
+        } else if drift > 0.0 {
+            to(Integral::Stops)
+        } else if drift + drive > 0.0 {
+            to(Integral::Slides)
+        } else {
+            Mode { side: 0, ..mode }
+        }
+    }
+
+    /// Store and pass on what happens on the element; returns v at its end.
+    fn emit(
+        &mut self,
+        h: S,
+        next: S,
+        (end, order): (f64, u8),
+        is_instant: bool,
+    ) -> Result<S, Error> {
+        let (t, delay) = (self.t, self.plant.delay());
+        let tolerance = slack(t, delay);
+        let field = self.field();
+        let mut v = self.series(&field.v);
+        let y = self.series(&field.y);
+        let is_limited = field.mode.is_limited();
+        if self.requested.is_measured() {
+            self.requested
+                .measure(t.value(), h.value(), end, &y.values());
+        }
+        if is_limited {
+            self.requested.limited(t, next);
+        }
+        let until = next.value() - tolerance;
+        self.requested
+            .output_blocks(until, |times| y.at_each(times.map(|time| (time - t) / h)));
+        self.requested
+            .input_blocks(until, |times| v.at_each(times.map(|time| (time - t) / h)));
+        if let Some(pieces) = &mut self.pieces {
+            let mut scale = h;
+            if is_instant {
+                v.set_degree(0);
+                scale = S::from(1.0);
+            }
+            let mut piece = pieces.blank();
+            piece.start = delay + t;
+            piece.end = delay + next;
+            piece.origin = t + delay;
+            piece.scale = scale;
+            piece.series.copy_from(&v);
+            piece.order = order;
+            pieces.push(piece)?;
+        }
+        Ok(v.at(S::from(end)))
+    }
+}
+
+/// `sign` (u − bound).
+fn against<S: Scalar>(u: &Series<S>, bound: S, sign: f64) -> Series<S> {
+    let mut out = *u;
+    out.coefficients[0] = out.coefficients[0] - bound;
+    scaled(&out, sign)
+}
+
+fn scaled<S: Scalar>(u: &Series<S>, gain: f64) -> Series<S> {
+    let mut out = *u;
+    let terms = out.coefficients.iter_mut().take(out.degree + 1);
+    terms.for_each(|c| *c *= S::from(gain));
+    out
+}
+
+fn add<S: Scalar>(sum: &mut Series<S>, gain: f64, other: &Series<S>) {
+    sum.degree = sum.degree.max(other.degree);
+    for (c, o) in sum.coefficients.iter_mut().zip(&other.coefficients) {
+        *c += S::from(gain) * *o;
+    }
+}
