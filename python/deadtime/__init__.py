@@ -80,7 +80,11 @@ if TYPE_CHECKING:
         TransferFunction as TransferFunction,
         feedback as feedback,
     )
-    from deadtime.tuning import design as design, design_filter as design_filter
+    from deadtime.tuning import (
+        check_gains as check_gains,
+        design as design,
+        design_filter as design_filter,
+    )
 
 
 #: The names of each package that are here too.
@@ -104,7 +108,7 @@ _PACKAGES = {
     "gallery": "",
     "links": "",
     "estimation": "damping_ratio estimate_delay identifiability",
-    "tuning": "design design_filter",
+    "tuning": "check_gains design design_filter",
     "reports": "",
     "logs": "latency open_log",
     "flights": "",
