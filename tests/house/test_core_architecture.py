@@ -12,7 +12,17 @@ WIRE_FORMATS = ROOT / "rust" / "wire"
 BINDINGS = ROOT / "rust" / "bindings" / "src"
 
 # What each package of the core may use besides itself; every package may use the foundation.
-FOUNDATION = {"between", "error", "memory", "order", "parallel", "simd", "simplex", "status", "task"}
+FOUNDATION = {
+    "between",
+    "error",
+    "memory",
+    "order",
+    "parallel",
+    "simd",
+    "simplex",
+    "status",
+    "task",
+}
 CORE_ARROWS = {
     "linear_algebra": set(),
     "lambertw": set(),
@@ -87,7 +97,17 @@ ORDER = {
         "crossings",
         "ranges",
     ],
-    "tuning": ["simplices", "candidates", "goal", "search", "open", "responses", "demands", "robust", "rules"],
+    "tuning": [
+        "simplices",
+        "candidates",
+        "goal",
+        "search",
+        "open",
+        "responses",
+        "demands",
+        "robust",
+        "rules",
+    ],
     "dde": ["scalar", "limits", "rate_limits", "propagator", "control_loop", "system", "spectral"],
     "loops": [
         "entry",

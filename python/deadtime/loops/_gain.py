@@ -113,9 +113,7 @@ class LoopGain:
         _ = loop.known_delay
         return margins_of(loop.native.held_margins(delay_margin))
 
-    def hinf_norm(
-        self, of: _TRANSFERS = "sensitivity"
-    ) -> float:
+    def hinf_norm(self, of: _TRANSFERS = "sensitivity") -> float:
         """Return the largest gain over frequency of a transfer function of the closed loop.
 
         Parameters

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from deadtime._base.validation import finite, positive
 from deadtime.loops import ControlLoop
@@ -12,11 +13,12 @@ from deadtime.tuning._margins import RequiredMargins
 #: Bandwidth of the noise of a continuous loop, as a multiple of one over delay and lag, rad/s.
 _BANDWIDTH = 100.0
 
+
 @dataclass(frozen=True)
 class Demands:
     """What must hold in every scenario; None where nothing is demanded."""
 
-    margins: RequiredMargins = RequiredMargins()
+    margins: RequiredMargins
     max_sensitivity: float | None = None
     noise_gain: float | None = None
     settling_time: float | None = None
@@ -62,7 +64,8 @@ class Demands:
         """The others."""
         if name in self.margins.named:
             return replace(self, margins=self.margins.without(name))
-        return replace(self, **{name: None})
+        nothing: dict[str, Any] = {name: None}
+        return replace(self, **nothing)
 
 
 def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:
