@@ -462,7 +462,7 @@ class _FixedStepSettings(Protocol):
     @property
     def delay_path(self) -> str: ...
     @property
-    def limit(self) -> float | None: ...
+    def bounds(self) -> _Pair | None: ...
     @property
     def sample_steps(self) -> int | None: ...
     @property
@@ -1190,6 +1190,15 @@ class _ControllerForm(Protocol):
     def is_filtered(self) -> bool: ...
     @property
     def rule(self) -> str | None: ...
+    @property
+    def extras(self) -> Sequence[str]: ...
+    @property
+    def stops(self) -> bool: ...
+
+class _CommandBounds(Protocol):
+    limit: float | None
+    low: float | None
+    rate: float | None
 
 #: Numerator and denominator of a plant, descending.
 _Fraction: TypeAlias = tuple[list[Any], list[Any]]
@@ -1207,7 +1216,7 @@ class Loop:
         *,
         delay: float,
         sample_time: float | None,
-        limit: float | None,
+        bounds: _CommandBounds,
         is_measured: bool,
         given: _Fraction | None = None,
     ) -> Loop: ...
