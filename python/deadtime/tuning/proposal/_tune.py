@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from deadtime._base.validation import OpenRange
 from deadtime.estimation import PlantEstimate, estimate_delay
-from deadtime.loops import PI, Controller
+from deadtime.loops import PI, PID, Controller
 from deadtime.recordings import Recording
 from deadtime.tuning._problem import controller_template
 from deadtime.tuning._rules import rules
-from deadtime.tuning.forms import Form, check_form, settings_of
+from deadtime.tuning.forms import LOOPS_OF_FORMS, Form, check_form, settings_of
 from deadtime.tuning.proposal._gains import refusals, wanted_gains, why_none
 from deadtime.tuning.proposal._prediction import predicted_load, predicted_set_point
 from deadtime.tuning.proposal._proposal import Proposal
@@ -95,6 +96,8 @@ def tune(
     True
     """
     template = controller_template(controller)
+    if form in LOOPS_OF_FORMS and isinstance(template, (PI, PID)) and template.weight is None:
+        template = replace(template, weight=1.0)  # no firmware has another one
     check_form(template, form, loop, version)
     if isinstance(recording, PlantEstimate):
         fit = recording
