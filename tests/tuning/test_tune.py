@@ -44,6 +44,12 @@ def test_the_load_response_is_near_the_best_of_all_pi_controllers(found):
     assert 1.0 / gains["Ki"] < 1.15 * truth.best_load_ie(most)
 
 
+def test_the_true_sensitivity_is_below_the_largest_of_the_possible_plants(found):
+    truth, gains = Process(1.8, 40.0, LATE), found.controller.gains
+    most = float(truth.sensitivity(gains["Kp"], gains["Ki"]))
+    assert most < found.margins.max_sensitivity < 1.61
+
+
 @pytest.mark.survey
 def test_the_settling_time_is_near_the_best_of_all_pi_controllers(found):
     truth = Process(1.8, 40.0, LATE)

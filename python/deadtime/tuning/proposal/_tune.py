@@ -10,7 +10,7 @@ from deadtime.estimation import PlantEstimate, estimate_delay
 from deadtime.loops import PI, PID, Controller
 from deadtime.recordings import Recording
 from deadtime.tuning._problem import controller_template
-from deadtime.tuning._rules import rules
+from deadtime.tuning._rules import compared
 from deadtime.tuning.forms import LOOPS_OF_FORMS, Form, check_form, settings_of
 from deadtime.tuning.proposal._gains import refusals, wanted_gains, why_none
 from deadtime.tuning.proposal._prediction import predicted_load, predicted_set_point
@@ -133,6 +133,6 @@ def tune(
         shows_set_point=shows_set_point,
         shows_load=shows_load,
         remarks=found.remarks,
-        rules=rules(loops[0]),
+        rules=compared(loops[0], "proposal"),
         _loops=loops,
     )
