@@ -139,8 +139,8 @@ def designing() -> None:
 
     figure, axes = plt.subplots(figsize=(7.0, 4.0), layout="constrained")
     delays = np.linspace(0.15, 0.35, 81)
-    middle = dtm.design(vehicle, controller=smooth)
-    worst = dtm.design(vehicle, controller=smooth, delay=interval)
+    middle = dtm.design(vehicle, controller=smooth, objective="abscissa")
+    worst = dtm.design(vehicle, controller=smooth, delay=interval, objective="abscissa")
     for found, label in ((middle, "for 0.25 s alone"), (worst, "for 0.2 to 0.3 s")):
         gains = ", ".join(f"{name} {value:.3g}" for name, value in found.gains.items())
         abscissas = [found.loop.replace(delay=late).spectral_abscissa() for late in delays]

@@ -21,6 +21,9 @@ LATE = (0.3, 0.4)
 
 #: Loop and further arguments of each design.
 DESIGNS: dict[str, tuple[dtm.ControlLoop, dict[str, Any]]] = {
+    "load": (LOOP, {"objective": "load"}),
+    "load, continuous": (LOOP.continuous(), {"objective": "load"}),
+    "load, over an interval": (LOOP, {"objective": "load", "delay": LATE, "gain": (0.8, 1.2)}),
     "sampled": (LOOP, {}),
     "continuous": (LOOP.continuous(), {}),
     "over an interval of delays": (LOOP, {"delay": LATE}),
@@ -51,7 +54,7 @@ def main() -> None:
     calls = 1 if parser.parse_args().quick else 6
     print(f"{'PV around an integrator':28}{'CPU ms':>8}{'Python':>9}{'native':>8}  gains")
     for name, (loop, given) in DESIGNS.items():
-        options = {"controller": dtm.PV, **given}
+        options = {"controller": dtm.PV, "objective": "abscissa", **given}
         least = float("inf")
         for _ in range(calls):
             begin = time.process_time()

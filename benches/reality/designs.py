@@ -58,7 +58,9 @@ def designed(name: str, number: int) -> Designed | None:
         if fit.verdict != "reliable":
             return None
         try:
-            best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=DEMANDED)
+            best = dtm.design(
+                fit, controller=dtm.P(1.0), gain_margin=DEMANDED, objective="abscissa"
+            )
         except ValueError:
             return Designed(math.nan, math.nan, math.nan)
     vehicle = run.vehicle

@@ -81,6 +81,7 @@ if TYPE_CHECKING:
         feedback as feedback,
     )
     from deadtime.tuning import (
+        check_gains as check_gains,
         design as design,
         design_filter as design_filter,
         tune as tune,
@@ -108,7 +109,7 @@ _PACKAGES = {
     "gallery": "",
     "links": "",
     "estimation": "damping_ratio estimate_delay identifiability",
-    "tuning": "design design_filter tune",
+    "tuning": "check_gains design design_filter tune",
     "reports": "",
     "logs": "latency open_log",
     "flights": "",

@@ -168,15 +168,18 @@ def test_a_map_and_its_picture(tmp_path):
 
 
 def test_a_design(tmp_path):
-    out = found("design", "--delay", 0.36, "--kp", 1, 4, "--kv", 0, 0.9)
+    stable = ("--objective", "abscissa")
+    out = found("design", "--delay", 0.36, "--kp", 1, 4, "--kv", 0, 0.9, *stable)
     assert out["abscissa"] < -3.684
     robust = found("design", "--delay", 0.3, "--delay-to", 0.4, "--sample-time", 0.065)
     assert robust["abscissa"] < 0
+    assert robust["objective"] == "load"
+    assert robust["margins"]["max_sensitivity"] == pytest.approx(1.6, rel=1e-6)
     assert robust["delays"] == [0.3, pytest.approx(0.35), 0.4]
     picture = tmp_path / "design.png"
     fixed = found(
         "design", "--delay", 0.36, "--fix", "Kp=2", "--filter", 38, "--gain-margin", 2.25,
-        "--plot", picture,
+        "--plot", picture, *stable,
     )  # fmt: skip
     assert fixed["gains"]["Kp"] == 2.0
     assert fixed["margins"]["gain_margin"] >= 2.25

@@ -112,7 +112,9 @@ def test_a_plant_of_factors_with_one_lag_has_its_slider() -> None:
 
 
 def test_a_design_opens_with_the_interval_of_its_delay_and_stands_in_reports() -> None:
-    found = dtm.design(LOOP, controller=dtm.PV, delay=(0.3, 0.4), shape=(9, 9))
+    found = dtm.design(
+        LOOP, controller=dtm.PV, delay=(0.3, 0.4), shape=(9, 9), objective="abscissa"
+    )
     state = found.explore().state
     assert (state["Kp"], state["interval"]) == (found.gains["Kp"], [0.3, 0.4])
     shown = live_design(found)
@@ -122,7 +124,10 @@ def test_a_design_opens_with_the_interval_of_its_delay_and_stands_in_reports() -
     G = 1 / (dtm.s + dtm.delay(0.1))
     inside = dtm.ControlLoop(G, dtm.P(0.5), delay=0.1)
     ranges = {"Kp": (0.1, 0.6)}
-    assert live_design(dtm.design(inside, controller=dtm.P, ranges=ranges)) is None
+    assert (
+        live_design(dtm.design(inside, controller=dtm.P, ranges=ranges, objective="abscissa"))
+        is None
+    )
 
 
 def test_the_command_writes_the_page_of_a_loop_and_of_a_recording(tmp_path: Path) -> None:

@@ -33,7 +33,9 @@ def mapped():
 
 @functools.cache
 def designed():
-    return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
+    return dtm.design(
+        LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5), objective="abscissa"
+    )
 
 
 @functools.cache

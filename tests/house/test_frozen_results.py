@@ -32,7 +32,9 @@ def solved(**more):
 
 
 def designed():
-    return dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5))
+    return dtm.design(
+        LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5), objective="abscissa"
+    )
 
 
 def estimated():

@@ -46,7 +46,9 @@ PICTURED = {
         "reliable: delay",
     ),
     "Design": (
-        lambda: dtm.design(LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5)),
+        lambda: dtm.design(
+            LOOP, ranges={"Kp": (0.5, 3), "Kv": (0, 0.5)}, shape=(5, 5), objective="abscissa"
+        ),
         "least margins",
     ),
     "Identifiability": (

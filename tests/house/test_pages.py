@@ -30,6 +30,7 @@ PAGES = [
     "guide/large-maps.md",
     "guide/planning-an-experiment.md",
     "guide/process-loop.md",
+    "guide/loads-and-windup.md",
     "guide/sweeps-and-sensitivities.md",
     pytest.param("guide/what-an-answer-means.md", marks=pytest.mark.survey),
     "guide/what-a-ground-log-cannot-tell.md",

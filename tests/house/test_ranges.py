@@ -21,7 +21,9 @@ ASKED = {
     ),
     "boxes": lambda r: dtm.proved_boxes(VELOCITY, {"Kp": r}, at={"Kv": 0.3, "T": 0.36}, **FAST),
     "crossings": lambda r: dtm.crossings(VELOCITY, {"Kp": r}, at={"Kv": 0.3, "T": 0.36}),
-    "design": lambda r: dtm.design(LOOP, controller=dtm.P, ranges={"Kp": r}).loop,
+    "design": lambda r: (
+        dtm.design(LOOP, controller=dtm.P, ranges={"Kp": r}, objective="abscissa").loop
+    ),
     "region": lambda r: (s + delay(1.0)).roots(re=(-3, 2), im=r),
 }
 

@@ -89,7 +89,9 @@ def test_its_numbers_are_those_of_the_loop():
         lambda loop: loop.continuous().characteristic(),
         lambda loop: loop.plant.transfer_function(),
         lambda loop: dtm.sweep(loop, {"Kp": (1.0, 2.0, 3)}, [0.0, 1.0]),
-        lambda loop: dtm.design(loop, controller=dtm.P, ranges={"Kp": (0.1, 3.0)}),
+        lambda loop: dtm.design(
+            loop, controller=dtm.P, ranges={"Kp": (0.1, 3.0)}, objective="abscissa"
+        ),
         lambda loop: dtm.simulate_fixed_step(loop, 1.0, step=0.01),
     ],
 )

@@ -49,7 +49,7 @@ def test_results_of_studies_can_be_pickled():
     loop = LOOP.replace(Kv=0.0)
     results = [
         dtm.sweep(loop, {"Kp": np.array([0.5, 1.0])}),
-        dtm.design(loop, controller=dtm.P),
+        dtm.design(loop, controller=dtm.P, objective="abscissa"),
         dtm.identifiability(loop, dtm.Experiment.step(), noise=0.005),
     ]
     for result in results:

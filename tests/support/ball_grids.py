@@ -4,13 +4,14 @@ On a cell of frequencies with the middle m and the half width r, abs(G)^2 is at 
 
     g0(m) + abs(g1(m)) r + abs(g2(cell)) r^2
 
-with the coefficients of its Taylor series, in balls of which the last one holds the whole cell. Cells
-whose bound is below a value that is taken are dropped, the others halved.
+with the coefficients of its Taylor series, in balls of which the last one holds the whole cell.
+Cells whose bound is below a value that is taken are dropped, the others halved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 from flint import acb, acb_series, arb, ctx
 
@@ -35,7 +36,7 @@ def largest_gain(
     try:
         ratio = (high / low) ** (1.0 / _CELLS)
         edges = [low * ratio**k for k in range(_CELLS)] + [high]
-        cells = list(zip(edges[:-1], edges[1:], strict=True))
+        cells = list(pairwise(edges))
         best = arb(0)
         for _ in range(_ROUNDS):
             bounds = []

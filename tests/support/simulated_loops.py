@@ -101,7 +101,9 @@ class Diagram:
             w = arrived
             if not delayed:
                 # Without a direct path the output does not wait for the command.
-                u = command(C @ x + q + n, 0.0)
+                u = command(C @ x + q + n, C @ (A @ x + B * d))
+                if not self.smooth and mode[0] == mode[2] == 0:
+                    u /= 1.0 + self.Kd * (C @ B)
                 w = issued(u)
             y = C @ x + D * (w + d) + q
             moved = A @ x + B * (w + d)
@@ -161,6 +163,8 @@ def continuous(loop, times):
     jumps = sorted(
         {when for part in (loop.reference, loop.load, loop.output, loop.noise) for when, _ in part}
     )
+    if loop.is_measured:
+        jumps = sorted({*jumps, *(when + loop.delay for when, _ in loop.output)})
     #: Start, end, length of the element and the series over it of y, v and what is delayed.
     pieces = [(-math.inf, 0.0, 1.0, np.zeros((3, DEGREE + 1)))]
     place, is_new, mode, stuck = 0, True, (0, "runs", 0), 0

@@ -86,7 +86,7 @@ def test_times_are_not_below_zero_and_keep_their_sum():
 @pytest.mark.long
 @pytest.mark.survey
 def test_margins_hold_in_the_whole_region(fit):
-    best = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
+    best = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31), objective="abscissa")
     assert best.region.verdict == "reliable"
     assert best.region.level == 0.95
     assert best.margins.gain_margin >= 3.0
@@ -100,9 +100,13 @@ def test_margins_hold_in_the_whole_region(fit):
     assert f"worst over the joint 95 % region of the estimate (delay {delays}, gain 0." in told
     assert "the true loop has these margins with a probability of 95 %" in told
     assert "were the estimate exact" in told
-    alone = dtm.design(fit.loop, controller=SMOOTH, gain_margin=3.0, shape=(31, 31))
+    alone = dtm.design(
+        fit.loop, controller=SMOOTH, gain_margin=3.0, shape=(31, 31), objective="abscissa"
+    )
     assert alone.abscissa < best.abscissa
-    wider = dtm.design(fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31), level=0.999)
+    wider = dtm.design(
+        fit, controller=SMOOTH, gain_margin=3.0, shape=(31, 31), level=0.999, objective="abscissa"
+    )
     assert alone.abscissa < best.abscissa < wider.abscissa
 
 
@@ -117,23 +121,25 @@ def test_an_indication_is_refused_by_name():
     fit = estimate("delay", "gain")
     assert fit.verdict != "reliable"
     with pytest.raises(ValueError, match=r"indication.*the plant lacks it.*allow_indication=True"):
-        dtm.design(fit, controller=dtm.P)
-    best = dtm.design(fit, controller=dtm.P, gain_margin=2.5, allow_indication=True)
+        dtm.design(fit, controller=dtm.P, objective="abscissa")
+    best = dtm.design(
+        fit, controller=dtm.P, gain_margin=2.5, allow_indication=True, objective="abscissa"
+    )
     assert "with which probability the true loop has these margins is not known" in best.summary()
 
 
 def test_what_has_no_region_is_refused(fit):
     for more in ({"delay": 0.3}, {"gain": (0.8, 0.9)}):
         with pytest.raises(ValueError, match="leave delay= and gain= out"):
-            dtm.design(fit, **more)
+            dtm.design(fit, objective="abscissa", **more)
     unsure = dtm.estimate_delay(FLIGHT, KNOWN, method="gcc", free=("delay",))
     with pytest.raises(ValueError, match=r"the estimate has no region: the gcc method"):
-        dtm.design(unsure)
+        dtm.design(unsure, objective="abscissa")
     with pytest.raises(ValueError, match=r"level=1\.5"):
-        dtm.design(fit, level=1.5)
+        dtm.design(fit, level=1.5, objective="abscissa")
     weak = replace(fit, stderr={**fit.stderr, "gain": 1.0}, _profile=None)
     with pytest.raises(ValueError, match=r"region of the gain, .* holds zero"):
-        dtm.design(weak)
+        dtm.design(weak, objective="abscissa")
 
 
 def test_gains_that_meet_a_margin_but_not_by_its_estimate_are_returned():
@@ -149,7 +155,9 @@ def test_gains_for_the_worst_of_a_wide_region_are_found_far_from_those_for_its_e
     """The search ended there, and named as the nearest a loop that had what was asked."""
     flight = dtm.Experiment.step(8.0, rest=1.04).run(TRUTH, noise=0.03, seed=2)
     fit = dtm.estimate_delay(flight, KNOWN, free=("delay", "gain", "lag"))
-    best = dtm.design(fit, controller=dtm.P(1.0), gain_margin=6.0, allow_indication=True)
+    best = dtm.design(
+        fit, controller=dtm.P(1.0), gain_margin=6.0, allow_indication=True, objective="abscissa"
+    )
     loops = [best.loop.replace(limit=None, **one) for one in best.region.points]
     least = min(one.stable_range("gain")[1] / one.parameters["gain"] for one in loops)
     # The worst has what was asked, and no more.
@@ -169,7 +177,9 @@ def test_flights_in_gusts(flights):
             fit = dtm.estimate_delay(table.recording_of(condition, run), loop, free=condition.free)
         if fit.verdict != "reliable":
             continue
-        best = dtm.design(fit, controller=SMOOTH, gain_margin=2.5, shape=(31, 31))
+        best = dtm.design(
+            fit, controller=SMOOTH, gain_margin=2.5, shape=(31, 31), objective="abscissa"
+        )
         vehicle = run.vehicle
         truth = dtm.ControlLoop(
             dtm.Integrator(vehicle.gain, sum(vehicle.lags)),

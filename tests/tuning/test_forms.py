@@ -141,6 +141,23 @@ def test_every_loop_has_the_gains_it_says(form):
         assert found.source.split()[0].lower() == form
 
 
+def test_weights_of_the_set_point_and_the_tracking_time_are_typed():
+    given = dtm.PID(1.0, 0.1, 2.0, weight=0.5, derivative_weight=0.0, anti_windup=7.0)
+    found = settings_of(given, "ideal")
+    assert found.lines[-3:] == ("b = 0.5", "c = 0", "Tt = 7 s")
+    assert controller_of("\n".join(found.lines), "ideal") == given
+    # PX4 takes the derivative of the measurement, which is a weight of zero: nothing to note.
+    rate = dtm.PID(0.15, 0.2, 0.003, one_pole_filter(30.0), derivative_weight=0.0)
+    found = settings_of(rate, "px4", loop="roll rate")
+    assert not any("kick" in note for note in found.notes)
+    assert found.controller.derivative_weight == 0.0
+    # Half of the gain of D is half of its F: 115.4/2.
+    half = dtm.PID(82.5807, 1120.16, 0.909284, SMOOTH, derivative_weight=0.5)
+    found = settings_of(half, "betaflight", loop="roll rate")
+    assert "set f_roll = 58" in found.lines
+    assert found.controller.derivative_weight == pytest.approx(0.5, abs=0.01)
+
+
 def test_the_series_form_multiplies_out_to_the_ideal_one():
     # (1 + 1/(12 s)) (1 + 3 s) = 1 + 3/12 + 1/(12 s) + 3 s.
     ideal = IdealForm.of(SeriesForm(2.0, 12.0, 3.0).controller())
@@ -182,7 +199,10 @@ def test_files_of_ground_stations_are_read():
 
 REFUSED = [
     (dtm.PI(1.0, 0.1), "ardupilot", "altitude", "no integral gain"),
-    (dtm.PV(0.1, 0.003, SMOOTH), "ardupilot", "roll rate", "derivative of the error"),
+    (dtm.PV(0.1, 0.003, SMOOTH), "ardupilot", "roll rate", "takes the derivative of the error"),
+    (dtm.PI(0.1, 0.1, weight=0.5), "px4", "roll rate", "no weight of the set point"),
+    (dtm.PI(82.0, 900.0, weight=0.5), "betaflight", "roll rate", "no weight of P"),
+    (dtm.PI(1.0, 0.1, feed_forward=1.0), "ideal", "", "without one"),
     (dtm.PD(0.1, 0.003, dtm.DerivativeFilter(200.0)), "ardupilot", "roll rate", "has one pole"),
     (dtm.PD(0.1, 0.003, dtm.DerivativeFilter(200.0)), "px4", "roll rate", "has one pole"),
     (dtm.PD(82.0, 0.9, dtm.DerivativeFilter(200.0, 0.5)), "betaflight", "roll rate", "PT1"),

@@ -35,7 +35,7 @@ def test_an_unstable_first_order_plant_is_stabilised_below_a_delay_of_its_time_c
         loop = unstable(0.2, gain, sample_time)
         assert loop.replace(Kp=factor * near).is_stable() == (factor > 1.0)
         assert loop.replace(Kp=factor * far).is_stable() == (factor < 1.0)
-    best = dtm.design(unstable(0.2, gain, sample_time), controller=dtm.P)
+    best = dtm.design(unstable(0.2, gain, sample_time), controller=dtm.P, objective="abscissa")
     if sample_time is None:
         # a double root at 1 - 1/T, with K T = e^(T - 1)
         assert best.gains["Kp"] * gain == pytest.approx(np.exp(0.2 - 1.0) / 0.2, rel=1e-5)
@@ -49,17 +49,19 @@ def test_without_delay_the_critical_gain_is_two_over_the_sample_time():
 
 def test_a_narrow_stable_interval_far_from_zero_is_found():
     # Between 1 and 1.0013 lies one cell of the map from 0.02 to 1.25 times the critical gain.
-    best = dtm.design(unstable(0.99), controller=dtm.P)
+    best = dtm.design(unstable(0.99), controller=dtm.P, objective="abscissa")
     assert best.abscissa == pytest.approx(1.0 - 1.0 / 0.99, rel=1e-2)
-    assert dtm.design(unstable(0.99), controller=dtm.PV).abscissa < best.abscissa
+    assert (
+        dtm.design(unstable(0.99), controller=dtm.PV, objective="abscissa").abscissa < best.abscissa
+    )
 
 
 def test_beyond_its_time_constant_a_proportional_gain_is_refused_and_a_derivative_found():
     with pytest.raises(ValueError, match=r"no proportional gain up to .* with its delay of 1.2 s"):
-        dtm.design(unstable(1.2), controller=dtm.P)
+        dtm.design(unstable(1.2), controller=dtm.P, objective="abscissa")
     with pytest.raises(ValueError, match="no proportional gain"):
         critical_gain(unstable(1.2))
-    best = dtm.design(unstable(1.2))
+    best = dtm.design(unstable(1.2), objective="abscissa")
     assert best.abscissa < -0.5
     assert best.proved == ("stable",)
 
@@ -69,6 +71,7 @@ def test_beyond_its_time_constant_a_proportional_gain_is_refused_and_a_derivativ
 def test_a_plant_of_negative_gain_has_the_mirrored_design(controller, sample_time):
     loop = dtm.ControlLoop(dtm.Integrator(0.7, 0.1), P1, delay=0.2, sample_time=sample_time)
     options = {"controller": controller, "shape": (41,) if controller is dtm.P else (25, 25)}
+    options["objective"] = "abscissa"
     one = dtm.design(loop, **options)
     other = dtm.design(loop.replace(gain=-0.7), **options)
     for name, value in one.gains.items():
@@ -82,7 +85,7 @@ def test_a_double_integrator_has_no_proportional_gain_but_a_design(gain, sample_
     plant = dtm.RationalPlant([gain], [1.0, 0.0, 0.0])
     loop = dtm.ControlLoop(plant, P1, delay=0.2, sample_time=sample_time)
     assert stable_gains(loop).intervals == ()
-    best = dtm.design(loop, shape=(31, 31))
+    best = dtm.design(loop, shape=(31, 31), objective="abscissa")
     assert best.abscissa < -2.0
     assert best.gains["Kp"] * gain > 0.0
 
@@ -91,7 +94,7 @@ def test_a_search_without_result_does_not_claim_impossibility():
     plant = dtm.RationalPlant([1.0], [1.0, 0.0, 0.0, 0.0])
     loop = dtm.ControlLoop(plant, P1, delay=0.2)
     with pytest.raises(ValueError, match=r"tried in Kp from .* nor in .* proves nothing"):
-        dtm.design(loop, shape=(9, 9))
+        dtm.design(loop, shape=(9, 9), objective="abscissa")
 
 
 def own_matrix(A, B, C, gain, whole, part, period):
@@ -193,14 +196,14 @@ def test_what_is_neither_loop_nor_plant_is_told_what_is(ask):
 def test_a_plant_is_designed_for_as_the_loop_around_it():
     G = 0.9 / (dtm.s * (0.1 * dtm.s + 1.0)) * dtm.delay(0.2)
     loop = dtm.ControlLoop(dtm.Integrator(0.9, 0.1), P1, delay=0.3)
-    wanted = dtm.design(loop, fixed={"Kv": 0.1}, delay=(0.3, 0.4))
-    found = dtm.design(G, fixed={"Kv": 0.1}, delay=(0.1, 0.2))
+    wanted = dtm.design(loop, fixed={"Kv": 0.1}, delay=(0.3, 0.4), objective="abscissa")
+    found = dtm.design(G, fixed={"Kv": 0.1}, delay=(0.1, 0.2), objective="abscissa")
     assert found.delays == pytest.approx(wanted.delays)
     assert found.gains["Kp"] == pytest.approx(wanted.gains["Kp"], rel=1e-6)
     assert found.abscissa == pytest.approx(wanted.abscissa, rel=1e-6)
-    assert dtm.design(G, fixed={"Kv": 0.1}).delays == (0.2,)
+    assert dtm.design(G, fixed={"Kv": 0.1}, objective="abscissa").delays == (0.2,)
     with pytest.raises(ValueError, match="delay of the loop is not known"):
-        dtm.design(0.9 / dtm.s)
+        dtm.design(0.9 / dtm.s, objective="abscissa")
 
 
 def test_gains_for_a_plant_with_delays_inside_are_found_in_given_ranges():
@@ -208,8 +211,8 @@ def test_gains_for_a_plant_with_delays_inside_are_found_in_given_ranges():
     G = 1.0 / (dtm.s + 0.5 * dtm.delay(1.0))
     loop = dtm.ControlLoop(G, P1, delay=1.0)
     with pytest.raises(ValueError, match="give ranges="):
-        dtm.design(loop, controller=dtm.P)
-    found = dtm.design(loop, controller=dtm.P, ranges={"Kp": (-0.4, 0.5)})
+        dtm.design(loop, controller=dtm.P, objective="abscissa")
+    found = dtm.design(loop, controller=dtm.P, ranges={"Kp": (-0.4, 0.5)}, objective="abscissa")
     assert found.gains["Kp"] == pytest.approx(math.exp(-1) - 0.5, abs=1e-4)
     assert found.abscissa == pytest.approx(-1.0, abs=1e-2)
     assert found.proved == ("stable",)
@@ -222,4 +225,9 @@ def test_gains_for_a_plant_with_delays_inside_are_found_in_given_ranges():
 )
 def test_gains_are_given_by_name_in_a_dict(given):
     with pytest.raises(TypeError, match="give"):
-        dtm.design(dtm.ControlLoop(dtm.Integrator(), P1, delay=0.3), controller=dtm.P, **given)
+        dtm.design(
+            dtm.ControlLoop(dtm.Integrator(), P1, delay=0.3),
+            controller=dtm.P,
+            objective="abscissa",
+            **given,
+        )

@@ -273,7 +273,11 @@ def test_nested_brackets_are_no_recursion_error():
 def test_gains_are_lowered_until_there_is_a_proof_or_refused():
     def designed(Kp):
         return dtm.design(
-            LOOPS["P"], controller=dtm.P, delay=(0.0, 0.5), ranges={"Kp": (0.999 * Kp, Kp)}
+            LOOPS["P"],
+            controller=dtm.P,
+            delay=(0.0, 0.5),
+            ranges={"Kp": (0.999 * Kp, Kp)},
+            objective="abscissa",
         )
 
     # The limit for 0.5 s is 3.16.

@@ -5,6 +5,7 @@ import math
 import deadtime as dtm
 import numpy as np
 import pytest
+from best_pi import Process
 from deadtime.tuning import controller_of
 
 TRUTH = dtm.FirstOrder(1.8, 40.0)
@@ -33,6 +34,29 @@ def test_the_gains_hold_on_the_true_process(found):
     assert truth.is_stable()
     assert truth.margin().gain_margin > 2.0
     assert truth.step_response().info()["overshoot"] < 25.0
+
+
+def test_the_load_response_is_near_the_best_of_all_pi_controllers(found):
+    truth, gains = Process(1.8, 40.0, LATE), found.controller.gains
+    most = float(truth.sensitivity(gains["Kp"], gains["Ki"]))
+    assert 1.4 < most < 1.65
+    # Seen: 1.0; the integral of the error after a load is 1/Ki.
+    assert 1.0 / gains["Ki"] < 1.15 * truth.best_load_ie(most)
+
+
+def test_the_true_sensitivity_is_below_the_largest_of_the_possible_plants(found):
+    truth, gains = Process(1.8, 40.0, LATE), found.controller.gains
+    most = float(truth.sensitivity(gains["Kp"], gains["Ki"]))
+    assert most < found.margins.max_sensitivity < 1.61
+
+
+@pytest.mark.survey
+def test_the_settling_time_is_near_the_best_of_all_pi_controllers(found):
+    truth = Process(1.8, 40.0, LATE)
+    gains = dtm.tune(found.fit, objective="set_point_settling").controller.gains
+    most = float(truth.sensitivity(gains["Kp"], gains["Ki"]))
+    own = float(truth.settling([gains["Kp"]], [gains["Ki"]], 40.0 * LATE)[0])
+    assert own < 1.15 * truth.best_settling(most)
 
 
 def test_what_is_typed_is_what_was_proposed(found):

@@ -12,7 +12,16 @@ from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
 from deadtime.tuning import Design, design as find_design
 
-Objective = Literal["abscissa", "damping", "settling_time", "overshoot"]
+Objective = Literal[
+    "load",
+    "load_ie",
+    "set_point",
+    "set_point_settling",
+    "abscissa",
+    "damping",
+    "settling_time",
+    "overshoot",
+]
 Kind = Literal["P", "PV", "PD", "PI", "PID"]
 
 CONTROLLERS: dict[str, type[Controller]] = {"P": P, "PV": PV, "PD": PD, "PI": PI, "PID": PID}
@@ -43,7 +52,20 @@ def command(
     choose_filter: Annotated[
         bool, typer.Option("--choose-filter", help="Choose the corner of the filter, too.")
     ] = False,
-    objective: Annotated[Objective, typer.Option(help="What to make best.")] = "abscissa",
+    objective: Annotated[
+        Objective | None,
+        typer.Option(help="What to make best: load, or abscissa where the filter is chosen, too."),
+    ] = None,
+    max_sensitivity: Annotated[
+        float | None, typer.Option(help="Largest Ms, for loads and set points; 1.6 if not given.")
+    ] = None,
+    noise_gain: Annotated[
+        float | None,
+        typer.Option(help="Largest noise of the command over that of the measurement."),
+    ] = None,
+    settling_time: Annotated[
+        float | None, typer.Option(help="Longest settling time of a step, s.")
+    ] = None,
     gain_margin: Annotated[float | None, typer.Option(help="Least gain margin, a factor.")] = None,
     phase_margin: Annotated[float | None, typer.Option(help="Least phase margin, °.")] = None,
     delay_margin: Annotated[float | None, typer.Option(help="Least delay margin, s.")] = None,
@@ -74,8 +96,11 @@ def command(
             controller=CONTROLLERS[controller],
             delay=low if delay_to is None else (low, high),
             gain=None if gain_to is None else (gain, gain_to),
-            objective=objective,
+            objective=objective or ("abscissa" if choose_filter else "load"),
             fixed=dict(map(_gain, fix)) if fix else None,
+            max_sensitivity=max_sensitivity,
+            noise_gain=noise_gain,
+            settling_time=settling_time,
             gain_margin=gain_margin,
             phase_margin=phase_margin,
             delay_margin=delay_margin,
@@ -118,6 +143,7 @@ def _as_dict(found: Design) -> dict[str, object]:
         "checked": found.checked,
         "proved": found.proved,
         "step": found.step_info,
+        "noise_gain": found.noise_gain,
         "traded": {trade.requirement: trade.words for trade in found.traded},
         "filter": None if choice is None else choice.omega,
     }

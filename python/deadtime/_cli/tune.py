@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import shlex
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,13 +12,13 @@ import typer
 from deadtime._base.page import check_pages
 from deadtime._cli import options as opt
 from deadtime._cli.columns import COLUMNS
-from deadtime._cli.design import CONTROLLERS, Kind
+from deadtime._cli.design import CONTROLLERS, Kind, Objective
 from deadtime._cli.exit_codes import NONE
 from deadtime._cli.fills import Given, filled
 from deadtime._cli.show import print_json, print_text, save_figure, stages
 from deadtime._cli.windows import files_and_windows
 from deadtime.logs import open_log, tune_loop
-from deadtime.loops import Controller
+from deadtime.loops import PV, Controller
 from deadtime.recordings import is_table, read_recording
 from deadtime.tuning import Form, ParallelForm, Proposal, one_pole_filter, tune
 
@@ -42,11 +43,14 @@ def command(
     kd: float = 0.0,
     spans: opt.Ends | None = None,
     filter: float | None = None,  # noqa: A002
+    weight: float | None = None,
     columns: Annotated[Given, COLUMNS],
     window: opt.Window = None,
     sample_time: opt.Sample_time = None,
     limit: opt.Limit = None,
     plant: str | None = None,
+    objective: Objective | None = None,
+    max_sensitivity: float | None = None,
     gain_margin: float | None = None,
     phase_margin: float | None = None,
     delay_margin: float | None = None,
@@ -81,8 +85,15 @@ def command(
         Spans of measurement and output, for a proportional band.
     filter
         Corner of the derivative's filter, one pole, Hz.
+    weight
+        Weight of the set point in the proportional term: 1 where your controller has none. Without:
+        the one with which a step settles first.
     plant
         Kind of plant, if it is known, such as 'two lags'.
+    objective
+        What to make best; without: the response to a load.
+    max_sensitivity
+        Largest Ms; without: 1.6.
     gain_margin
         Least gain margin, a factor.
     phase_margin
@@ -97,9 +108,15 @@ def command(
     if out is not None:
         check_pages()
     (path,), (part,) = files_and_windows([file], window)
-    asked = {"gain_margin": gain_margin, "phase_margin": phase_margin, "delay_margin": delay_margin}
-    demands = {name: value for name, value in asked.items() if value is not None}
-    template = _template(controller, filter)
+    asked = {
+        "objective": objective,
+        "max_sensitivity": max_sensitivity,
+        "gain_margin": gain_margin,
+        "phase_margin": phase_margin,
+        "delay_margin": delay_margin,
+    }
+    demands: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    template = _template(controller, filter, weight)
     is_log = path.is_file() and not is_table(path)
     with stages(1, quiet=as_json) as begin:
         begin("estimating and designing")
@@ -123,7 +140,7 @@ def command(
                 loop=loop or "",
                 version=firmware,
                 spans=spans,
-                flown=None if kp is None else ParallelForm(kp, ki, kd).controller(),
+                flown=_flown(controller, kp, ki, kd),
                 sample_time=sample_time,
                 limit=limit,
                 allow_indication=allow_indication,
@@ -134,16 +151,32 @@ def command(
     _show(found, path, plot, out, as_json)
 
 
-def _template(kind: Kind | None, corner: float | None) -> type[Controller] | Controller | None:
-    """The kind of controller that is asked for, with its filter; None where none is."""
-    if corner is None:
-        return None if kind is None else CONTROLLERS[kind]
-    if kind not in ("PV", "PD", "PID"):
+def _template(
+    kind: Kind | None, corner: float | None, weight: float | None
+) -> type[Controller] | Controller | None:
+    """The kind of controller that is asked for, with its filter and weight; None where none is."""
+    if corner is not None and kind not in ("PV", "PD", "PID"):
         raise ValueError("--filter is that of a derivative: give --controller PV, PD or PID")
-    found: Any = CONTROLLERS[kind]
-    gains = [1.0] * (3 if kind == "PID" else 2)
-    made: Controller = found(*gains, filter=one_pole_filter(corner))
+    if weight is not None and kind not in (None, "PI", "PID"):
+        raise ValueError("--weight is that of the set point: give --controller PI or PID")
+    if corner is None and weight is None:
+        return None if kind is None else CONTROLLERS[kind]
+    found: Any = CONTROLLERS[kind or "PI"]
+    names = inspect.signature(found).parameters
+    parts: dict[str, Any] = {name: 1.0 for name in names if name.startswith("K")}
+    if corner is not None:
+        parts["filter"] = one_pole_filter(corner)
+    if weight is not None:
+        parts["weight"] = weight
+    made: Controller = found(**parts)
     return made
+
+
+def _flown(kind: Kind | None, kp: float | None, ki: float, kd: float) -> Controller | None:
+    """The controller that was in use, by its gains."""
+    if kp is None:
+        return None
+    return PV(kp, kd) if kind == "PV" else ParallelForm(kp, ki, kd).controller()
 
 
 def _refuse(given: Given) -> None:

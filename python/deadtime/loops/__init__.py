@@ -7,13 +7,22 @@ imitates block diagrams that are run in fixed steps.
 
 # The files. `_control_loop` is the loop, `_plants`, `_controllers` and `_derivative_filter` are its
 # parts. `_specification` checks them and hands them to the kernel; `_in_time`, `_poles` and `_gain`
-# hold the questions that a loop answers, `_inputs` its loads and noise, `_load_response` the response
-# to a step of one. `_held` makes maps of sampled loops, `_sweep` runs many
-# loops, `_fixed_step` imitates block diagrams in fixed steps.
+# hold the questions that a loop answers, `_inputs` its loads and noise, `_load_response` the
+# response to a step of one. `_held` makes maps of sampled loops, `_sweep` runs many loops,
+# `_fixed_step` imitates block diagrams in fixed steps.
 
 from deadtime._base.explorer import Explorer
 from deadtime.loops._control_loop import ControlLoop
-from deadtime.loops._controllers import PD, PI, PID, PV, Controller, P
+from deadtime.loops._controllers import (
+    PD,
+    PI,
+    PID,
+    PV,
+    BackCalculation,
+    ConditionalIntegration,
+    Controller,
+    P,
+)
 from deadtime.loops._derivative_filter import (
     PAPER_FILTER as PAPER_FILTER,
     DerivativeFilter,
@@ -55,6 +64,8 @@ __all__ = [
     "PI",
     "PID",
     "PV",
+    "BackCalculation",
+    "ConditionalIntegration",
     "ControlLoop",
     "Controller",
     "DerivativeFilter",

@@ -19,10 +19,10 @@ from deadtime.loops._given_plants import plant_and_delay
 from deadtime.loops._in_time import LoopInTime
 from deadtime.loops._plants import Plant
 from deadtime.loops._poles import LoopPoles
-from deadtime.loops._specification import LoopSpecification
+from deadtime.loops._specification import UNEQUAL, LoopSpecification, is_unequal
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
     """A plant under feedback with one delay in the loop.
 
@@ -43,8 +43,14 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         Delay in s, zero or more; None where it is not known yet.
     sample_time : float, optional
         Sample time in s; None for continuous time.
-    limit : float, optional
-        Bound of the command, abs(u) <= limit; None for no bound.
+    limit : float or (float, float), optional
+        Bound of the command, abs(u) <= limit, or the least and the greatest command, zero between
+        them; None for no bound. `bounds` has both.
+    rate_limit : float, optional
+        Bound of the rate of the command after its limit, in its unit per s; in a sampled loop, of
+        its change from sample to sample over `sample_time`. None for no bound.
+    computation_time : float, optional
+        Time in s from a sample to the command that is computed from it, added to `delay`.
     delay_path : {"command", "measurement"}
         Where the delay sits. Between command and plant, the output starts to move `delay` after a
         step; in the measurement, the output itself is the same function `delay` earlier. A plant
@@ -80,6 +86,7 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
     delay: float | None = None
     sample_time: float | None = None
     limit: float | None = None
+    rate_limit: float | None = None
     delay_path: Literal["command", "measurement"] = "command"
 
     def __init__(
@@ -89,7 +96,9 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         *,
         delay: float | None = None,
         sample_time: float | None = None,
-        limit: float | None = None,
+        limit: float | tuple[float, float] | None = None,
+        rate_limit: float | None = None,
+        computation_time: float = 0.0,
         delay_path: Literal["command", "measurement"] = "command",
     ) -> None:
         own, in_series = (plant, 0.0) if isinstance(plant, Plant) else plant_and_delay(plant)
@@ -101,7 +110,13 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
                 )
             delay = in_series + (0.0 if delay is None else non_negative("delay", delay))
         controls = controller_of(controller)
-        specification = LoopSpecification(own, controls, delay, sample_time, limit, delay_path)
+        if computation_time:
+            delay = _with_computation(computation_time, delay, delay_path)
+        # Two bounds become what refuses to be one number.
+        bound: Any = limit
+        specification = LoopSpecification(
+            own, controls, delay, sample_time, bound, rate_limit, delay_path
+        )
         given = vars(specification)
         mine = {name: given[name] for name in _NAMES}
         mine["specification"] = specification
@@ -111,10 +126,23 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         # Without what is kept for speed.
         return _loop_of, tuple(getattr(self, name) for name in _NAMES)
 
+    def __repr__(self) -> str:
+        shown = [
+            f"{name}={getattr(self, name)!r}"
+            for name in _NAMES
+            if name != "rate_limit" or self.rate_limit is not None
+        ]
+        return f"ControlLoop({', '.join(shown)})"
+
     @property
     def is_sampled(self) -> bool:
         """Whether the command is held between samples."""
         return self.sample_time is not None
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest command, infinite where there is no limit."""
+        return self.specification.bounds
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -123,7 +151,8 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         Returns
         -------
         dict of str to float
-            ``delay``, ``sample_time`` and ``limit`` are there where they are not None.
+            ``delay``, ``sample_time``, ``limit`` and ``rate_limit`` are there where they are not
+            None, and unequal limits as ``limit_low`` and ``limit_high``.
         """
         return self.specification.parameters
 
@@ -152,6 +181,9 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
         {'gain': 1.0, 'lag': 0.0, 'Kp': 3.0, 'delay': 0.36}
         """
         parts = {name: changes.pop(name, getattr(self, name)) for name in _NAMES}
+        if is_unequal(parts["limit"]):
+            pairs = zip(UNEQUAL, self.bounds, strict=True)
+            parts["limit"] = tuple(changes.pop(name, own) for name, own in pairs)
         for part in ("plant", "controller"):
             if isinstance(parts[part], (Plant, Controller)):
                 mine = parts[part].parameters
@@ -219,3 +251,19 @@ _NAMES = tuple(field.name for field in fields(LoopSpecification))
 
 def _loop_of(*values: Any) -> ControlLoop:
     return ControlLoop(**dict(zip(_NAMES, values, strict=True)))
+
+
+def _with_computation(time: float, delay: float | None, path: str) -> float:
+    """The delay with a computation time, which acts like it."""
+    time = non_negative("computation_time", time)
+    if delay is None:
+        raise ValueError(
+            f"computation_time={time:g} is added to the delay, which is None: give both, or "
+            "their sum as the delay once it is known"
+        )
+    if path == "measurement":
+        raise ValueError(
+            f"computation_time={time:g} delays the command, and delay_path='measurement' has "
+            "the delay elsewhere: leave one of them out"
+        )
+    return non_negative("delay", delay) + time

@@ -1,7 +1,8 @@
 r"""Controllers: what turns the reference r and the measured output y into the command u.
 
-Each is linear in its gains: u = R(s) r - F(s) y. The derivative is either ideal, H(s) = s, or
-filtered, H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled
+Each is linear in its gains: u = R(s) r - F(s) y. Weights of the reference and a feed-forward make
+the two differ, and act on the response to the reference alone. The derivative is either ideal, H(s)
+= s, or filtered, H(s) = \ :math:`\omega^2 s / (s^2 + 2 \zeta \omega s + \omega^2)`. In a sampled
 loop filter and integrator stay continuous and are sampled with the rest: this is exact.
 """
 
@@ -12,11 +13,17 @@ from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, NamedTuple
 
-from deadtime._base.validation import finite
+from deadtime._base.validation import finite, positive
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation
 from deadtime.loops._given_plants import transfer_function_of
 from deadtime.loops._native import feedback_polynomials
 from deadtime.systems import TransferFunction
+
+#: Numbers that a controller may have besides its gains and its filter, in the kernel's order.
+_EXTRAS = ("weight", "derivative_weight", "feed_forward")
+
+#: Parts of a controller that are no gains.
+_OTHERS = frozenset((*_EXTRAS, "filter", "anti_windup"))
 
 
 class ControllerForm(NamedTuple):
@@ -26,6 +33,64 @@ class ControllerForm(NamedTuple):
     is_filtered: bool = False
     #: How its filter runs in a sampled loop; None: continuous.
     rule: Discretisation | None = None
+    #: Names of further numbers: weights, feed-forward, tracking time.
+    extras: tuple[str, ...] = ()
+    #: Whether the integral stops while it would drive the command further out of its bounds.
+    stops: bool = False
+
+
+@dataclass(frozen=True)
+class BackCalculation:
+    """Anti-windup by back-calculation: the integral follows the command behind its limits.
+
+    The integral of a controller gains (v - u)/tracking_time, v the command after all limits and u
+    the one before (Åström and Hägglund, Advanced PID Control, 2006, section 3.5). A time between
+    those of derivative and integral action is usual, sqrt(Ti Td); for PI, Ti.
+
+    Parameters
+    ----------
+    tracking_time : float
+        Time constant Tt in s: a short one unwinds fast, and lets short peaks of the command reset
+        the integral.
+
+    Raises
+    ------
+    ValueError
+        If it is not positive.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> guarded = dtm.PI(Kp=1.0, Ki=0.5, anti_windup=dtm.loops.BackCalculation(tracking_time=2.0))
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), guarded, delay=0.1, limit=0.2)
+    >>> plain = loop.replace(controller=dtm.PI(Kp=1.0, Ki=0.5))
+    >>> round(loop.step_response().info()["overshoot"])
+    13
+    >>> round(plain.step_response().info()["overshoot"])
+    68
+    """
+
+    tracking_time: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tracking_time", positive("tracking_time", self.tracking_time))
+
+
+@dataclass(frozen=True)
+class ConditionalIntegration:
+    """Anti-windup by conditional integration: the integral stops while it would make it worse.
+
+    It stops while the command is beyond a limit and the control error would drive it further. In
+    continuous time the command may stay at the limit; the integral then follows from that.
+
+    Examples
+    --------
+    >>> import deadtime as dtm
+    >>> guarded = dtm.PI(Kp=1.0, Ki=0.5, anti_windup=dtm.loops.ConditionalIntegration())
+    >>> loop = dtm.ControlLoop(dtm.Integrator(), guarded, delay=0.1, limit=0.2)
+    >>> round(loop.step_response().info()["overshoot"])
+    4
+    """
 
 
 @dataclass(frozen=True)
@@ -47,12 +112,33 @@ class Controller:
         smooth = self._filter
         if smooth is not None and not isinstance(smooth, DerivativeFilter):
             raise TypeError(f"filter={smooth!r}: give a DerivativeFilter or None")
+        for name in _EXTRAS:
+            given = getattr(self, name, None)
+            if given is not None:
+                object.__setattr__(self, name, finite(name, given))
+        guard = getattr(self, "anti_windup", None)
+        if isinstance(guard, (int, float)):
+            guard = BackCalculation(guard)
+            object.__setattr__(self, "anti_windup", guard)
+        if not isinstance(guard, (BackCalculation, ConditionalIntegration, type(None))):
+            raise TypeError(
+                f"anti_windup={guard!r}: give a BackCalculation, a ConditionalIntegration or None"
+            )
+
+    def __repr__(self) -> str:
+        given = {part.name: getattr(self, part.name) for part in fields(self)}
+        shown = [
+            f"{name}={value!r}"
+            for name, value in given.items()
+            if value is not None or name == "filter" or name not in _OTHERS
+        ]
+        return f"{type(self).__name__}({', '.join(shown)})"
 
     @classmethod
     @cache
     def _gains(cls) -> tuple[str, ...]:
         """Names of the gains."""
-        return tuple(field.name for field in fields(cls) if field.name != "filter")
+        return tuple(field.name for field in fields(cls) if field.name not in _OTHERS)
 
     @property
     def gains(self) -> dict[str, float]:
@@ -65,10 +151,24 @@ class Controller:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The gains, and ``omega`` and ``damping`` of the filter where there is one."""
+        """The named numbers: the gains, and those of the other parts that there are.
+
+        A filter has ``omega`` and ``damping``. ``weight``, ``derivative_weight`` and
+        ``feed_forward`` are there where they are given, ``tracking_time`` with back-calculation.
+        """
         numbers, smooth = self.gains, self._filter
         if smooth is not None:
             numbers |= {"omega": smooth.omega, "damping": smooth.damping}
+        return numbers | self._extras
+
+    @property
+    def _extras(self) -> dict[str, float]:
+        """Weights, feed-forward and tracking time, where they are given, in the kernel's order."""
+        given = {name: getattr(self, name, None) for name in _EXTRAS}
+        numbers = {name: value for name, value in given.items() if value is not None}
+        guard = getattr(self, "anti_windup", None)
+        if isinstance(guard, BackCalculation):
+            numbers["tracking_time"] = guard.tracking_time
         return numbers
 
     def transfer_function(self) -> TransferFunction:
@@ -107,18 +207,25 @@ class Controller:
                 damping=numbers.get("damping", self._filter.damping),
                 discretisation=self._filter.discretisation,
             )
+        extras = self._extras
+        changed |= {name: numbers.get(name, extras[name]) for name in _EXTRAS if name in extras}
+        guard = getattr(self, "anti_windup", None)
+        if isinstance(guard, BackCalculation):
+            guard = BackCalculation(numbers.get("tracking_time", guard.tracking_time))
+        if guard is not None:
+            changed["anti_windup"] = guard
         return type(self)(**changed)
 
     @property
     def _form(self) -> ControllerForm:
         """What it is without its numbers."""
         kind, smooth = type(self).__name__, self._filter
-        if smooth is None:
-            return ControllerForm(kind)
-        return ControllerForm(kind, True, smooth.discretisation)
+        stops = isinstance(getattr(self, "anti_windup", None), ConditionalIntegration)
+        rule = None if smooth is None else smooth.discretisation
+        return ControllerForm(kind, smooth is not None, rule, tuple(self._extras), stops)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class P(Controller):
     """Proportional controller, u = Kp (r - y).
 
@@ -126,6 +233,8 @@ class P(Controller):
     ----------
     Kp : float
         Gain, not zero.
+    feed_forward : float, optional
+        Gain of the reference past the controller, added to the command.
 
     Raises
     ------
@@ -140,9 +249,10 @@ class P(Controller):
     """
 
     Kp: float
+    feed_forward: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PV(Controller):
     """Proportional and velocity controller, u = Kp (r - y) - Kv H y.
 
@@ -155,6 +265,8 @@ class PV(Controller):
     filter : DerivativeFilter, optional
         H(s); without it the derivative is ideal and the loop is neutral where the plant's
         relative degree is one.
+    feed_forward : float, optional
+        Gain of the reference past the controller, added to the command.
 
     Raises
     ------
@@ -171,9 +283,10 @@ class PV(Controller):
     Kp: float
     Kv: float
     filter: DerivativeFilter | None = None
+    feed_forward: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PD(Controller):
     """Proportional and derivative controller, u = Kp e + Kd H e with e = r - y.
 
@@ -184,6 +297,13 @@ class PD(Controller):
     filter : DerivativeFilter, optional
         H(s); without it the derivative is ideal, and a step of the reference is an impulse of the
         command, which a limited or sampled loop does not see.
+    weight : float, optional
+        Weight b of the reference in the proportional term, Kp (b r - y); one without it. Below one,
+        a step of the reference overshoots less; responses to loads stay as they are.
+    derivative_weight : float, optional
+        Weight c of the reference in the derivative, Kd H (c r - y); one without it.
+    feed_forward : float, optional
+        Gain of the reference past the controller, added to the command.
 
     Raises
     ------
@@ -201,16 +321,27 @@ class PD(Controller):
     Kp: float
     Kd: float
     filter: DerivativeFilter | None = None
+    weight: float | None = None
+    derivative_weight: float | None = None
+    feed_forward: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PI(Controller):
     """Proportional and integral controller, u = Kp e + Ki ∫ e dt with e = r - y.
 
     Parameters
     ----------
     Kp, Ki : float
-        Gains, not both zero. The integral does not stop while the command is limited.
+        Gains, not both zero.
+    weight : float, optional
+        Weight b of the reference in the proportional term, Kp (b r - y); one without it. Below one,
+        a step of the reference overshoots less; responses to loads stay as they are.
+    feed_forward : float, optional
+        Gain of the reference past the controller, added to the command.
+    anti_windup : BackCalculation, ConditionalIntegration or float, optional
+        What keeps the integral from winding up while the command is limited; a number is the
+        tracking time of back-calculation in s. Without it the integral does not stop.
 
     Raises
     ------
@@ -226,19 +357,32 @@ class PI(Controller):
 
     Kp: float
     Ki: float
+    weight: float | None = None
+    feed_forward: float | None = None
+    anti_windup: BackCalculation | ConditionalIntegration | float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PID(Controller):
     """Proportional, integral and derivative controller, u = Kp e + Ki ∫ e dt + Kd H e, e = r - y.
 
     Parameters
     ----------
     Kp, Ki, Kd : float
-        Gains, not all zero. The integral does not stop while the command is limited.
+        Gains, not all zero.
     filter : DerivativeFilter, optional
         H(s); without it the derivative is ideal, and a step of the reference is an impulse of the
         command, which a limited or sampled loop does not see.
+    weight : float, optional
+        Weight b of the reference in the proportional term, Kp (b r - y); one without it. Below one,
+        a step of the reference overshoots less; responses to loads stay as they are.
+    derivative_weight : float, optional
+        Weight c of the reference in the derivative, Kd H (c r - y); one without it.
+    feed_forward : float, optional
+        Gain of the reference past the controller, added to the command.
+    anti_windup : BackCalculation, ConditionalIntegration or float, optional
+        What keeps the integral from winding up while the command is limited; a number is the
+        tracking time of back-calculation in s. Without it the integral does not stop.
 
     Raises
     ------
@@ -256,3 +400,7 @@ class PID(Controller):
     Ki: float
     Kd: float
     filter: DerivativeFilter | None = None
+    weight: float | None = None
+    derivative_weight: float | None = None
+    feed_forward: float | None = None
+    anti_windup: BackCalculation | ConditionalIntegration | float | None = None

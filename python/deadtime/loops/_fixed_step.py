@@ -27,7 +27,7 @@ class FixedStepSettings:
 
     delay: float
     delay_path: str
-    limit: float | None
+    bounds: tuple[float, float] | None
     sample_steps: int | None
     solver: str
     step: float
@@ -108,6 +108,11 @@ def simulate_fixed_step(
     if duration < 0.0:
         raise ValueError(f"end={duration} s lies before the start of the run at 0")
     refuse_discretised(loop.controller, loop.sample_time, "a run in fixed steps")
+    if loop.rate_limit is not None or getattr(loop.controller, "anti_windup", None) is not None:
+        raise ValueError(
+            "a run in fixed steps has no rate_limit and no anti_windup: leave them out, or use "
+            "loop.simulate"
+        )
     specification = loop.specification
     delay = specification.known_delay
     initial = finite("initial_output", initial_output)
@@ -123,7 +128,7 @@ def simulate_fixed_step(
     settings = FixedStepSettings(
         delay=delay,
         delay_path=loop.delay_path,
-        limit=loop.limit,
+        bounds=None if loop.limit is None else specification.bounds,
         sample_steps=_sample_steps(loop.sample_time, length),
         solver=solver,
         step=length,

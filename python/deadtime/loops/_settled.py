@@ -31,9 +31,10 @@ TIME_CONSTANTS = 3.0
 _AT_LIMIT = 1e-12
 
 
-def rests_at_limit(command: ArrayLike, limit: ArrayLike) -> Mask:
-    """Whether the command that the reference needs at rest is as large as the limit, or larger."""
-    return np.asarray(np.abs(command) >= np.multiply(limit, 1.0 - _AT_LIMIT))
+def rests_at_limit(command: ArrayLike, bounds: tuple[ArrayLike, ArrayLike]) -> Mask:
+    """Whether the command that the reference needs at rest is at one of its bounds, or beyond."""
+    low, high = (np.multiply(bound, 1.0 - _AT_LIMIT) for bound in bounds)
+    return np.asarray((np.asarray(command) >= high) | (np.asarray(command) <= low))
 
 
 def time_inside(
@@ -69,11 +70,12 @@ def stays_settled(
     It is a matter of the loop only if its command was or is to be at the limit. `times` count from
     the start.
     """
-    if loop.limit is None or not np.isfinite(settled):
+    if (loop.limit is None and loop.rate_limit is None) or not np.isfinite(settled):
         return True
+    low, high = loop.bounds
     command = loop.command_at_rest(reference)
-    rests = command is not None and bool(rests_at_limit(command, loop.limit))
-    limited = np.flatnonzero(np.abs(inputs) >= loop.limit)
+    rests = command is not None and bool(rests_at_limit(command, loop.bounds))
+    limited = np.flatnonzero((inputs >= high) | (inputs <= low))
     if not (limited.size or rests):
         return True
     # The command left its limit before the output after the last one at which it was there.

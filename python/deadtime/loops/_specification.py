@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,15 @@ if TYPE_CHECKING:
     from deadtime.loops._runs import LoopRun
 
 
+#: The names of unequal limits of the command, the least one first.
+UNEQUAL = ("limit_low", "limit_high")
+
+#: Numbers that the poles of a loop do not depend on.
+_WITHOUT_POLES = (
+    *("limit", *UNEQUAL, "rate_limit", "tracking_time"),
+    *("weight", "derivative_weight", "feed_forward"),
+)
+
 #: Where the delay of a loop can sit.
 DELAY_PATHS = ("command", "measurement")
 
@@ -42,6 +51,7 @@ class LoopSpecification(PickledByFields):
     delay: float | None = None
     sample_time: float | None = None
     limit: float | None = None
+    rate_limit: float | None = None
     delay_path: Literal["command", "measurement"] = "command"
 
     def __post_init__(self) -> None:
@@ -54,7 +64,9 @@ class LoopSpecification(PickledByFields):
         if self.sample_time is not None:
             object.__setattr__(self, "sample_time", positive("sample_time", self.sample_time))
         if self.limit is not None:
-            object.__setattr__(self, "limit", positive("limit", self.limit))
+            object.__setattr__(self, "limit", _limit(self.limit))
+        if self.rate_limit is not None:
+            object.__setattr__(self, "rate_limit", positive("rate_limit", self.rate_limit))
         if self.delay_path not in DELAY_PATHS:
             raise ValueError(
                 f"delay_path={self.delay_path!r}: give one of {', '.join(map(repr, DELAY_PATHS))}"
@@ -64,7 +76,8 @@ class LoopSpecification(PickledByFields):
             return
         if not self.plant.is_linear:
             return
-        for name, value in (("sample_time", self.sample_time), ("limit", self.limit)):
+        for name in ("sample_time", "limit", "rate_limit"):
+            value = getattr(self, name)
             if value is not None:
                 raise ValueError(
                     f"{name}={value}: a hold or a limit needs a plant that is rational but for one "
@@ -75,11 +88,27 @@ class LoopSpecification(PickledByFields):
     def parameters(self) -> dict[str, float]:
         """The named numbers of plant and controller, then those of the loop that are not None."""
         numbers = self.plant.parameters | self.controller.parameters
-        own = (("delay", self.delay), ("sample_time", self.sample_time), ("limit", self.limit))
-        for name, value in own:
-            if value is not None:
-                numbers[name] = value
+        numbers |= {
+            name: value
+            for name in ("delay", "sample_time")
+            if (value := getattr(self, name)) is not None
+        }
+        if is_unequal(self.limit):
+            numbers |= dict(zip(UNEQUAL, self.bounds, strict=True))
+        elif self.limit is not None:
+            numbers["limit"] = self.limit
+        if self.rate_limit is not None:
+            numbers["rate_limit"] = self.rate_limit
         return numbers
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest command, infinite where there is none."""
+        given: object = self.limit
+        if isinstance(given, UnequalLimits):
+            return given.low, given.high
+        limit = np.inf if self.limit is None else self.limit
+        return -limit, limit
 
     @property
     def known_delay(self) -> float:
@@ -118,7 +147,7 @@ class LoopSpecification(PickledByFields):
             ([*numbers.values()], [*controller.parameters.values()]),
             delay=0.0 if self.delay is None else self.delay,
             sample_time=self.sample_time,
-            limit=self.limit,
+            bounds=_Bounds(self),
             is_measured=self.delay_path == "measurement",
             given=plant._given(numbers),
         )
@@ -211,7 +240,8 @@ class LoopSpecification(PickledByFields):
     def steady_state(self, reference: float) -> float | None:
         """Output at rest under a constant reference; None without such a rest within the limit."""
         command = self.command_at_rest(reference)
-        if command is None or (self.limit is not None and abs(command) > self.limit):
+        low, high = self.bounds
+        if command is None or not low <= command <= high:
             return None
         return self.kernel.rest_gains()[0] * reference
 
@@ -221,10 +251,72 @@ class LoopSpecification(PickledByFields):
         return None if np.isnan(output) else command * reference
 
 
+class _Bounds:
+    """Bounds of the command as the kernel takes them."""
+
+    def __init__(self, loop: LoopSpecification) -> None:
+        low, high = loop.bounds
+        self.limit = None if loop.limit is None else high
+        self.low = low if is_unequal(loop.limit) else None
+        self.rate = loop.rate_limit
+
+
+class UnequalLimits:
+    """The least and the greatest command, where a number is asked for that neither is."""
+
+    __array_ufunc__ = None
+
+    def __init__(self, low: float, high: float) -> None:
+        self.low, self.high = low, high
+
+    def __repr__(self) -> str:
+        return f"({self.low!r}, {self.high!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, UnequalLimits) and hash(self) == hash(other)
+
+    def __hash__(self) -> int:
+        return hash((self.low, self.high))
+
+    def _refuse(self, *_: object) -> NoReturn:
+        raise ValueError(
+            f"limit={self!r}: this takes a loop with equal limits of its command, or none; give "
+            "loop.replace(limit=...) one number"
+        )
+
+    __float__ = __neg__ = __abs__ = __format__ = _refuse
+    __lt__ = __le__ = __gt__ = __ge__ = _refuse
+    __add__ = __radd__ = __sub__ = __rsub__ = _refuse
+    __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _refuse
+
+
+def is_unequal(limit: object) -> bool:
+    """Whether a limit has two bounds that are not alike."""
+    return isinstance(limit, UnequalLimits)
+
+
+def _limit(limit: Any) -> Any:
+    """Check the limit of a command; one number where both bounds are alike."""
+    if isinstance(limit, UnequalLimits):
+        return limit
+    if not isinstance(limit, (tuple, list)):
+        return positive("limit", limit)
+    if len(limit) != 2:
+        raise ValueError(f"limit={limit!r}: give a number, or the least and the greatest command")
+    low, high = (float("nan") if x is None else float(x) for x in limit)
+    if not (low < high and low <= 0.0 <= high):
+        raise ValueError(
+            f"limit={limit!r}: give the least and the greatest command, zero between them; "
+            "float('inf') for none"
+        )
+    return high if low == -high else UnequalLimits(low, high)
+
+
 def numbers_of(parameters: Mapping[str, float | None], names: Collection[str]) -> dict[str, Any]:
     """Return the numbers of a loop that stability depends on; `names` must be among them."""
     values: dict[str, Any] = {**parameters}
-    values.pop("limit", None)
+    for name in _WITHOUT_POLES:
+        values.pop(name, None)
     unknown = [name for name in names if name not in values and name != "delay"]
     if unknown:
         raise ValueError(

@@ -38,7 +38,7 @@ from deadtime.loops._settled import (
     slowest_rates,
     time_inside,
 )
-from deadtime.loops._specification import refuse_discretised
+from deadtime.loops._specification import UNEQUAL, refuse_discretised
 from deadtime.systems import first_duration
 
 # Sets that have not settled are simulated again over a longer time. The simulation times are the
@@ -215,9 +215,10 @@ def sweep(
         The loop, with the numbers that are the same in all sets.
     values : mapping of str to (low, high, n) or array_like
         Numbers that vary, by their names in `ControlLoop.parameters`, or ``delay``,
-        ``sample_time`` and ``limit``. Each range ``(low, high, n)`` of n points is an axis of the
-        results, in the order given; two of them make a grid. Arrays broadcast against one another
-        on the axes after these: arrays of equal length give one set for each index.
+        ``sample_time``, ``limit`` and ``rate_limit``. Each range ``(low, high, n)`` of n points is
+        an axis of the results, in the order given; two of them make a grid. Arrays broadcast
+        against one another on the axes after these: arrays of equal length give one set for each
+        index.
     time : float or array_like, shape (n,)
         For metrics, the time in s up to which responses are measured, from zero; of an array, the
         first and the last time. By default ten times the longest delay or time constant; for sets
@@ -512,8 +513,14 @@ class _Sets:
     def at_limit(self) -> tuple[Array, Mask]:
         """Decay rates of plant and controller alone, 1/s, and which commands rest at the limit."""
         command, slowest = self.kernel.sweep_rest(self.native)
-        limit = self.native.values.get("limit", self.loop.limit or np.inf)
-        return slowest_rates(slowest).reshape(self.shape), rests_at_limit(command, limit).reshape(
+        values = self.native.values
+        own = self.loop.bounds
+        if "limit" in values:
+            bounds: Any = (-values["limit"], values["limit"])
+        else:
+            pairs = zip(UNEQUAL, own, strict=True)
+            bounds = tuple(values.get(name, bound) for name, bound in pairs)
+        return slowest_rates(slowest).reshape(self.shape), rests_at_limit(command, bounds).reshape(
             self.shape
         )
 

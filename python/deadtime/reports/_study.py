@@ -201,12 +201,12 @@ def study(
     report("mapping the gains")
     template = PV(Kp=1.0, Kv=0.1, filter=PAPER_FILTER)
     interval = comparison.best.ci(0.95, "delay")
-    designed = design(fitted, controller=template, delay=interval)
+    designed = design(fitted, controller=template, delay=interval, objective="abscissa")
     report("designing without the delay, for comparison")
     # Without delay and hold no gain is too large: the same gains are looked at as with the delay.
     axes = designed.charts[0].axes.items()
     same = None if fitted.is_sampled else {name: (one[0], one[-1]) for name, one in axes}
-    naive = design(fitted, controller=template, delay=0.0, ranges=same)
+    naive = design(fitted, controller=template, delay=0.0, ranges=same, objective="abscissa")
     report("simulating both designs")
     loop_of_responses = fitted if truth is None else truth.truth
     responses = {

@@ -1,9 +1,11 @@
 """Choose the gains of a loop whose delay is known up to an interval.
 
 `design` looks for gains that are best in the worst case over delay and gain of the plant and keep
-their margins there, and `design_filter` chooses the filter of the derivative. `adaptive_gains`
-makes a list of gains for a delay that moves, with a proof. `settings_of` writes gains in the forms
-that people type in, `controller_of` reads them. `tune` goes from a recording to such gains.
+their margins there, and `design_filter` chooses the filter of the derivative. `rules` has the gains
+by rules of thumb beside them, and `check_gains` is the gate before gains are set in a machine.
+`adaptive_gains` makes a list of gains for a delay that moves, with a proof. `settings_of` writes
+gains in the forms that people type in, `controller_of` reads them. `tune` goes from a recording to
+such gains.
 """
 
 # The files. `_problem` holds what is free and what is not known, `_region` the region of an
@@ -11,13 +13,17 @@ that people type in, `controller_of` reads them. `tune` goes from a recording to
 # must hold. `_candidates` hands loops to the kernel, which judges many of them at once and improves
 # gains. `_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the
 # delay at which they are worst and repeats the search until it finds none that is worse, and
-# `_made` puts the result together. `_filter_choice` chooses the filter of the derivative.
+# `_made` puts the result together. `_responses` designs by responses under the demands of
+# `_demands`, in one call of the kernel; `_rules` is the table of rules and `_gate` the gate.
+# `_filter_choice` chooses the filter of the derivative.
 
 from deadtime.tuning._design import design
 from deadtime.tuning._filter_choice import design_filter
+from deadtime.tuning._gate import Gate, check_gains
 from deadtime.tuning._live import live_design as live_design
 from deadtime.tuning._region import ConfidenceRegion
 from deadtime.tuning._result import Design, FilterChoice, LeastMargins, Trade
+from deadtime.tuning._rules import RuleFigures, RuleTable, rules
 from deadtime.tuning._stabilising import critical_gain
 from deadtime.tuning.adaptive import (
     Choice,
@@ -49,22 +55,27 @@ __all__ = [
     "GainFollower",
     "GainSchedule",
     "GainSet",
+    "Gate",
     "IdealForm",
     "LeastMargins",
     "ParallelForm",
     "Prediction",
     "Proposal",
+    "RuleFigures",
+    "RuleTable",
     "SeriesForm",
     "Settings",
     "SwitchingProof",
     "Trade",
     "adaptive_gains",
+    "check_gains",
     "controller_of",
     "critical_gain",
     "design",
     "design_filter",
     "one_pole_filter",
     "proportional_band",
+    "rules",
     "settings_of",
     "tune",
 ]

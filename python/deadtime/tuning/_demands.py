@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from deadtime._base.validation import finite, positive
 from deadtime.loops import ControlLoop
@@ -17,7 +18,7 @@ _BANDWIDTH = 100.0
 class Demands:
     """What must hold in every scenario; None where nothing is demanded."""
 
-    margins: RequiredMargins = RequiredMargins()
+    margins: RequiredMargins
     max_sensitivity: float | None = None
     noise_gain: float | None = None
     settling_time: float | None = None
@@ -63,7 +64,8 @@ class Demands:
         """The others."""
         if name in self.margins.named:
             return replace(self, margins=self.margins.without(name))
-        return replace(self, **{name: None})
+        nothing: dict[str, Any] = {name: None}
+        return replace(self, **nothing)
 
 
 def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:

@@ -7,9 +7,11 @@ from dataclasses import replace
 from typing import Literal
 
 from deadtime._base.validation import finite
+from deadtime.estimation import PlantEstimate
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._demands import Demands
 from deadtime.tuning._filter_choice import filter_choice
+from deadtime.tuning._found_plants import loops_around, refusal
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
 from deadtime.tuning._objectives import objective_named
@@ -49,8 +51,10 @@ def design(
 
     Parameters
     ----------
-    loop : ControlLoop, DelayEstimate or a plant
-        Plant, delay, hold and limit; its controller is replaced. With an estimate the gains are the
+    loop : ControlLoop, DelayEstimate, PlantEstimate or a plant
+        Plant, delay, hold and limit; its controller is replaced. With a `PlantEstimate`, for loads
+        and set points, the gains hold for all ends of the intervals of delay, gain and largest time
+        constant. With an estimate the gains are the
         best for the worst loop of its joint confidence region of delay, gain and lag. A plant of
         any kind that `ControlLoop` takes stands for the continuous loop around it without a limit.
     controller : Controller or class of one
@@ -65,10 +69,10 @@ def design(
     objective : str
         ``"load"``, the default: the response to a step of a load at the plant's input, the integral
         of its modulus (IAE) for a unit load. ``"load_ie"``: the integral of the error, which is
-        1/abs(Ki). Without an integral term both are the deviation at rest, abs(P/(1 + P Kp)) with the
-        steady gain P of the plant, 1/abs(Kp) of an integrating one. ``"set_point"``: the integral of
-        abs(y - rest) after a unit step of the reference. ``"set_point_settling"``: its 2 % settling
-        time. The limit is left out of all four.
+        1/abs(Ki). Without an integral term both are the deviation at rest, abs(P/(1 + P Kp)) with
+        the steady gain P of the plant, 1/abs(Kp) of an integrating one. ``"set_point"``: the
+        integral of abs(y - rest) after a unit step of the reference. ``"set_point_settling"``: its
+        2 % settling time. The limit is left out of all four.
         ``"abscissa"``: the spectral abscissa smallest (the most stable gains). ``"damping"``: the
         damping ratio of the dominant poles largest. ``"settling_time"``: the 2 % settling time of
         a step smallest, hold and limit included. ``"overshoot"``: its overshoot smallest, which is
@@ -102,9 +106,10 @@ def design(
         corner as `design_filter` does, which knows no loads and set points.
     ranges : mapping of str to (float, float), optional
         Where to look for each free gain. If not given, loads and set points look at all ratios of
-        the gains up to hundreds of times their time scale; the others from the stability limit under proportional
-        control, negative for a plant that needs negative gains; where no proportional gain is
-        stable, around what the plant's response at one over the delay asks for.
+        the gains up to hundreds of times their time scale; the others from the stability limit
+        under proportional control, negative for a plant that needs negative gains; where no
+        proportional gain is stable, around what the plant's response at one over the delay asks
+        for.
     shape : tuple of int, optional
         Points of the map that the search starts from, along each free gain.
     amplitude : float
@@ -173,17 +178,28 @@ def design(
         raise ValueError(f"filter={filter!r}: give a DerivativeFilter, 'auto' or None")
     required = RequiredMargins.checked(gain_margin, phase_margin, delay_margin)
     demands = Demands.checked(required, max_sensitivity, noise_gain, settling_time, bandwidth)
+    doubt = None
+    if isinstance(loop, PlantEstimate) and objective in RESPONSES:
+        doubt = refusal(loop)
+        if doubt is not None and not allow_indication:
+            raise ValueError(
+                f"the estimate is an indication, so that the margins of a design on it are not "
+                f"known ({doubt}): take allow_indication=True for gains without known margins"
+            )
+        loop, *around = loops_around(loop, template, level)
+        plants = (*plants, *around)
     problem = pose(
         loop, template, delay, gain, fixed, ranges, amplitude, threads, level, allow_indication
     )
     if objective in RESPONSES:
         if filter == "auto":
             raise ValueError(
-                f"filter='auto' and objective={objective!r}: give a DerivativeFilter, or choose its "
-                "corner by 'abscissa', 'damping' or 'settling_time'"
+                f"filter='auto' and objective={objective!r}: give a DerivativeFilter, or choose "
+                "its corner by 'abscissa', 'damping' or 'settling_time'"
             )
         weight = _load_weight(objective, load_weight)
-        return Wanted(problem, objective, weight, demands, _loops_of(plants, template)).design()
+        others = _loops_of(plants, template)
+        return Wanted(problem, objective, weight, demands, others, doubt).design()
     goal = objective_named(objective)
     _refuse_responses(objective, demands, load_weight, plants)
     if filter != "auto":

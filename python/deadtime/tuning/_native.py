@@ -9,7 +9,6 @@ from deadtime._deadtime import (
     half_rule as half_rule,
     lasting_load as lasting_load,
     noise_gain as noise_gain,
-    response_figures as response_figures,
     robust_gains as robust_gains,
     tuning_rules as tuning_rules,
 )

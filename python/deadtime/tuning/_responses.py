@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from deadtime.loops import ControlLoop
+from deadtime.loops import PI, PID, ControlLoop, sweep
 from deadtime.tuning._candidates import Scenario
 from deadtime.tuning._demands import Demands, white_to
 from deadtime.tuning._exchange import fine, proved
@@ -21,8 +21,8 @@ from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
 from deadtime.tuning._settling import step_info
 
-#: Objectives that are responses, and how the kernel names them: whether the integral of the error of
-#: a load counts, and whether the settling time of a set point does.
+#: Objectives that are responses, and how the kernel names them: whether the integral of the error
+#: of a load counts, and whether the settling time of a set point does.
 RESPONSES: dict[str, tuple[bool, bool]] = {
     "load": (False, False),
     "load_ie": (True, False),
@@ -30,12 +30,15 @@ RESPONSES: dict[str, tuple[bool, bool]] = {
     "set_point_settling": (False, True),
 }
 
-#: Largest Ms where nothing is asked for: that of SIMC (Skogestad 2003, table 1), and in the middle of
-#: what Astrom and Hagglund (2006, section 4.5) call reasonable, 1.2 to 2.
+#: Largest Ms where nothing is asked for: that of SIMC (Skogestad 2003, table 1), and in the middle
+#: of what Astrom and Hagglund (2006, section 4.5) call reasonable, 1.2 to 2.
 MAX_SENSITIVITY = 1.6
 
 #: A figure at most this factor from its demand limits the design.
 _ACTIVE = 1.0 + 1e-3
+
+#: Weights of the reference that are tried: more of them settle a little earlier.
+_WEIGHTS = np.linspace(0.0, 1.0, 41)
 
 #: Relative loss that counts as none.
 _NOTHING = 1e-3
@@ -52,6 +55,8 @@ class Wanted:
     demands: Demands
     #: Further plants, whose loops must meet the demands as well.
     others: tuple[ControlLoop, ...] = ()
+    #: Why the estimate behind it cannot be relied on.
+    doubt: str | None = None
 
     def gains(
         self, scenarios: Sequence[Scenario], corners: int, demands: Demands | None = None
@@ -91,7 +96,7 @@ class Wanted:
         corners = [problem.middle, *(one for one in problem.corners if one != problem.middle)]
         every = [*corners, *(one for one in fine(problem) if one not in corners)]
         found = self.gains(every, len(corners))
-        gains, middle = found.gains, problem.at(found.gains)
+        gains, middle = found.gains, self._weighted(problem.at(found.gains), corners)
         judged = problem.candidates(corners)
         point = np.array([gains])
         worst = max(range(len(every)), key=lambda place: found.margins[place].max_sensitivity)
@@ -118,7 +123,38 @@ class Wanted:
                 middle.specification.kernel, white_to(middle, self.demands.bandwidth)
             ),
             _problem=problem,
+            _others=tuple(one.replace(controller=middle.controller) for one in self.others),
+            _doubt=self.doubt,
         )
+
+    def _weighted(self, loop: ControlLoop, scenarios: Sequence[Scenario]) -> ControlLoop:
+        """The loop with the weight of the reference with which a step settles first at its worst.
+
+        The weight moves no margin and no response to a load. A weight that is given stays.
+        """
+        controller = loop.controller
+        if not isinstance(controller, (PI, PID)) or controller.weight is not None:
+            return loop
+        if not loop.plant.is_rational:
+            return loop
+        moving = loop.replace(controller=replace(controller, weight=1.0))
+        values = {"weight": _WEIGHTS[:, None]}
+        for name in self.problem.intervals:
+            values[name] = np.array([[one[name] for one in scenarios]])
+        found = sweep(
+            moving,
+            values,
+            amplitude=self.problem.amplitude,
+            metrics=("settling_time",),
+            threads=self.problem.threads,
+        )
+        settled = np.where(np.isnan(found["settling_time"]), np.inf, found["settling_time"])
+        worst = settled.max(axis=1)
+        if not np.isfinite(worst.min()):
+            return loop
+        # The largest weight of those that are as good: its command is not slower than it must be.
+        best = np.flatnonzero(worst <= worst.min() * (1.0 + _NOTHING))[-1]
+        return moving.replace(weight=float(_WEIGHTS[best]))
 
     def _trades(
         self, found: RobustGains, margins: LeastMargins, every: Sequence[Scenario], corners: int
@@ -152,14 +188,14 @@ class Wanted:
         return tuple(made)
 
     def _is_active(self, name: str, asked: float, had: float) -> bool:
-        """Does a demand limit the design? Of those that are not in the margins that is not known."""
+        """Does a demand limit the design? It is not known of those that are no margins."""
         if math.isnan(had):
             return True
         return had * _ACTIVE >= asked if name == "max_sensitivity" else had <= asked * _ACTIVE
 
 
 def _least(found: RobustGains) -> LeastMargins:
-    """Each margin at its least, Ms and Mt at their largest; a delay margin only where it is known."""
+    """Each margin at its least, Ms and Mt at their largest; delay margins as far as known."""
     each = found.margins
     late = [one.delay_margin for one in each if not math.isnan(one.delay_margin)]
     return LeastMargins(

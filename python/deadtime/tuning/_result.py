@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite, nan
@@ -12,11 +13,13 @@ from deadtime._base.digits import between
 from deadtime._base.drawing import Figure
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.notebook import Pictured
-from deadtime.loops import ControlLoop, Explorer, explorer_of
+from deadtime.loops import Controller, ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
 from deadtime.tuning._candidates import Scenario
+from deadtime.tuning._gate import Gate, gate_of_loops
 from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._region import ConfidenceRegion
+from deadtime.tuning._rules import RuleTable, compared
 from deadtime.tuning._survey import Survey, charts_at
 
 
@@ -136,10 +139,12 @@ class Design(ReadOnlyArrays, Pictured):
     region: ConfidenceRegion | None = None
     _problem: Problem | None = field(default=None, repr=False)
     _survey: Survey | None = field(default=None, repr=False)
+    _others: tuple[ControlLoop, ...] = field(default=(), repr=False)
+    _doubt: str | None = field(default=None, repr=False)
 
     @cached_property
     def charts(self) -> tuple[StabilityMap, ...]:
-        """Maps of the gains: for each of `delays`; of one free gain a single one, over gain and delay.
+        """Maps of the gains for each of `delays`; of one free gain a single one.
 
         They are made when they are first asked for.
         """
@@ -159,6 +164,56 @@ class Design(ReadOnlyArrays, Pictured):
     def _late(self) -> str:
         ends = dict.fromkeys((self.delays[0], self.delays[-1]))
         return " to ".join(f"{end:g}" for end in ends)
+
+    def compared(self) -> RuleTable:
+        """Return the gains by rules of thumb beside those of the design, with what each gives.
+
+        Returns
+        -------
+        RuleTable
+            As of `rules`, the design first. All of them on `loop`, where what is not known is in
+            the middle.
+
+        Raises
+        ------
+        ValueError
+            As in `rules`.
+        """
+        return compared(self.loop, "design")
+
+    def gate(
+        self,
+        *,
+        flown: Controller | Mapping[str, float] | None = None,
+        noise: float | None = None,
+        override: bool = False,
+    ) -> Gate:
+        """Return whether the gains may be set in a machine, and why not.
+
+        Parameters
+        ----------
+        flown : Controller or mapping of str to float, optional
+            The gains that the machine has now; a change is not judged if not given.
+        noise : float, optional
+            Standard deviation of the measurement noise.
+        override : bool
+            Set aside that the estimate is an indication; the result says so.
+
+        Returns
+        -------
+        Gate
+            As of `check_gains`, over all that was not known to the design.
+        """
+        problem, region = self._problem, self.region
+        every = [self.loop, *self._others]
+        if problem is not None:
+            gains = [self.gains[name] for name in problem.free]
+            spread = problem.scenarios(3) if region is None else region.points
+            every += [problem.at(gains, one) for one in spread]
+        doubt = self._doubt
+        if region is not None and region.verdict != "reliable":
+            doubt = "it is an indication"
+        return gate_of_loops(every, doubt, flown, noise, override)
 
     def explore(self) -> Explorer:
         """Return a page with the designed loop and the interval of its delay.

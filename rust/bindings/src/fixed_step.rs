@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 pub(crate) struct FixedStepSettings {
     delay: f64,
     delay_path: String,
-    limit: Option<f64>,
+    /// The least and the greatest command.
+    bounds: Option<(f64, f64)>,
     sample_steps: Option<usize>,
     solver: String,
     step: f64,
@@ -42,7 +43,7 @@ impl FixedStepSettings {
         Ok(Settings {
             delay: self.delay,
             path,
-            bounds: self.limit.map(|limit| (-limit, limit)),
+            bounds: self.bounds,
             sample_steps: self.sample_steps,
             solver,
             step: self.step,

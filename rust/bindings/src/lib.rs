@@ -119,8 +119,7 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::tuning::{
-        PyCandidates, RobustGains, half_rule, lasting_load, noise_gain, response_figures,
-        robust_gains, tuning_rules,
+        PyCandidates, RobustGains, half_rule, lasting_load, noise_gain, robust_gains, tuning_rules,
     };
     #[pymodule_export]
     use super::ufunc::limit_threads;

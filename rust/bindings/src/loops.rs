@@ -9,8 +9,9 @@ use deadtime::dde::ensemble::Measures;
 use deadtime::dde::fixed_step::{self, Rest};
 use deadtime::dde::{Criteria, Request};
 use deadtime::loops::{
-    ControlLoop, Controller, Each, Factors, Fraction, GivenPlant, HeldPlane, Input, Kind, Monomial,
-    Path, Place, Plant, Rule, SampledFilter, SlopesAsked, SweptLoops, Symbol, Values,
+    ControlLoop, Controller, Each, Extra, Extras, Factors, Fraction, GivenPlant, HeldPlane, Input,
+    Kind, Monomial, Path, Place, Plant, Rule, SampledFilter, SlopesAsked, SweptLoops, Symbol,
+    Values,
 };
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray1,
@@ -71,6 +72,9 @@ pub(crate) struct ControllerForm {
     kind: String,
     is_filtered: bool,
     rule: Option<String>,
+    /// The names of further numbers: weights, feed-forward, tracking time.
+    extras: Vec<String>,
+    stops: bool,
 }
 
 impl ControllerForm {
@@ -81,12 +85,27 @@ impl ControllerForm {
             Some(name) => Some(Rule::named(name).ok_or_else(|| unknown(name))?),
             None => None,
         };
+        let mut extras = Extras::default();
+        for name in &self.extras {
+            extras = extras.with(Extra::named(name).ok_or_else(|| unknown(name))?);
+        }
         Ok(Controller {
             kind: Kind::named(&self.kind).ok_or_else(|| unknown(&self.kind))?,
             is_filtered: self.is_filtered,
             rule,
+            extras,
+            stops: self.stops,
         })
     }
+}
+
+/// The greatest command, also of the modulus where there is no least one; the least; and the greatest
+/// rate.
+#[derive(FromPyObject)]
+pub(crate) struct CommandBounds {
+    limit: Option<f64>,
+    low: Option<f64>,
+    rate: Option<f64>,
 }
 
 /// One number for all loops, or one for each.
@@ -237,7 +256,7 @@ pub(crate) struct LoopSensitivities {
 #[pymethods]
 impl PyLoop {
     #[new]
-    #[pyo3(signature = (plant, controller, numbers, *, delay, sample_time, limit, is_measured, given=None))]
+    #[pyo3(signature = (plant, controller, numbers, *, delay, sample_time, bounds, is_measured, given=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
     fn new(
         plant: PlantForm<'_>,
@@ -245,7 +264,7 @@ impl PyLoop {
         numbers: (Vec<f64>, Vec<f64>),
         delay: f64,
         sample_time: Option<f64>,
-        limit: Option<f64>,
+        bounds: CommandBounds,
         is_measured: bool,
         given: Option<Given<f64>>,
     ) -> PyResult<Self> {
@@ -255,7 +274,9 @@ impl PyLoop {
             controller: numbers.1,
             delay,
             sample_time,
-            limit,
+            limit: bounds.limit,
+            low: bounds.low,
+            rate: bounds.rate,
             given: given.map(|(num, den)| Fraction { num, den }),
         };
         let path = if is_measured {

@@ -1,7 +1,6 @@
 //! Bindings of `deadtime::tuning`.
 
 use deadtime::Error;
-use deadtime::loops::{ControlLoop, Input};
 use deadtime::tuning::{
     self, Candidates, Decisive, Demands, Goal, Loops, Objective, Posed, Scenario, Wish, Within,
 };
@@ -322,29 +321,6 @@ pub(crate) fn robust_gains(
 #[pyfunction]
 pub(crate) fn noise_gain(py: Python<'_>, of: &PyLoop, bandwidth: f64) -> PyResult<f64> {
     run_here(py, |task| tuning::noise_gain(of.core(), bandwidth, task))
-}
-
-/// Integral of the modulus, peak and settling time after a unit step of the load or the reference, and
-/// overshoot in %.
-#[pyfunction]
-pub(crate) fn response_figures(
-    py: Python<'_>,
-    of: &PyLoop,
-    of_load: bool,
-) -> PyResult<(f64, f64, f64, f64)> {
-    let input = if of_load {
-        Input::Load
-    } else {
-        Input::Reference
-    };
-    let core: &ControlLoop = of.core();
-    let found = run_here(py, |task| tuning::figures(core, input, task))?;
-    Ok((
-        found.iae,
-        found.peak,
-        found.settling_time,
-        found.overshoot,
-    ))
 }
 
 /// What a unit load leaves: the integral of the error, or without an integral the deviation at rest.

@@ -1,7 +1,7 @@
 //! A request: numbers one after the other, lists with their length before them.
 
 use deadtime::Error;
-use deadtime::loops::{ControlLoop, Controller, Factors, Kind, Path, Place, Plant, Values};
+use deadtime::loops::{ControlLoop, Controller, Extras, Factors, Kind, Path, Place, Plant, Values};
 
 /// What is left to read.
 pub(crate) struct Request<'a> {
@@ -121,6 +121,8 @@ impl<'a> Request<'a> {
             kind,
             is_filtered,
             rule: None,
+            extras: Extras::default(),
+            stops: false,
         };
         let plant = Plant::Factors(Factors {
             num,
@@ -135,6 +137,8 @@ impl<'a> Request<'a> {
             delay,
             sample_time: (sample_time > 0.0).then_some(sample_time),
             limit: limit.is_finite().then_some(limit),
+            low: None,
+            rate: None,
             given: None,
         };
         let names = ["gain", "lag"].map(String::from).to_vec();

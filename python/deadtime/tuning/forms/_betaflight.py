@@ -15,7 +15,7 @@ import math
 import re
 from collections.abc import Mapping
 
-from deadtime.loops import PD, PID, Controller, DerivativeFilter
+from deadtime.loops import Controller, DerivativeFilter
 from deadtime.tuning.forms._firmware import NO_FILTER
 from deadtime.tuning.forms._settings import (
     Settings,
@@ -23,7 +23,9 @@ from deadtime.tuning.forms._settings import (
     one_pole_filter,
     parts_of,
     pole_of,
+    refuse_feed_forward,
     rounding_of,
+    weights_of,
 )
 
 SOURCE = "Betaflight 4.3 to 2025.12: src/main/flight/pid.h, pid_init.c, pid.c and common/filter.c"
@@ -95,8 +97,10 @@ def write(controller: Controller, loop: str, version: tuple[int, ...] | None) ->
     for letter, gain, scale in zip("pid", gains, scales(loop), strict=True):
         values[f"{letter}_{axis}"] = _whole(f"{letter}_{axis}", gain, scale, LARGEST)
     notes = list(NOTES)
-    if gains[2] and isinstance(controller, (PD, PID)):
-        values[f"f_{axis}"] = _whole(f"f_{axis}", gains[2], FEEDFORWARD, LARGEST_F)
+    check(controller)
+    weighted = gains[2] * weights_of(controller)[1]
+    if weighted:
+        values[f"f_{axis}"] = _whole(f"f_{axis}", weighted, FEEDFORWARD, LARGEST_F)
     else:
         notes.append(KEPT_F)
     lines = [f"set {name} = {value:.0f}" for name, value in values.items()]
@@ -124,7 +128,11 @@ def write(controller: Controller, loop: str, version: tuple[int, ...] | None) ->
 
 
 def check(controller: Controller) -> None:
-    """Refuse a filter that the firmware lacks."""
+    """Refuse a filter, a weight or a feed-forward that the firmware lacks."""
+    refuse_feed_forward(controller, "betaflight")
+    weight = weights_of(controller)[0]
+    if weight != 1.0:
+        raise ValueError(f"weight={weight:g}: Betaflight has no weight of P: take weight=1")
     smooth = parts_of(controller)[3]
     if smooth is not None:
         _low_pass(smooth)
@@ -146,9 +154,13 @@ def read(given: Mapping[str, float] | str, loop: str) -> Controller:
     if derivative:
         _check_constant(told, axis)
     smooth = _filter_of(told) if derivative else None
-    apart = abs(derivative - _told(told, f"f_{axis}") * FEEDFORWARD)
-    of_error = apart <= SAME_F * max(FEEDFORWARD, scales(loop)[2])
-    return controller_from(proportional, integral, derivative, smooth, not of_error)
+    of_set_point = _told(told, f"f_{axis}") * FEEDFORWARD
+    of_error = abs(derivative - of_set_point) <= SAME_F * max(FEEDFORWARD, scales(loop)[2])
+    weights = {}
+    if integral and derivative and of_set_point and not of_error:
+        weights["derivative_weight"] = of_set_point / derivative
+    on_measurement = not (of_error or weights)
+    return controller_from(proportional, integral, derivative, smooth, on_measurement, **weights)
 
 
 def _of_head(told: dict[str, str], axis: str) -> dict[str, str]:

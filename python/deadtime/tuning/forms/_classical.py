@@ -16,9 +16,10 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from deadtime._base.validation import finite
-from deadtime.loops import PV, Controller
+from deadtime.loops import PV, BackCalculation, Controller
 from deadtime.tuning.forms._settings import (
     Settings,
     controller_from,
@@ -26,6 +27,7 @@ from deadtime.tuning.forms._settings import (
     one_pole_filter,
     parts_of,
     pole_of,
+    refuse_feed_forward,
     rounding_of,
 )
 
@@ -36,6 +38,9 @@ SOURCE = "Åström and Hägglund 2006, section 3.2"
 
 #: A line such as ``Ti = 40 s``.
 LINE = re.compile(r"^\s*(\w+)\s*[=:]\s*(\S+)", re.M)
+
+#: What the weights of the set point and the time of back-calculation are called.
+WEIGHTS = {"weight": "b", "derivative_weight": "c", "tracking_time": "Tt"}
 
 #: Name of the number for an integral or a derivative that is switched off, and a filter's time.
 OFF, FILTER = "off", "Tf"
@@ -259,9 +264,20 @@ FORMS: dict[str, type[IdealForm] | type[SeriesForm] | type[ParallelForm]] = {
 def write(controller: Controller, form: str, spans: tuple[float, float] | None) -> Settings:
     """The numbers of one of the forms."""
     found = FORMS[form].of(controller)
+    refuse_feed_forward(controller, form)
     values = {name: _typed(value) for name, value in vars(found).items()}
+    values |= {
+        WEIGHTS[name]: _typed(value)
+        for name, value in controller.parameters.items()
+        if name in WEIGHTS and (value != 1.0 or name == "tracking_time")
+    }
     lines = [f"{name} = {_shown(name, value)}" for name, value in values.items()]
     notes = []
+    if "b" in values:
+        notes.append(
+            "b weights the set point in the proportional term. A controller without it overshoots "
+            "more after a step of the set point, and answers loads alike: design with weight=1."
+        )
     smooth = parts_of(controller)[3]
     if smooth is not None:
         corner = pole_of(smooth)
@@ -297,7 +313,7 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
     values = numbers_from(text, form, LINE)
     kind = FORMS[form]
     names = kind.__dataclass_fields__
-    unknown = [name for name in values if name not in (*names, FILTER, "PB")]
+    unknown = [name for name in values if name not in (*names, *WEIGHTS.values(), FILTER, "PB")]
     if unknown:
         raise ValueError(f"{unknown[0]!r} is no number of the form {form!r}: {', '.join(names)}")
     own = {name: value for name, value in values.items() if name in names}
@@ -306,7 +322,10 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
     time = values.get(FILTER, 0.0)
     smooth = one_pole_filter(0.5 / (math.pi * time)) if time else None
     parts = parts_of(kind(**own).controller())
-    return controller_from(*parts[:3], smooth if parts[2] else None, on_measurement)
+    weights: Any = {name: values[short] for name, short in WEIGHTS.items() if short in values}
+    if "tracking_time" in weights:
+        weights["anti_windup"] = BackCalculation(weights.pop("tracking_time"))
+    return controller_from(*parts[:3], smooth if parts[2] else None, on_measurement, **weights)
 
 
 def _typed(value: float) -> float:

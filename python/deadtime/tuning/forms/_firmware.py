@@ -12,14 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from deadtime.loops import PD, PID, PV, Controller, DerivativeFilter
+from deadtime.loops import Controller, DerivativeFilter
 from deadtime.tuning.forms._settings import (
     Settings,
     controller_from,
     one_pole_filter,
     parts_of,
     pole_of,
+    refuse_feed_forward,
     rounding_of,
+    weights_of,
 )
 
 #: Digits that are written, of the seven that a parameter of 32 bits holds. More: long numbers to
@@ -136,10 +138,14 @@ def check(controller: Controller, found: FirmwareLoop, form: str, loop: str) -> 
                 f"{type(controller).__name__}: the {loop} loop of {form} has no {part} gain, only "
                 f"{', '.join(found.names.values())}"
             )
-    if isinstance(controller, PV) and controller.gains["Kv"] and found.derivative_of == "error":
+    refuse_feed_forward(controller, form)
+    weight, derivative_weight = weights_of(controller)
+    if weight != 1.0:
+        raise ValueError(f"weight={weight:g}: {form} has no weight of the set point: take weight=1")
+    if gains[2] and derivative_weight != 1.0 and found.derivative_of == "error":
         raise ValueError(
-            f"PV: the {loop} loop of {form} takes the derivative of the error, so that a step of "
-            "the set point kicks: take PD or PID"
+            f"{type(controller).__name__}: the {loop} loop of {form} takes the derivative of the "
+            "error, so that a step of the set point kicks: take PD, or PID with derivative_weight=1"
         )
     if smooth is not None:
         _corner(smooth, form)
@@ -149,7 +155,7 @@ def _notes(controller: Controller, found: FirmwareLoop) -> list[str]:
     """What the firmware does otherwise than the controller."""
     notes = [found.note] if found.note else []
     _, _, derivative, smooth = parts_of(controller)
-    if derivative and isinstance(controller, (PD, PID)) and found.derivative_of == "measurement":
+    if derivative and weights_of(controller)[1] and found.derivative_of == "measurement":
         notes.append(NO_KICK)
     if derivative and smooth is None:
         notes.append(NO_FILTER)

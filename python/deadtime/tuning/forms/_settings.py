@@ -96,14 +96,33 @@ def controller_from(
     derivative: float,
     smooth: DerivativeFilter | None = None,
     on_measurement: bool = False,
+    **weights: float,
 ) -> Controller:
-    """The simplest controller with these gains."""
+    """The simplest controller with these gains; weights are those of PI and PID."""
     if derivative == 0.0:
-        return P(proportional) if integral == 0.0 else PI(proportional, integral)
+        if integral == 0.0:
+            return P(proportional)
+        return PI(proportional, integral, **weights)
     if integral != 0.0:
-        return PID(proportional, integral, derivative, smooth)
+        if on_measurement:
+            weights["derivative_weight"] = 0.0
+        return PID(proportional, integral, derivative, smooth, **weights)
     kind = PV if on_measurement else PD
     return kind(proportional, derivative, smooth)
+
+
+def weights_of(controller: Controller) -> tuple[float, float]:
+    """Weights of the set point in the proportional term and in the derivative."""
+    numbers = controller.parameters
+    derivative = 0.0 if isinstance(controller, PV) else numbers.get("derivative_weight", 1.0)
+    return numbers.get("weight", 1.0), derivative
+
+
+def refuse_feed_forward(controller: Controller, form: str) -> None:
+    """Refuse a gain of the set point past the controller, which is not written."""
+    gain = controller.parameters.get("feed_forward", 0.0)
+    if gain:
+        raise ValueError(f"feed_forward={gain:g}: {form} is written without one, so leave it out")
 
 
 def one_pole_filter(corner: float) -> DerivativeFilter:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,14 +9,9 @@ from typing import Any
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 from deadtime.tuning._design import design
+from deadtime.tuning._gate import LARGEST_CHANGE, LARGEST_SENSITIVITY, check_gains
 from deadtime.tuning._result import Design
-
-#: Margins that are asked for where nothing is: those of a maximum sensitivity of 1.67 at most.
-MARGINS = {"gain_margin": 2.5, "phase_margin": 50.0}
-
-#: Largest factor by which a gain may change against the one that was flown, in one step. Larger: a
-#: wrong estimate costs more; smaller: more steps to the same gains.
-STEP = 2.0
+from deadtime.tuning.proposal._possible import possible_loops
 
 
 @dataclass(frozen=True)
@@ -28,75 +22,92 @@ class Gains:
     ----------
     design : Design
         As it was found.
+    controller : Controller
+        With at most `LARGEST_CHANGE` times the gains that were flown.
     loops : tuple of ControlLoop
-        The loops that the estimate leaves possible, the likeliest first, with the gains.
-    reasons : tuple of str
-        Why the gains may not be used; empty where they may.
+        The loops that the estimate leaves possible, the likeliest first.
     remarks : tuple of str
-        What was changed for them to be used.
+        What else has to be known.
     """
 
     design: Design
+    controller: Controller
     loops: tuple[ControlLoop, ...]
-    reasons: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...]
+
+    def under(self, controller: Controller) -> tuple[ControlLoop, ...]:
+        """The loops under a controller."""
+        return tuple(loop.replace(controller=controller) for loop in self.loops)
 
 
-def gains_for(
+def why_none(fit: PlantEstimate, level: float, allow_indication: bool) -> tuple[str, ...]:
+    """Why no gains come of an estimate, whatever they are; empty where they may."""
+    if fit.verdict == "none":
+        return (fit.reason,)
+    low, high = fit.ci(level, "gain")
+    if not low * high > 0.0:
+        ends = f"{low:.3g} and {high:.3g}"
+        return (f"the sign of the plant's gain is not certain: it is between {ends}",)
+    if fit.verdict == "reliable" or allow_indication:
+        return ()
+    return (f"the estimate is an indication: {fit.reason}",)
+
+
+def wanted_gains(
     fit: PlantEstimate,
     template: Controller,
     *,
     sample_time: float | None,
     limit: float | None,
     level: float,
-    allow_indication: bool,
     flown: Controller | None,
     demands: Mapping[str, Any],
 ) -> Gains:
-    """Find gains over the intervals of an estimate, and say whether they may be used."""
-    loop = fit.loop(template, sample_time=sample_time, limit=limit)
-    late, strong = (fit.ci(level, name) for name in ("delay", "gain"))
-    asked: dict[str, Any] = dict(demands) or MARGINS
-    found = design(loop, controller=template, delay=late, gain=strong, **asked)
-    remarks: tuple[str, ...] = ()
-    best = found.loop.replace(delay=fit.delay, gain=fit.parameters["gain"])
-    if flown is not None:
-        best, remarks = _one_step(best, flown)
-    corners = itertools.product(late, strong)
-    loops = (best, *(best.replace(delay=each, gain=gain) for each, gain in corners))
-    return Gains(found, loops, _reasons(fit, loops, allow_indication), remarks)
+    """The best gains for all plants that an estimate leaves possible, one step from the flown."""
+    likeliest = fit.loop(template, sample_time=sample_time, limit=limit)
+    loops = tuple(possible_loops(fit, likeliest, level))
+    found = design(likeliest, controller=template, plants=loops[1:], **demands)
+    chosen, remarks = _one_step(found.loop.controller, flown)
+    if fit.verdict != "reliable":
+        remarks = (f"Set aside: the estimate is an indication, {fit.reason}.", *remarks)
+    return Gains(found, chosen, loops, remarks)
 
 
-def _one_step(loop: ControlLoop, flown: Controller) -> tuple[ControlLoop, tuple[str, ...]]:
-    """The loop with gains at most `STEP` times from those that were flown."""
-    wanted, limited = loop.controller.gains, {}
-    for name, gain in wanted.items():
-        old = flown.gains.get(name, 0.0)
-        low, high = sorted((old / STEP, old * STEP))
-        limited[name] = min(max(gain, low), high) if old else gain
-    changed = [name for name in wanted if limited[name] != wanted[name]]
-    if not changed:
-        return loop, ()
-    words = ", ".join(f"{name} = {wanted[name]:.4g}" for name in changed)
-    return loop.replace(**limited), (
-        f"The design has {words}. A gain changes by at most a factor of {STEP:g} in one step: "
-        "record again with these, and take the next step.",
-    )
-
-
-def _reasons(
-    fit: PlantEstimate, loops: tuple[ControlLoop, ...], allow_indication: bool
+def refusals(
+    fit: PlantEstimate,
+    gains: Gains,
+    typed: Controller,
+    flown: Controller | None,
+    rounding: float,
+    most: float | None,
 ) -> tuple[str, ...]:
-    """Why the gains of these loops may not be used."""
-    reasons = []
-    if fit.verdict != "reliable" and not allow_indication:
-        reasons.append(f"the estimate is an indication: {fit.reason}")
-    if not all(loop.is_stable() for loop in loops):
-        reasons.append("the loop is not stable for all plants that the recording leaves possible")
-    return tuple(reasons)
+    """Why typed gains do not pass the gate; empty where they do. `most` is the Ms demanded."""
+    gate = check_gains(
+        gains.loops[0],
+        typed,
+        flown=typed if flown is None else flown,
+        loops=gains.loops[1:],
+        max_sensitivity=max(LARGEST_SENSITIVITY, most or 0.0),
+        largest_change=LARGEST_CHANGE * (1.0 + rounding),
+        noise=fit.noise_std,
+    )
+    return gate.reasons
 
 
-def with_typed(gains: Gains, typed: Controller) -> Gains:
-    """The same with the gains that are typed in, rounded as they are."""
-    loops = tuple(loop.replace(controller=typed) for loop in gains.loops)
-    return replace(gains, loops=loops)
+def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller, tuple[str, ...]]:
+    """Gains at most `LARGEST_CHANGE` times from those that were flown."""
+    if flown is None:
+        return wanted, ()
+    gains = wanted.gains
+    for name, gain in wanted.gains.items():
+        if old := flown.gains.get(name, 0.0):
+            low, high = sorted((old / LARGEST_CHANGE, old * LARGEST_CHANGE))
+            gains[name] = min(max(gain, low), high)
+    changed = [name for name, gain in wanted.gains.items() if gains[name] != gain]
+    if not changed:
+        return wanted, ()
+    words = ", ".join(f"{name} = {wanted.gains[name]:.4g}" for name in changed)
+    return replace(wanted, **gains), (
+        f"The design has {words}. A gain changes by at most a factor of {LARGEST_CHANGE:g} in one "
+        "step: record again with these, and take the next step.",
+    )

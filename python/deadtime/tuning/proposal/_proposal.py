@@ -22,6 +22,7 @@ from deadtime._base.verdicts import Verdict
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 from deadtime.tuning._result import Design, LeastMargins
+from deadtime.tuning._rules import RuleTable
 from deadtime.tuning.forms import Settings
 from deadtime.tuning.proposal._page import render
 from deadtime.tuning.proposal._prediction import Prediction, banded
@@ -52,6 +53,8 @@ class Proposal(ReadOnlyArrays, Pictured):
         Whether the recording has the same move, so that both can be drawn over each other.
     remarks : tuple of str
         What else has to be known, in sentences.
+    rules : RuleTable or None
+        The gains beside those of rules of thumb, each on the likeliest plant.
     """
 
     verdict: Verdict
@@ -65,6 +68,7 @@ class Proposal(ReadOnlyArrays, Pictured):
     shows_set_point: bool = False
     shows_load: bool = False
     remarks: tuple[str, ...] = ()
+    rules: RuleTable | None = None
     _loops: tuple[ControlLoop, ...] = ()
 
     def __repr__(self) -> str:
@@ -150,7 +154,8 @@ class Proposal(ReadOnlyArrays, Pictured):
         if self.settings is None or self.design is None:
             return [*lines, f"next: {self.fit.advice().words}"]
         lines += self.settings.summary().splitlines()
-        return [*lines, *self.expected(), *self.remarks]
+        lines += [*self.expected(), *self.remarks]
+        return lines if self.rules is None else [*lines, *repr(self.rules).splitlines()]
 
     def expected(self) -> list[str]:
         """Margins, and what the gains are expected to do, in sentences.
@@ -178,15 +183,19 @@ class Proposal(ReadOnlyArrays, Pictured):
         """
         self._made()
         each = [loop.margin() for loop in self._loops]
-        return LeastMargins(
-            *(min(float(getattr(one, name)) for one in each) for name in LeastMargins._fields)
-        )
+
+        def worst(name: str) -> float:
+            most = max if name.startswith("max_") else min
+            return most(float(getattr(one, name)) for one in each)
+
+        return LeastMargins(*map(worst, LeastMargins._fields))
 
     def _margins(self) -> str:
         least = self.margins
         return (
             f"least margins over what the recording leaves open: gain {least.gain_margin:.3g}, "
-            f"phase {least.phase_margin:.3g}°, delay {least.delay_margin:.3g} s"
+            f"phase {least.phase_margin:.3g}°, delay {least.delay_margin:.3g} s; Ms at most "
+            f"{least.max_sensitivity:.3g}"
         )
 
     def _responses(self) -> list[str]:
@@ -234,6 +243,7 @@ class Proposal(ReadOnlyArrays, Pictured):
             "load_response": None if met is None else met.info(),
             "step": None if info is None else {name: info[name] for name in steps},
             "remarks": self.remarks,
+            "rules": None if self.rules is None else [row._asdict() for row in self.rules],
             "estimate": self.fit.to_dict(),
         }
         found |= {

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from deadtime._base.validation import OpenRange
 from deadtime.estimation import PlantEstimate, estimate_delay
-from deadtime.loops import PI, Controller
+from deadtime.loops import PI, PID, Controller
 from deadtime.recordings import Recording
 from deadtime.tuning._problem import controller_template
-from deadtime.tuning.forms import Form, check_form, settings_of
-from deadtime.tuning.proposal._gains import gains_for, with_typed
+from deadtime.tuning._rules import compared
+from deadtime.tuning.forms import LOOPS_OF_FORMS, Form, check_form, settings_of
+from deadtime.tuning.proposal._gains import refusals, wanted_gains, why_none
 from deadtime.tuning.proposal._prediction import predicted_load, predicted_set_point
 from deadtime.tuning.proposal._proposal import Proposal
 
@@ -94,30 +96,31 @@ def tune(
     True
     """
     template = controller_template(controller)
+    if form in LOOPS_OF_FORMS and isinstance(template, (PI, PID)) and template.weight is None:
+        template = replace(template, weight=1.0)  # no firmware has another one
     check_form(template, form, loop, version)
     if isinstance(recording, PlantEstimate):
         fit = recording
     else:
         fit = estimate_delay(recording, None, window=window, **(known or {}))
-    if fit.verdict == "none":
-        return Proposal("none", (fit.reason,), fit, flown=flown)
-    found = gains_for(
+    if reasons := why_none(fit, level, allow_indication):
+        return Proposal("none", reasons, fit, flown=flown)
+    found = wanted_gains(
         fit,
         template,
         sample_time=sample_time,
         limit=limit,
         level=level,
-        allow_indication=allow_indication,
         flown=flown,
         demands=demands,
     )
-    if found.reasons:
-        return Proposal("none", found.reasons, fit, flown=flown)
-    chosen = found.loops[0].controller
-    settings = settings_of(chosen, form, loop=loop, version=version, spans=spans)
-    found = with_typed(found, settings.controller)
-    set_point, shows_set_point = predicted_set_point(fit, found.loops)
-    load, shows_load = predicted_load(fit, found.loops)
+    settings = settings_of(found.controller, form, loop=loop, version=version, spans=spans)
+    typed, most = settings.controller, demands.get("max_sensitivity")
+    if reasons := refusals(fit, found, typed, flown, settings.rounding, most):
+        return Proposal("none", reasons, fit, flown=flown)
+    loops = found.under(typed)
+    set_point, shows_set_point = predicted_set_point(fit, loops)
+    load, shows_load = predicted_load(fit, loops)
     return Proposal(
         verdict=fit.verdict,
         reasons=(),
@@ -130,5 +133,6 @@ def tune(
         shows_set_point=shows_set_point,
         shows_load=shows_load,
         remarks=found.remarks,
-        _loops=found.loops,
+        rules=compared(loops[0], "proposal"),
+        _loops=loops,
     )

@@ -63,9 +63,12 @@ impl ControlLoop {
     /// # Errors
     /// As [`family`](Self::family).
     pub fn terms(&self, places: &[Place], values: &Values<Symbol>) -> Result<Vec<Term>, Error> {
-        let none = places
-            .iter()
-            .find(|place| matches!(place, Place::SampleTime | Place::Limit));
+        let none = places.iter().find(|place| {
+            matches!(
+                place,
+                Place::SampleTime | Place::Limit | Place::Low | Place::Rate
+            )
+        });
         if let Some(place) = none {
             refuse!(
                 "{place:?}: the characteristic function of a continuous loop has no such number"

@@ -27,8 +27,12 @@ pub enum Place {
     Delay,
     /// Of the hold, s.
     SampleTime,
-    /// Bound of the command.
+    /// Greatest command, and bound of its modulus where there is no least one.
     Limit,
+    /// Least command.
+    Low,
+    /// Bound of the rate of the command.
+    Rate,
 }
 
 /// The numbers of a loop.
@@ -42,8 +46,12 @@ pub struct Values<S = f64> {
     pub delay: S,
     /// s; none in continuous time.
     pub sample_time: Option<S>,
-    /// Bound of the command; none where there is no bound.
+    /// Greatest command, and bound of its modulus without `low`; none where there is no bound.
     pub limit: Option<S>,
+    /// Least command; none where it is that of equal bounds.
+    pub low: Option<S>,
+    /// Bound of the rate of the command; none where there is no bound.
+    pub rate: Option<S>,
     /// num and den of a [`Plant::Given`].
     pub given: Option<Fraction<S>>,
 }
@@ -68,6 +76,8 @@ impl<S> Values<S> {
             Place::Delay => Some(&mut self.delay),
             Place::SampleTime => self.sample_time.as_mut(),
             Place::Limit => self.limit.as_mut(),
+            Place::Low => self.low.as_mut(),
+            Place::Rate => self.rate.as_mut(),
         }
     }
 
@@ -76,6 +86,8 @@ impl<S> Values<S> {
         match place {
             Place::SampleTime => self.sample_time = Some(value),
             Place::Limit => self.limit = Some(value),
+            Place::Low => self.low = Some(value),
+            Place::Rate => self.rate = Some(value),
             _ => {
                 if let Some(slot) = self.slot(place) {
                     *slot = value;
@@ -94,6 +106,8 @@ impl<S> Values<S> {
             delay: change(&self.delay),
             sample_time: self.sample_time.as_ref().map(change),
             limit: self.limit.as_ref().map(change),
+            low: self.low.as_ref().map(change),
+            rate: self.rate.as_ref().map(change),
             given: None,
         }
     }
@@ -155,6 +169,15 @@ impl ControlLoop {
         &self.values
     }
 
+    /// Is the command bounded otherwise than by its modulus, or does its integral not wind up?
+    pub fn is_guarded(&self) -> bool {
+        let controller = self.controller;
+        let winds = controller.kind.integrates()
+            && (controller.stops || controller.names().any(|name| name == "tracking_time"));
+        let values = &self.values;
+        values.low.is_some() || values.rate.is_some() || (winds && values.limit.is_some())
+    }
+
     /// Is the delay in the measurement?
     pub fn is_measured(&self) -> bool {
         self.path == Path::Measurement
@@ -175,21 +198,15 @@ impl ControlLoop {
     /// [`Error::Argument`] where the loop has no such number.
     pub fn place(&self, name: &str) -> Result<Place, Error> {
         let of_plant = self.names.iter().position(|own| own == name);
-        let gains = self.controller.kind.gains();
-        let of_filter = ["omega", "damping"]
-            .into_iter()
-            .filter(|_| self.controller.is_filtered);
-        let of_controller = gains
-            .iter()
-            .copied()
-            .chain(of_filter)
-            .position(|own| own == name);
+        let of_controller = self.controller.names().position(|own| own == name);
         match (of_plant, of_controller, name) {
             (Some(index), ..) => Ok(Place::Plant(index)),
             (_, Some(index), _) => Ok(Place::Controller(index)),
             (.., "delay") => Ok(Place::Delay),
             (.., "sample_time") => Ok(Place::SampleTime),
-            (.., "limit") => Ok(Place::Limit),
+            (.., "limit" | "limit_high") => Ok(Place::Limit),
+            (.., "limit_low") => Ok(Place::Low),
+            (.., "rate_limit") => Ok(Place::Rate),
             _ => refuse!("this loop has no number {name:?}"),
         }
     }

@@ -10,6 +10,9 @@
 //! for simulation. The derivative is either ideal, H(s) = s, or filtered, H(s) = ω² s/(s² + 2 ζ ω s +
 //! ω²). In a sampled loop the filter and the integrator stay continuous and are sampled with the rest,
 //! unless the filter runs on samples itself ([`Rule`]).
+//!
+//! The reference may enter with weights, Kp (b r − y) and Kd H (c r − y), and past the controller with a
+//! gain of feed-forward (Åström and Hägglund, Advanced PID Control, 2006, section 3.4).
 
 use super::entry::{Entry, Number};
 use super::filter::{Rule, Sampled, SampledFilter};
@@ -65,7 +68,68 @@ impl Kind {
     }
 }
 
-/// A controller without its numbers, which are its gains and, of a filter, ω and ζ.
+/// Numbers that a controller may have besides its gains and its filter, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extra {
+    /// Weight b of the reference in the proportional term.
+    Weight,
+    /// Weight c of the reference in the derivative.
+    DerivativeWeight,
+    /// Gain of the reference past the controller.
+    FeedForward,
+    /// Time constant of back-calculation, s.
+    TrackingTime,
+}
+
+impl Extra {
+    const ALL: [(Self, &'static str); 4] = [
+        (Self::Weight, "weight"),
+        (Self::DerivativeWeight, "derivative_weight"),
+        (Self::FeedForward, "feed_forward"),
+        (Self::TrackingTime, "tracking_time"),
+    ];
+
+    /// The number of a name, such as `weight`.
+    pub fn named(name: &str) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find_map(|(extra, own)| (own == name).then_some(extra))
+    }
+}
+
+/// Which of these numbers a controller has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Extras(u8);
+
+impl Extras {
+    /// With one more.
+    #[must_use]
+    pub fn with(self, extra: Extra) -> Self {
+        Self(self.0 | 1 << extra as u8)
+    }
+
+    fn has(self, extra: Extra) -> bool {
+        self.0 & 1 << extra as u8 != 0
+    }
+
+    /// How many they are.
+    fn count(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// The place of one among them.
+    fn place(self, extra: Extra) -> Option<usize> {
+        let before = self.0 & ((1 << extra as u8) - 1);
+        self.has(extra).then_some(before.count_ones() as usize)
+    }
+
+    /// Their names.
+    fn names(self) -> impl Iterator<Item = &'static str> {
+        let all = Extra::ALL.into_iter();
+        all.filter_map(move |(extra, name)| self.has(extra).then_some(name))
+    }
+}
+
+/// A controller without its numbers: its gains, of a filter ω and ζ, and the extra ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Controller {
     /// Which terms it has.
@@ -74,6 +138,10 @@ pub struct Controller {
     pub is_filtered: bool,
     /// How the filter runs where the loop is sampled; none: continuous before the sampler.
     pub rule: Option<Rule>,
+    /// Which further numbers there are.
+    pub extras: Extras,
+    /// Does the integral stop while it would drive the command further out of its bounds?
+    pub stops: bool,
 }
 
 /// u = p (r − y) + i ∫(r − y) − d H y, or + d H (r − y).
@@ -105,7 +173,52 @@ pub(super) struct Paths<S> {
 impl Controller {
     /// How many numbers it has.
     pub fn count(&self) -> usize {
-        self.kind.gains().len() + 2 * usize::from(self.is_filtered)
+        self.kind.gains().len() + 2 * usize::from(self.is_filtered) + self.extras.count()
+    }
+
+    /// The names of its numbers, in their order.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        let filter = ["omega", "damping"].into_iter();
+        let own = self.kind.gains().iter().copied();
+        own.chain(filter.filter(|_| self.is_filtered))
+            .chain(self.extras.names())
+    }
+
+    /// One of the further numbers; none where there is no such.
+    pub(super) fn extra<S: Entry>(&self, numbers: &[S], extra: Extra) -> Option<S> {
+        let first = self.count() - self.extras.count();
+        let place = self.extras.place(extra)?;
+        numbers.get(first + place).cloned()
+    }
+
+    /// Gain of the reference in the command, past integral and derivative.
+    fn reference_gain<S: Entry>(&self, numbers: &[S]) -> S {
+        let mut gain = self.terms(numbers).p;
+        if let Some(weight) = self.extra(numbers, Extra::Weight) {
+            gain = gain * weight;
+        }
+        match self.extra(numbers, Extra::FeedForward) {
+            Some(feed) => gain + feed,
+            None => gain,
+        }
+    }
+
+    /// Weight of the reference in what the derivative sees.
+    pub(super) fn derivative_weight<S: Entry>(&self, numbers: &[S]) -> S {
+        if !self.kind.derivative_of_error() {
+            return S::from(0.0);
+        }
+        let weight = self.extra(numbers, Extra::DerivativeWeight);
+        weight.unwrap_or_else(|| S::from(1.0))
+    }
+
+    /// The gain with which the excess of the command acts on the integral of the error, 1/(Tt Ki); none
+    /// without back-calculation, or without an integral.
+    pub(super) fn tracking<S: Number>(&self, numbers: &[S]) -> Option<S> {
+        let time = self.extra(numbers, Extra::TrackingTime)?;
+        let i = self.terms(numbers).i;
+        let integrates = self.kind.integrates() && !i.is_zero();
+        integrates.then(|| S::from(1.0) / (time * i))
     }
 
     /// Does its filter run on samples in a sampled loop?
@@ -132,7 +245,7 @@ impl Controller {
     }
 
     /// ω and ζ; none of an ideal derivative.
-    fn filter<S: Entry>(&self, numbers: &[S]) -> Option<(S, S)> {
+    pub(super) fn filter<S: Entry>(&self, numbers: &[S]) -> Option<(S, S)> {
         let first = self.kind.gains().len();
         match (numbers.get(first), numbers.get(first + 1)) {
             (Some(omega), Some(damping)) if self.is_filtered => {
@@ -166,7 +279,7 @@ impl Controller {
             None => (vec![one], None),
         };
         let g = product(&integral, &rolled_off);
-        let path = |d: S| {
+        let path = |p: S, d: S| {
             let mut num = scaled(&p, &g);
             if self.kind.differentiates() {
                 let slope = match &square {
@@ -180,14 +293,10 @@ impl Controller {
             }
             num
         };
-        let of_error = if self.kind.derivative_of_error() {
-            d.clone()
-        } else {
-            zero.clone()
-        };
+        let of_error = d.clone() * self.derivative_weight(numbers);
         Paths {
-            f: path(d),
-            r: path(of_error),
+            f: path(p, d),
+            r: path(self.reference_gain(numbers), of_error),
             g,
         }
     }
@@ -202,7 +311,7 @@ impl Controller {
     ) -> ControllerEquations<S> {
         let Terms { p, i, d } = self.terms(numbers);
         let (zero, one) = (S::from(0.0), S::from(1.0));
-        let on_error = S::from(f64::from(u8::from(self.kind.derivative_of_error())));
+        let on_error = self.derivative_weight(numbers);
         let integrals = usize::from(self.kind.integrates());
         let size = integrals + 2 * usize::from(self.is_filtered);
         let mut made = ControllerEquations {
@@ -212,7 +321,7 @@ impl Controller {
             c: Vec::with_capacity(size),
             p: -p.clone(),
             q: zero.clone(),
-            m: p,
+            m: self.reference_gain(numbers),
             impulse: zero.clone(),
         };
         if integrals > 0 {
@@ -227,7 +336,7 @@ impl Controller {
                 made.c.extend(sampled.c.iter().cloned());
                 let direct = sampled.d.clone();
                 made.p = made.p + direct.clone();
-                made.m = made.m + -on_error * direct;
+                made.m = made.m - on_error * direct;
             }
             (Some((omega, damping)), None) => {
                 let place =
@@ -291,16 +400,15 @@ impl Controller {
             states.push(if i.is_zero() {
                 S::from(0.0)
             } else {
-                (command.clone() - p * S::from(reference - output)) / i
+                // What weights and feed-forward add to the gain of the error.
+                let fed = self.reference_gain(numbers) - p.clone();
+                let of_error = p * S::from(reference - output) + fed * S::from(reference);
+                (command.clone() - of_error) / i
             });
         }
         if self.is_filtered {
-            let seen = if self.kind.derivative_of_error() {
-                output - reference
-            } else {
-                output
-            };
-            states.extend([S::from(seen), S::from(0.0)]);
+            let seen = S::from(output) - self.derivative_weight(numbers) * S::from(reference);
+            states.extend([seen, S::from(0.0)]);
         }
         states
     }

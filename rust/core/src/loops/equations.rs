@@ -85,7 +85,14 @@ impl ControlLoop {
             !plant.d.is_zero() && input == Input::Load,
             "the plant passes its command straight to its output: it has no response to a load here"
         );
-        Ok(closed(plant, controller, input))
+        let first = plant.b.len();
+        let tracking = self.controller().tracking(&values.controller);
+        let mut equations = closed(plant, controller, input);
+        if let Some(gain) = tracking {
+            equations.excess = vec![S::from(0.0); equations.b.len()];
+            equations.excess[first] = gain;
+        }
+        Ok(equations)
     }
 
     /// The loop for the kernels that take steps in time.
@@ -99,16 +106,29 @@ impl ControlLoop {
     }
 
     /// The loop of these equations, with its delay, its samples and the bounds of its command.
-    pub(super) fn bounded(
+    pub(super) fn bounded<S: Scalar>(
         &self,
-        equations: Equations,
+        equations: Equations<S>,
         update: Option<Update>,
-        values: &Values,
-    ) -> Result<LinearLoop, Error> {
-        let plain = LinearLoop::new(equations, values.delay, values.sample_time, values.limit)?;
+        values: &Values<S>,
+    ) -> Result<LinearLoop<S>, Error> {
+        let made = LinearLoop::new(equations, values.delay, values.sample_time, values.limit);
+        let mut made = made?;
+        if let Some(low) = values.low {
+            let high = values.limit.unwrap_or_else(|| S::from(f64::INFINITY));
+            made = made.with_bounds(low, high)?;
+        }
+        if let Some(rate) = values.rate {
+            made = made.with_rate(rate)?;
+        }
+        let controller = self.controller();
+        if controller.stops && controller.kind.integrates() {
+            let first = self.plant().order(&values.plant, values.given.as_ref())?;
+            made = made.with_stop(first);
+        }
         match update {
-            Some(update) => plain.with_update(update),
-            None => Ok(plain),
+            Some(update) => made.with_update(update),
+            None => Ok(made),
         }
     }
 
@@ -122,7 +142,7 @@ impl ControlLoop {
         let own = controller.equations(&values.controller, sampled.as_ref());
         let equations = self.equations(values, Input::Reference, sampled.as_ref())?;
         let still = vec![0.0; equations.states() - own.b.len()];
-        let on_error = f64::from(u8::from(controller.kind.derivative_of_error()));
+        let on_error = controller.derivative_weight(&values.controller);
         Ok(Columns {
             load: Column {
                 states: equations.b,
@@ -160,7 +180,8 @@ impl ControlLoop {
         let controller = self.controller();
         let sampled = controller.sampled(&values.controller, values.sample_time.as_ref())?;
         let equations = self.equations(values, input, sampled.as_ref())?;
-        let update = sampled.map(|filter| self.update(&filter, &equations));
+        let weight = controller.derivative_weight(&values.controller);
+        let update = sampled.map(|filter| self.update(&filter, &equations, &weight));
         Ok((equations, update))
     }
 
@@ -170,7 +191,7 @@ impl ControlLoop {
     /// As [`linear`](Self::linear).
     pub fn linear_in<S: Scalar>(&self, values: &Values<S>) -> Result<LinearLoop<S>, Error> {
         let equations = self.equations(values, Input::Reference, None)?;
-        LinearLoop::new(equations, values.delay, values.sample_time, values.limit)
+        self.bounded(equations, None, values)
     }
 
     /// Plant and controller for a run in fixed steps.
@@ -203,13 +224,17 @@ impl ControlLoop {
     }
 
     /// What a sample does to all states: the filter reads the output, and its states come last.
-    fn update<S: Number>(&self, filter: &SampledFilter<S>, equations: &Equations<S>) -> Update<S> {
+    fn update<S: Number>(
+        &self,
+        filter: &SampledFilter<S>,
+        equations: &Equations<S>,
+        on_error: &S,
+    ) -> Update<S> {
         let (n, m) = (equations.b.len(), filter.g.len());
         let mut states = vec![S::from(0.0); n * n];
         (0..n).for_each(|i| states[i * n + i] = S::from(1.0));
         let mut command = vec![S::from(0.0); n];
         let mut reference = command.clone();
-        let on_error = f64::from(u8::from(self.controller().kind.derivative_of_error()));
         for i in 0..m {
             let row = n - m + i;
             for j in 0..m {
@@ -219,7 +244,7 @@ impl ControlLoop {
                 states[row * n] = filter.g[i].clone() * equations.c[0].clone();
             }
             command[row] = filter.g[i].clone() * equations.d.clone();
-            reference[row] = S::from(-on_error) * filter.g[i].clone();
+            reference[row] = -(on_error.clone() * filter.g[i].clone());
         }
         Update {
             states,

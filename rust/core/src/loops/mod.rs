@@ -31,7 +31,7 @@ mod sweep;
 mod symbol;
 
 pub use control_loop::{ControlLoop, Path, Place, Values};
-pub use controller::{Controller, Kind};
+pub use controller::{Controller, Extra, Extras, Kind};
 pub use each::Each;
 pub use entry::{Entry, Number};
 pub use equations::Input;

@@ -128,6 +128,21 @@ impl Plant {
     }
 }
 
+impl Plant {
+    /// The number of states for these numbers.
+    ///
+    /// # Errors
+    /// As [`fraction`](Self::fraction).
+    pub(super) fn order<S: Entry>(
+        &self,
+        numbers: &[S],
+        given: Option<&Fraction<S>>,
+    ) -> Result<usize, Error> {
+        let fraction = self.fraction(numbers, given)?;
+        Ok(led(&fraction.den).len().saturating_sub(1))
+    }
+}
+
 impl<S: Number> Fraction<S> {
     /// The observable canonical form.
     ///

@@ -171,7 +171,8 @@ impl ControlLoop {
                 (keeps || is_given, !is_given && name.starts_with("lag"))
             }
             Place::Controller(index) => (false, index >= self.controller().kind.gains().len()),
-            Place::Delay | Place::SampleTime | Place::Limit => (false, true),
+            Place::Delay | Place::SampleTime | Place::Limit | Place::Rate => (false, true),
+            Place::Low => (false, false),
         };
         let keeps_sign = keeps_sign && value != 0.0;
         if keeps_sign && value < 0.0 {
@@ -188,7 +189,8 @@ impl ControlLoop {
     fn highest_crossing(&self) -> Result<f64, Error> {
         let [b, a, ..] = self.polynomials(self.values())?;
         let (p, i, d) = self.controller().gains_of_terms(&self.values().controller);
-        let damping = self.values().controller.last().copied().unwrap_or(1.0);
+        let filter = self.controller().filter(&self.values().controller);
+        let damping = filter.map_or(1.0, |(_, damping)| damping);
         // The least modulus of x² + 2 damping x + 1 where Re x ≥ 0.
         let least = if damping >= std::f64::consts::FRAC_1_SQRT_2 {
             1.0

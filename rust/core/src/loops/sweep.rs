@@ -3,7 +3,7 @@
 //! The equations are written for all loops of a block at once, over [`Each`]; blocks bound the memory.
 
 use crate::dde::Criteria;
-use crate::dde::ensemble::{self, Measures, Outcome, Sets};
+use crate::dde::ensemble::{self, Alone, Measures, Outcome, Sets};
 use crate::stability::{abscissae, decay};
 use crate::{Error, Task, memory, parallel};
 
@@ -83,6 +83,7 @@ impl<'a> SweptLoops<'a> {
             .limit
             .clone()
             .unwrap_or(Each::Shared(f64::INFINITY));
+        let low = self.values.low.clone();
         // The reference path has the denominator of the feedback.
         let (mut shared, mut own) = (0.0_f64, Vec::new());
         for part in &parts[..4] {
@@ -100,7 +101,9 @@ impl<'a> SweptLoops<'a> {
                 .map(|part| part.last().map_or(0.0, |c| at(c, set)));
             let (output, command) = rest_gains(ends);
             let command = command * self.amplitude;
-            let within = command.abs() <= at(&limit, set);
+            let high = at(&limit, set);
+            let least = low.as_ref().map_or(-high, |low| at(low, set));
+            let within = command >= least && command <= high;
             let times = own.iter().map(|part| {
                 numbers.clear();
                 numbers.extend(part.iter().map(|c| at(c, set)));
@@ -184,6 +187,12 @@ impl<'a> SweptLoops<'a> {
         mut keep: impl FnMut(&[usize], &Measures),
     ) -> Result<(), Error> {
         let resting = self.resting()?;
+        if self.is_guarded() {
+            let numbers = resting.iter().map(|one| (one.steady, one.slowest));
+            let numbers: Vec<_> = numbers.collect();
+            let one = |set| self.alone(set);
+            return ensemble::metrics_alone(&numbers, one, (span, criteria), task, keep);
+        }
         self.blocks(|places, sets| {
             let column = |of: fn(&Resting) -> f64| -> Vec<f64> {
                 places.iter().map(|place| of(&resting[*place])).collect()
@@ -213,6 +222,22 @@ impl<'a> SweptLoops<'a> {
         let width = times.len();
         let mut outputs = memory::filled(SWEEP, f64::NAN, self.count.saturating_mul(width))?;
         let mut outcomes = memory::filled(SWEEP, Outcome::Refused, self.count)?;
+        if self.is_guarded() {
+            for set in 0..self.count {
+                task.check()?;
+                if let Some(one) = self.alone(set) {
+                    let (found, outcome) = one.response(times, task)?;
+                    if let Some(row) = outputs.get_mut(set * width..(set + 1) * width)
+                        && found.len() == width
+                    {
+                        row.copy_from_slice(&found);
+                    }
+                    outcomes[set] = outcome;
+                }
+                task.advance(1);
+            }
+            return Ok((outputs, outcomes));
+        }
         self.blocks(|places, sets| {
             let (found, status) = ensemble::responses(sets, times, task)?;
             for ((place, row), outcome) in places.iter().zip(found.chunks(width)).zip(status) {
@@ -251,6 +276,22 @@ impl<'a> SweptLoops<'a> {
             SWEEP,
             found.into_iter().map(|found| found.unwrap_or(refused)),
         )
+    }
+
+    /// Do the bounds of the commands need more than a row of numbers holds?
+    fn is_guarded(&self) -> bool {
+        self.of.with(self.values_of(0)).is_guarded()
+    }
+
+    /// One loop, to run by itself; none where its numbers are not those of a loop.
+    fn alone(&self, set: usize) -> Option<Alone> {
+        let one = self.of.with(self.values_of(set));
+        let plant = one.linear(Input::Reference).ok()?;
+        Some(Alone {
+            ahead: one.output_lead(),
+            plant,
+            amplitude: self.amplitude,
+        })
     }
 
     /// The numbers of one loop.

@@ -1,54 +1,34 @@
-//! Figures of the response of a loop to a unit step of its load or of its reference, limit left out.
+//! Responses of a loop to a unit step of its load or of its reference, limit left out.
 
 use crate::dde::{LinearLoop, Request, Start};
 use crate::elementary::exp;
-use crate::loops::{ControlLoop, Input, Place};
+use crate::loops::{ControlLoop, DeviationAsked, Drive, Figures, Input, Place};
 use crate::{Error, Task};
 
-/// Times at which a response is evaluated: more are more exact and take time in proportion.
+/// Times at which a response is evaluated for a slope or an overshoot: more are more exact and take time
+/// in proportion.
 const POINTS: usize = 1500;
 
-/// Length of the first run in units of the slowest time of the loop, and most doublings of it.
+/// Length of the step response of a plant in units of a bound on its slowest time.
 const FIRST: f64 = 8.0;
-const DOUBLINGS: usize = 8;
 
-/// Share of the largest deviation within which a response rests, over the last part of the run.
-const QUIET: f64 = 1e-4;
-const QUIET_FOR: f64 = 0.3;
-
-/// Half width of the settling band, as a share of the step.
+/// Half width of the settling band, as a share of the largest deviation.
 const BAND: f64 = 0.02;
 
-/// Figures of a response; NaN of one that does not come to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures {
-    /// Integral of the modulus of the deviation from rest.
-    pub iae: f64,
-    /// The largest deviation from where the response began.
-    pub peak: f64,
-    /// After which the deviation from rest is below 2 % of the step, s; of a load of its peak.
-    pub settling_time: f64,
-    /// How far the output goes beyond its rest, % of that; zero of a load.
-    pub overshoot: f64,
-}
-
-impl Figures {
-    const NONE: Self = Self {
-        iae: f64::NAN,
-        peak: f64::NAN,
-        settling_time: f64::NAN,
-        overshoot: f64::NAN,
-    };
-}
-
-/// The figures of a response.
+/// The figures of a response; none of one that does not come to rest.
 ///
 /// # Errors
 /// Those that end all work.
-pub fn figures(of: &ControlLoop, input: Input, task: &Task) -> Result<Figures, Error> {
-    match measured(of, input, task) {
+pub fn figures(of: &ControlLoop, drive: Drive, task: &Task) -> Result<Option<Figures>, Error> {
+    let asked = DeviationAsked {
+        of: drive,
+        size: 1.0,
+        band: BAND,
+        span: None,
+    };
+    match without_limit(of).deviation(&asked, task) {
         Err(error) if error.ends_all() => Err(error),
-        found => Ok(found.unwrap_or(Figures::NONE)),
+        found => Ok(found.ok().filter(|found| found.is_settled)),
     }
 }
 
@@ -57,26 +37,37 @@ pub fn figures(of: &ControlLoop, input: Input, task: &Task) -> Result<Figures, E
 /// # Errors
 /// As [`figures`].
 pub(super) fn settling_time(of: &ControlLoop, task: &Task) -> Result<f64, Error> {
-    Ok(figures(of, Input::Reference, task)?.settling_time)
+    let found = figures(of, Drive::Reference, task)?;
+    Ok(found.map_or(f64::NAN, |found| found.deviation.recovery_time))
 }
 
-fn measured(of: &ControlLoop, input: Input, task: &Task) -> Result<Figures, Error> {
+/// How far a step of the reference goes beyond its rest, in % of that, within `span`; NaN where that is
+/// not known.
+///
+/// # Errors
+/// Those that end all work.
+pub(super) fn overshoot(of: &ControlLoop, span: f64, task: &Task) -> Result<f64, Error> {
+    let of = without_limit(of);
+    let found = of.rest_gains().and_then(|(rest, _)| {
+        let linear = of.linear(Input::Reference)?;
+        let outputs = response(&linear, span, task)?;
+        let beyond = outputs.iter().map(|y| (y - rest) / rest);
+        Ok(100.0 * beyond.fold(0.0, f64::max))
+    });
+    match found {
+        Err(error) if error.ends_all() => Err(error),
+        found => Ok(found.unwrap_or(f64::NAN)),
+    }
+}
+
+fn without_limit(of: &ControlLoop) -> ControlLoop {
     let mut values = of.values().clone();
     values.limit = None;
-    let of = of.with(values);
-    let linear = of.linear(input)?;
-    let wait = of.values().delay + of.values().sample_time.unwrap_or(0.0);
-    let mut span = FIRST * (wait + of.slowest_time()?);
-    for _ in 0..DOUBLINGS {
-        if let Some(found) = over(&linear, input, span, task)? {
-            return Ok(found);
-        }
-        span *= 2.0;
-    }
-    Ok(Figures::NONE)
+    of.with(values)
 }
 
-fn over(linear: &LinearLoop, input: Input, span: f64, task: &Task) -> Result<Option<Figures>, Error> {
+/// The response to a unit step from rest at zero.
+fn response(linear: &LinearLoop, span: f64, task: &Task) -> Result<Vec<f64>, Error> {
     let step = span / (POINTS - 1) as f64;
     let time: Vec<f64> = (0..POINTS).map(|k| k as f64 * step).collect();
     let start = Start {
@@ -90,29 +81,7 @@ fn over(linear: &LinearLoop, input: Input, span: f64, task: &Task) -> Result<Opt
         reference_time: &[0.0],
         reference: &[1.0],
     };
-    let outputs = linear.respond(&start, &asked, task)?.outputs;
-    let rest = outputs.last().copied().unwrap_or(f64::NAN);
-    let peak = outputs.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
-    let first = ((1.0 - QUIET_FOR) * POINTS as f64) as usize;
-    let tail = outputs.iter().skip(first);
-    if !tail.clone().all(|y| (y - rest).abs() <= QUIET * peak) {
-        return Ok(None);
-    }
-    let is_load = input == Input::Load;
-    let band = BAND * if is_load { peak } else { rest.abs() };
-    let outside = outputs.iter().rposition(|y| (y - rest).abs() > band);
-    let off: f64 = outputs.iter().map(|y| (y - rest).abs()).sum();
-    let beyond = outputs.iter().map(|y| (y - rest) * rest.signum());
-    Ok(Some(Figures {
-        iae: (off - 0.5 * (outputs[0] - rest).abs()) * step,
-        peak,
-        settling_time: outside.map_or(0.0, |place| time[(place + 1).min(POINTS - 1)]),
-        overshoot: if is_load {
-            0.0
-        } else {
-            100.0 * beyond.fold(0.0, f64::max) / rest.abs()
-        },
-    }))
+    Ok(linear.respond(&start, &asked, task)?.outputs)
 }
 
 /// The steepest slope of the response of the plant to a unit step of its command, delay and hold left
@@ -134,22 +103,10 @@ pub(super) fn steepest(
     (values.limit, values.sample_time, values.delay) = (None, None, 0.0);
     open = open.with(values);
     let linear = open.linear(Input::Load)?;
-    let start = Start {
-        state: vec![0.0; linear.equations().states()],
-        ..Start::default()
-    };
     let slow = open.slowest_time()?;
     let span = if slow > 0.0 { FIRST * slow } else { 1.0 };
     let step = span / (POINTS - 1) as f64;
-    let time: Vec<f64> = (0..POINTS).map(|k| k as f64 * step).collect();
-    let asked = Request {
-        time: &time,
-        output_lead: 0.0,
-        reference_before: 0.0,
-        reference_time: &[0.0],
-        reference: &[1.0],
-    };
-    let outputs = linear.respond(&start, &asked, task)?.outputs;
+    let outputs = response(&linear, span, task)?;
     let (Some(last), Some(before)) = (outputs.last(), outputs.get(POINTS - 2)) else {
         return Ok(None);
     };
@@ -170,6 +127,6 @@ pub(super) fn steepest(
         return Ok(None);
     };
     let share = (part - outputs[place - 1]) / (outputs[place] - outputs[place - 1]);
-    let dead = (time[best] + 0.5 * step - middle / slope).max(0.0);
-    Ok(Some((slope, dead, time[place - 1] + share * step)))
+    let dead = ((best as f64 + 0.5) * step - middle / slope).max(0.0);
+    Ok(Some((slope, dead, (place as f64 - 1.0 + share) * step)))
 }

@@ -9,12 +9,12 @@
 
 use super::demands::{Demands, is_stable_loop, margins_of};
 use super::open::{Gap, Open, Scale, gaps};
-use super::responses::{Figures, figures};
+use super::responses::figures;
 use super::simplices;
 use crate::between::minimum;
 use crate::elementary::exp;
 use crate::frequency::{Margins, first_term};
-use crate::loops::{ControlLoop, Input, Place};
+use crate::loops::{ControlLoop, Drive, Place};
 use crate::{Error, Task};
 
 /// Integral times of the grid in units of one over the phase crossover of the plant, as logarithms, and
@@ -454,16 +454,23 @@ impl<'a> Search<'a> {
         for (place, _) in &self.seen {
             let of = self.posed.with(&self.posed.loops[*place], gains);
             let number = |found: f64| if found.is_nan() { NEVER } else { found };
+            let of_step = |drive, is_settling: bool| -> Result<f64, Error> {
+                let found = figures(&of, drive, self.task)?.map(|found| found.deviation);
+                Ok(number(found.map_or(f64::NAN, |found| {
+                    if is_settling {
+                        found.recovery_time
+                    } else {
+                        found.iae
+                    }
+                })))
+            };
             let load = match (weights.load > 0.0, simulates) {
                 (false, _) => 0.0,
                 (true, false) => lasting(&of)?,
-                (true, true) => number(figures(&of, Input::Load, self.task)?.iae),
+                (true, true) => of_step(Drive::Load, false)?,
             };
             let set_point = if weights.set_point > 0.0 {
-                let Figures {
-                    iae, settling_time, ..
-                } = figures(&of, Input::Reference, self.task)?;
-                number(if wish.by_settling { settling_time } else { iae })
+                of_step(Drive::Reference, wish.by_settling)?
             } else {
                 0.0
             };

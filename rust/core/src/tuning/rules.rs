@@ -14,9 +14,9 @@ use num_complex::Complex64;
 
 use super::demands::margins_of;
 use super::open::Scale;
-use super::responses::{figures, steepest};
+use super::responses::{figures, overshoot, steepest};
 use crate::frequency::{first_term, small_roots};
-use crate::loops::{ControlLoop, Input, Kind, Place};
+use crate::loops::{ControlLoop, Drive, Kind, Place};
 use crate::quasipoly::QuasiPolynomial;
 use crate::{Error, Task};
 
@@ -91,13 +91,18 @@ pub fn rules(of: &ControlLoop, task: &Task) -> Result<Vec<Row>, Error> {
             critical.map(|(gain, period)| by_frequency(gain, period, with_derivative)),
         ),
     ];
+    // Rules know no weight of the reference.
+    let plain = match of.place("weight") {
+        Ok(place) => of.with_number(place, 1.0),
+        Err(_) => of.clone(),
+    };
     for (rule, ideal) in each {
         let gains = ideal.map(|(k, ti, td)| {
             let all = [k, k / ti, k * td];
             all.into_iter().take(kind.gains().len()).collect::<Vec<_>>()
         });
         let gains = gains.filter(|gains| gains.iter().all(|gain| gain.is_finite()));
-        found.push(row(rule, of, gains, task)?);
+        found.push(row(rule, &plain, gains, task)?);
     }
     Ok(found)
 }
@@ -130,11 +135,14 @@ fn row(
     let Some(margins) = margins.filter(|margins| margins.stable) else {
         return Ok(made);
     };
-    let step = figures(&of, Input::Reference, task)?;
     made.max_sensitivity = margins.peaks.sensitivity.value;
-    made.load_iae = figures(&of, Input::Load, task)?.iae;
-    made.settling_time = step.settling_time;
-    made.overshoot = step.overshoot;
+    if let Some(load) = figures(&of, Drive::Load, task)? {
+        made.load_iae = load.deviation.iae;
+    }
+    if let Some(step) = figures(&of, Drive::Reference, task)? {
+        made.settling_time = step.deviation.recovery_time;
+        made.overshoot = overshoot(&of, step.span, task)?;
+    }
     Ok(made)
 }
 

@@ -183,10 +183,7 @@ impl<S: Scalar> Field<S> {
             }
         }
         if let Some(rate) = plant.rate() {
-            slopes.push(Signal::constant(
-                size,
-                rate * S::from(f64::from(mode.slew)),
-            ));
+            slopes.push(Signal::constant(size, rate * S::from(f64::from(mode.slew))));
         }
         let (mut drive, mut drift) = (Signal::nothing(size), Signal::nothing(size));
         if let Some(state) = plant.stops().filter(|state| *state < n) {

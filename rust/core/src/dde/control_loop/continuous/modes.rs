@@ -53,7 +53,10 @@ pub(super) fn run<S: Scalar>(
         z.push(start.command);
     }
     let mut cursor = reference.cursor(&start.kicks);
-    cursor.advance(0.0, -slack(S::default(), plant.delay()).max(f64::MIN_POSITIVE));
+    cursor.advance(
+        0.0,
+        -slack(S::default(), plant.delay()).max(f64::MIN_POSITIVE),
+    );
     let mut run = Run {
         plant,
         fields: Vec::new(),
@@ -84,8 +87,7 @@ fn check<S: Scalar>(plant: &LinearLoop<S>) -> Result<(), Error> {
     let denominator = 1.0 - l.value();
     let is_bounded = plant.bounds().is_some() || plant.rate().is_some();
     refuse_if!(
-        plant.delay().value() == 0.0
-            && (denominator == 0.0 || (denominator < 0.0 && is_bounded)),
+        plant.delay().value() == 0.0 && (denominator == 0.0 || (denominator < 0.0 && is_bounded)),
         "without a delay the command depends on itself with gain L = {}, which {}: give \
          the loop a delay or filter the derivative",
         l.value(),
@@ -159,7 +161,10 @@ impl<S: Scalar> Run<'_, '_, S> {
     fn element(&mut self, is_first: bool) -> Result<(), Error> {
         let (t, delay) = (self.t, self.plant.delay());
         let tolerance = slack(t, delay);
-        let arriving = self.pieces.as_mut().map_or(SMOOTH, |pieces| pieces.reach(t));
+        let arriving = self
+            .pieces
+            .as_mut()
+            .map_or(SMOOTH, |pieces| pieces.reach(t));
         let jumps = is_first || is_reached(S::from(self.cursor.next_jump()), t, tolerance);
         let mut is_kicked = false;
         if jumps {
@@ -206,8 +211,16 @@ impl<S: Scalar> Run<'_, '_, S> {
         if next.value() > t.value() {
             self.changes = 0;
         }
-        let order = if is_kicked { 0 } else { self.orders.of_command(arriving, jumps) };
-        let order = if change.is_some() || self.changes > 0 { order.min(1) } else { order };
+        let order = if is_kicked {
+            0
+        } else {
+            self.orders.of_command(arriving, jumps)
+        };
+        let order = if change.is_some() || self.changes > 0 {
+            order.min(1)
+        } else {
+            order
+        };
         if is_kicked || self.orders.of_output(arriving, jumps) <= REPORTED {
             self.requested.output_break(t)?;
         }
@@ -238,7 +251,9 @@ impl<S: Scalar> Run<'_, '_, S> {
         self.r = self.cursor.advance(self.t.value(), tolerance);
         let n = equations.states();
         let states = &mut self.z[..n];
-        let kicked = self.cursor.kick(self.t.value(), tolerance, equations, states);
+        let kicked = self
+            .cursor
+            .kick(self.t.value(), tolerance, equations, states);
         let is_bounded = self.plant.bounds().is_some() || self.plant.rate().is_some();
         let mut is_kicked = kicked.is_some();
         if !is_bounded && self.pieces.is_none() {

@@ -41,5 +41,6 @@ mod window;
 #[cfg(test)]
 mod tests;
 
+pub use each::{Alone, metrics_alone};
 pub use sets::{Measures, Outcome, Sets};
 pub use sweep::{metrics, responses};

@@ -1,0 +1,92 @@
+"""The gate: what passes, and the reason for each refusal."""
+
+import dataclasses
+import re
+
+import deadtime as dtm
+import numpy as np
+import pytest
+
+LOOP = dtm.ControlLoop(
+    dtm.Integrator(0.85, 0.1), dtm.P(1.2), delay=0.25, sample_time=0.065, limit=1.0
+)
+
+
+def estimate(noise=0.003, length=8.0, free=("delay", "gain")):
+    truth = LOOP.replace(Kp=1.6)
+    known = truth.replace(plant=dtm.Integrator(lag=0.1), delay=None)
+    flight = dtm.Experiment.step(length, rest=1.04).run(truth, noise=noise, seed=2)
+    return dtm.estimate_delay(flight, known, free=free)
+
+
+def test_moderate_gains_of_a_known_loop_pass():
+    found = dtm.check_gains(LOOP, {"Kp": 1.5}, noise=0.003)
+    assert found.passed
+    assert found
+    assert found.reasons == ()
+    assert found.max_sensitivity == LOOP.replace(Kp=1.5).margin().max_sensitivity
+    assert {"stability", "Ms", "limit", "noise", "change"} <= set(found.checked)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.passed = False
+
+
+@pytest.mark.parametrize(
+    ("gains", "options", "reason"),
+    [
+        ({"Kp": 9.0}, {"flown": dtm.P(8.0)}, "not stable"),
+        ({"Kp": 3.0}, {"flown": dtm.P(2.9)}, "Ms is .* above 2"),
+        ({"Kp": 1.5}, {"flown": {"Kp": 0.5}}, "Kp changes from 0.5 to 1.5, by more than"),
+        ({"Kp": 1.5}, {"flown": {"Kp": -1.5}}, "changes its sign"),
+        ({"Kp": 1.5}, {"noise": 0.2}, "noise on the command"),
+        ({"Kp": 1.5}, {"loops": [LOOP.replace(delay=0.9)]}, "not stable with .*delay = 0.9"),
+    ],
+)
+def test_each_refusal_has_its_reason(gains, options, reason):
+    found = dtm.check_gains(LOOP, gains, **options)
+    assert not found.passed
+    assert any(re.search(reason, text) for text in found.reasons), found.reasons
+
+
+def test_hidden_modes_are_refused():
+    # (s - 0.1)/((s - 0.1)(s + 1)): the loop does not show the pole at 0.1.
+    plant = dtm.RationalPlant([1.0, -0.1], np.convolve([1.0, -0.1], [1.0, 1.0]).tolist())
+    found = dtm.check_gains(dtm.ControlLoop(plant, dtm.PI(1.0, 0.5), delay=0.1), {"Kp": 1.0})
+    assert not found.passed
+    # A slow pole that the zero of PI control cancels recovers slowly from loads.
+    slow = dtm.ControlLoop(dtm.FirstOrder(1.0, 100.0), dtm.PI(20.0, 0.2), delay=1.0)
+    found = dtm.check_gains(slow, {"Kp": 20.0})
+    assert any("hides the slow pole" in reason for reason in found.reasons)
+    assert dtm.check_gains(slow, {"Kp": 20.0, "Ki": 0.5}).passed
+
+
+def test_a_step_that_the_limit_never_lets_rest_is_refused():
+    plant = dtm.RationalPlant([1.0], [1.0, -0.5])
+    loop = dtm.ControlLoop(plant, dtm.P(2.0), delay=0.1, limit=1.0)
+    assert dtm.check_gains(loop, {"Kp": 1.6}, amplitude=0.1).passed
+    found = dtm.check_gains(loop, {"Kp": 1.6}, amplitude=5.0)
+    assert any("does not come to rest within the limit" in reason for reason in found.reasons)
+
+
+def test_an_estimate_must_be_reliable_or_set_aside():
+    fit = estimate()
+    assert fit.verdict == "reliable"
+    assert dtm.check_gains(fit, {"Kp": 1.4}).passed
+    unsure = fit.doubted("made up")
+    found = dtm.check_gains(unsure, {"Kp": 1.4})
+    assert not found.passed
+    assert "no reliable one" in found.reasons[0]
+    found = dtm.check_gains(unsure, {"Kp": 1.4}, override=True)
+    assert found.passed
+    assert "made up" in found.overridden[0]
+    assert "set aside" in found.summary()
+
+
+def test_a_design_has_its_gate():
+    best = dtm.design(LOOP, controller=dtm.P, delay=(0.2, 0.3))
+    assert best.gate().passed
+    assert not best.gate(flown={"Kp": 0.1}).passed
+    fit = estimate()
+    best = dtm.design(fit, controller=dtm.P)
+    assert best.gate(flown=dtm.P(1.6)).passed
+    with pytest.raises(TypeError, match="give a DelayEstimate or a ControlLoop"):
+        dtm.check_gains(3.0, {"Kp": 1.0})
