@@ -18,7 +18,7 @@ pub use candidates::{Candidates, Dominant, Loops, Scenario};
 pub use demands::{Demands, margins_of, noise_gain};
 pub use goal::{Decisive, Goal, Objective};
 pub use responses::figures;
-pub use robust::{Best, Posed, Wish, best, lasting};
+pub use robust::{Best, Neighbour, Posed, Wish, best, lasting};
 pub use rules::{Reduced, Row, reduced, rules};
 pub use search::{Within, best_within, least, worst_delay};
 

@@ -7,15 +7,17 @@
 //! loops, are added to those the search sees, and it is repeated (exchange: Hettich and Kortanek 1993,
 //! SIAM Review 35). Margins of the result are exact; that no better gains exist is not proved.
 
-use super::demands::{Demands, is_stable_loop, margins_of};
+use std::cell::Cell;
+
+use super::demands::{Demands, is_stable_loop, margins_of, sensitivity_of};
 use super::open::{Gap, Open, Scale, gaps};
 use super::responses::figures;
 use super::simplices;
 use crate::between::minimum;
 use crate::elementary::exp;
-use crate::frequency::{Margins, first_term};
+use crate::frequency::{Margins, Peak, first_term};
 use crate::loops::{ControlLoop, Drive, Place};
-use crate::{Error, Task};
+use crate::{Error, Task, parallel};
 
 /// Integral times of the grid in units of one over the phase crossover of the plant, as logarithms, and
 /// how many: wider and more find stranger best gains and take time in proportion.
@@ -54,9 +56,24 @@ const DOWN: f64 = 0.85;
 const STEPS_DOWN: usize = 60;
 const HALVINGS: usize = 30;
 
+/// Relative accuracy of gains that meet other demands, and of these.
+const KNOWN: f64 = 1e-8;
+
 /// Sampled loops, of those with the least delay margin by their crossings, whose exact one is computed,
 /// which takes long.
 const LATEST: usize = 2;
+
+/// Difference of two growths of an argument, rad, below which both loops are stable or neither is:
+/// between the quarter turn and the half turn that there are.
+const SAME_GROWTH: f64 = 0.75 * std::f64::consts::PI;
+
+/// How far around the best ratios neighbours are looked for, in the units of the grid, and at how many
+/// points of each of one or two ratios.
+const AROUND_ONE: (f64, usize) = (1.6, 33);
+const AROUND_TWO: (f64, usize) = (0.8, 7);
+
+/// Most loops, those with the largest Ms, whose margins are all computed.
+const WORST: usize = 12;
 
 /// What is made best.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +101,21 @@ pub struct Posed {
     pub demands: Demands,
     /// Where each free gain may be, if that is given.
     pub bounds: Option<Vec<(f64, f64)>>,
+    /// The ratios of the gains, if they are given: only the size of the gains is sought.
+    pub shape: Option<Vec<f64>>,
+    /// Part of the best value that neighbours may lose.
+    pub slack: f64,
+}
+
+/// Gains beside the best ones, with the largest Ms in the loops that the search saw.
+#[derive(Debug, Clone)]
+pub struct Neighbour {
+    /// The ratios.
+    pub shape: Vec<f64>,
+    /// The free gains.
+    pub gains: Vec<f64>,
+    /// What is made best.
+    pub value: f64,
 }
 
 /// What was found.
@@ -93,8 +125,12 @@ pub struct Best {
     pub gains: Vec<f64>,
     /// What was made best, in the worst of the loops that the search saw.
     pub value: f64,
-    /// The exact margins of every loop.
+    /// The loop with the largest Ms.
+    pub worst: usize,
+    /// The exact margins of the loops in which they may be least, that one first.
     pub margins: Vec<Margins>,
+    /// Those that lose no more than the slack.
+    pub neighbours: Vec<Neighbour>,
 }
 
 /// Factors on the two responses.
@@ -111,6 +147,8 @@ struct Search<'a> {
     seen: Vec<(usize, Open)>,
     /// Must every loop that is seen be stable where gaps are chosen, or the nominal one alone?
     checks_all: bool,
+    /// Growth of the argument of 1 + L of the nominal loop with gains that are stable.
+    growth: Cell<Option<f64>>,
     task: &'a Task,
 }
 
@@ -163,27 +201,38 @@ impl<'a> Search<'a> {
             scale: Scale::of(nominal, task)?,
             seen: seen.collect::<Result<_, Error>>()?,
             checks_all: false,
+            growth: Cell::new(None),
             task,
         })
     }
 
     fn run(mut self) -> Result<Best, Error> {
-        let (mut shape, mut is_new) = (Vec::new(), true);
+        let is_given = self.posed.shape.is_some();
+        let mut shape = self.posed.shape.clone().unwrap_or_default();
+        let mut is_new = !is_given;
         for _ in 0..ROUNDS {
             if is_new {
                 shape = self.shape()?;
             }
             let Some(gains) = self.gains(&shape)? else {
+                refuse_if!(
+                    is_given,
+                    "no gains with these ratios have Ms of at most {}",
+                    self.posed.demands.max_sensitivity
+                );
                 is_new = true;
                 continue;
             };
-            let each = self.posed.loops.iter();
-            let with = self.posed.demands.delay_margin > 0.0;
-            let margins = each.map(|of| margins_of(&self.posed.with(of, &gains), with, self.task));
-            let margins = margins.collect::<Result<Vec<_>, _>>()?;
-            match self.learn(&gains, &margins)? {
-                None => return self.judged(gains, margins),
-                Some(excess) => is_new = excess > SMALL,
+            let (posed, task) = (self.posed, self.task);
+            let peaks = parallel::results(
+                "the loops of a design",
+                posed.loops.len(),
+                || (),
+                |(), place| sensitivity_of(&posed.at(place, &gains), task),
+            )?;
+            match self.learn(&gains, &peaks)? {
+                None => return self.judged(gains, &shape, &peaks),
+                Some(excess) => is_new = !is_given && excess > SMALL,
             }
         }
         refuse!(
@@ -194,42 +243,97 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// The result, with the delay margins of the loops in which it may be least.
-    fn judged(&self, gains: Vec<f64>, mut margins: Vec<Margins>) -> Result<Best, Error> {
+    /// The result, with the margins of the loops in which they may be least.
+    fn judged(
+        &self,
+        gains: Vec<f64>,
+        shape: &[f64],
+        peaks: &[Option<Peak>],
+    ) -> Result<Best, Error> {
         let value = self.value(&gains, f64::INFINITY)?;
-        let estimate = |found: &Margins| {
-            let each = found.phase_margins.iter().zip(&found.gain_crossovers);
+        let neighbours = self.neighbours(shape, value)?;
+        let size = |place: &usize| peaks[*place].map_or(f64::INFINITY, |peak| peak.value);
+        let mut order: Vec<usize> = (0..peaks.len()).collect();
+        order.sort_by(|i, j| size(j).total_cmp(&size(i)));
+        order.truncate(WORST);
+        for (place, _) in &self.seen {
+            if !order.contains(place) {
+                order.push(*place);
+            }
+        }
+        let (posed, task) = (self.posed, self.task);
+        let with = posed.demands.delay_margin > 0.0;
+        let mut margins = parallel::results(
+            "the loops of a design",
+            order.len(),
+            || (),
+            |(), index| margins_of(&posed.at(order[index], &gains), with, task).map(Some),
+        )?;
+        let estimate = |found: &Option<Margins>| {
+            let each = found.iter().flat_map(|found| {
+                found.phase_margins.iter().zip(&found.gain_crossovers)
+            });
             each.map(|(turn, omega)| turn.rem_euclid(360.0) / omega)
                 .fold(f64::INFINITY, f64::min)
         };
-        let mut order: Vec<usize> = (0..margins.len()).collect();
-        order.sort_by(|i, j| estimate(&margins[*i]).total_cmp(&estimate(&margins[*j])));
-        for place in order.into_iter().take(LATEST) {
-            if margins[place].delay_margin.is_nan() {
-                let of = self.posed.with(&self.posed.loops[place], &gains);
-                margins[place] = margins_of(&of, true, self.task)?;
+        let mut late: Vec<usize> = (0..margins.len()).collect();
+        late.sort_by(|i, j| estimate(&margins[*i]).total_cmp(&estimate(&margins[*j])));
+        for index in late.into_iter().take(LATEST) {
+            let is_known = |found: &Margins| !found.delay_margin.is_nan();
+            if !margins[index].as_ref().is_some_and(is_known) {
+                margins[index] = Some(margins_of(&posed.at(order[index], &gains), true, task)?);
             }
         }
         Ok(Best {
             gains,
             value,
-            margins,
+            worst: order.first().copied().unwrap_or(0),
+            margins: margins.into_iter().flatten().collect(),
+            neighbours,
         })
     }
 
+    /// Gains around the best ratios that lose no more than the slack.
+    fn neighbours(&self, shape: &[f64], value: f64) -> Result<Vec<Neighbour>, Error> {
+        let mut found = Vec::new();
+        if self.posed.slack <= 0.0 {
+            return Ok(found);
+        }
+        let (reach, count) = match shape.len() {
+            0 => return Ok(found),
+            1 => AROUND_ONE,
+            _ => AROUND_TWO,
+        };
+        let axes: Vec<(f64, f64, usize)> = shape
+            .iter()
+            .map(|x| (x - reach, x + reach, count))
+            .collect();
+        let most = (1.0 + self.posed.slack) * value;
+        for shape in grid(&axes) {
+            self.task.check()?;
+            if let Some(gains) = self.gains(&shape)? {
+                let value = self.value(&gains, most)?;
+                if value <= most {
+                    found.push(Neighbour {
+                        shape,
+                        gains,
+                        value,
+                    });
+                }
+            }
+        }
+        Ok(found)
+    }
+
     /// Add where the demands are missed; the largest excess, or none where they are met.
-    fn learn(&mut self, gains: &[f64], margins: &[Margins]) -> Result<Option<f64>, Error> {
+    fn learn(&mut self, gains: &[f64], peaks: &[Option<Peak>]) -> Result<Option<f64>, Error> {
         let most = self.posed.demands.max_sensitivity;
         let mut missed: Vec<(f64, usize)> = Vec::new();
-        for (place, found) in margins.iter().enumerate() {
-            let excess = if found.stable {
-                found.peaks.sensitivity.value / most - 1.0
-            } else {
-                f64::INFINITY
-            };
+        for (place, found) in peaks.iter().enumerate() {
+            let excess = found.map_or(f64::INFINITY, |peak| peak.value / most - 1.0);
             let is_seen = self.seen.iter().any(|(known, _)| *known == place);
             let others = if self.posed.demands.has_others() && !is_seen && excess <= EXCESS {
-                let of = self.posed.with(&self.posed.loops[place], gains);
+                let of = self.posed.at(place, gains);
                 self.posed.demands.missed(&of, self.task)?
             } else {
                 0.0
@@ -253,9 +357,8 @@ impl<'a> Search<'a> {
                     self.seen.len() - 1
                 }
             };
-            if margins[place].stable {
-                let omega = margins[place].peaks.sensitivity.omega;
-                self.seen[known].1.add(omega, self.task)?;
+            if let Some(peak) = peaks[place] {
+                self.seen[known].1.add(peak.omega, self.task)?;
             } else if self.checks_all {
                 refuse!(
                     "no gains were found with which all loops are stable: give a smaller region, or \
@@ -316,11 +419,12 @@ impl<'a> Search<'a> {
 
     /// The best point of the grid.
     fn on_grid(&self) -> Result<Option<Vec<f64>>, Error> {
-        let mut points: Vec<(f64, Vec<f64>, Vec<f64>)> = Vec::new();
+        let mut points: Vec<(f64, Vec<f64>)> = Vec::new();
         for shape in grid(&self.posed.axes()) {
             self.task.check()?;
-            if let Some(gains) = self.gains(&shape)? {
-                points.push((self.least(&gains)?, shape, gains));
+            // Other demands leave smaller gains, which lasting loads do not like.
+            if let Some((ray, gap)) = self.gap(&shape)? {
+                points.push((self.least(&ray.at(gap.1))?, shape));
             }
         }
         points.sort_by(|x, y| x.0.total_cmp(&y.0));
@@ -329,11 +433,14 @@ impl<'a> Search<'a> {
             points = points.into_iter().step_by(stride).collect();
         }
         let mut best: Option<(f64, Vec<f64>)> = None;
-        for (least, shape, gains) in points {
+        for (least, shape) in points {
             let most = best.as_ref().map_or(NEVER, |best| best.0);
             if least >= most {
                 break;
             }
+            let Some(gains) = self.gains(&shape)? else {
+                continue;
+            };
             let value = self.value(&gains, most)?;
             if value < most {
                 best = Some((value, shape));
@@ -344,9 +451,20 @@ impl<'a> Search<'a> {
 
     /// The largest gains of this shape that meet the demands in the loops that are seen.
     fn gains(&self, shape: &[f64]) -> Result<Option<Vec<f64>>, Error> {
+        let Some((ray, gap)) = self.gap(shape)? else {
+            return Ok(None);
+        };
+        if !self.posed.demands.has_others() {
+            return Ok(Some(ray.at(gap.1)));
+        }
+        Ok(self.down(&ray, gap)?.map(|k| ray.at(k)))
+    }
+
+    /// The ray of a shape and the highest stable gap that Ms leaves on it.
+    fn gap(&self, shape: &[f64]) -> Result<Option<(Ray, Gap)>, Error> {
         let ray = self.posed.ray(shape, self.scale);
-        let demands = &self.posed.demands;
-        let least = 1.0 / (demands.max_sensitivity * (1.0 - AIMED));
+        let most = self.posed.demands.max_sensitivity;
+        let least = 1.0 / (most * (1.0 - AIMED));
         let mut list: Vec<Gap> = Vec::new();
         for (_, open) in &self.seen {
             open.exclude(&ray.offset, &ray.along, least, &mut list);
@@ -358,71 +476,85 @@ impl<'a> Search<'a> {
                 continue;
             }
             // Beyond the frequencies that are seen nothing is excluded.
-            let end = if end.is_finite() { end } else { 2.0 * from.max(f64::MIN_POSITIVE) };
-            let gains = ray.at(end);
-            if !self.is_stable(&gains)? {
+            let is_open = end == f64::INFINITY;
+            let end = if is_open { 2.0 * from.max(f64::MIN_POSITIVE) } else { end };
+            if !self.is_stable(&ray.at(end))? {
                 continue;
             }
             refuse_if!(
-                to.min(high) == f64::INFINITY,
-                "nothing limits the gains of this loop: Ms stays below {} for all of them; give it \
-                 the delay or the lags that the real loop has, or ranges=",
-                demands.max_sensitivity
+                is_open,
+                "nothing limits the gains of this loop: Ms stays below {most} for all of them; give \
+                 it the delay or the lags that the real loop has, or ranges="
             );
-            if !demands.has_others() {
-                return Ok(Some(gains));
-            }
-            if let Some(k) = self.down(&ray, (from, end))? {
-                return Ok(Some(ray.at(k)));
-            }
+            return Ok(Some((ray, (from, end))));
         }
         Ok(None)
     }
 
-    /// The largest k of a gap whose gains meet the other demands.
-    fn down(&self, ray: &Ray, (from, end): (f64, f64)) -> Result<Option<f64>, Error> {
-        let meets = |k: f64| -> Result<bool, Error> {
-            let gains = ray.at(k);
-            for (place, _) in &self.seen {
-                let of = self.posed.with(&self.posed.loops[*place], &gains);
-                if self.posed.demands.missed(&of, self.task)? > 0.0 {
-                    return Ok(false);
-                }
-            }
-            Ok(true)
-        };
+    /// By how much gains miss the other demands in the worst of the loops that are seen.
+    fn missed(&self, gains: &[f64]) -> Result<f64, Error> {
+        let mut worst = f64::NEG_INFINITY;
+        for (place, _) in &self.seen {
+            let of = self.posed.at(*place, gains);
+            worst = worst.max(self.posed.demands.missed(&of, self.task)?);
+        }
+        Ok(worst)
+    }
+
+    /// The largest k of a gap whose gains meet the other demands, by regula falsi (Illinois: Dowell and
+    /// Jarratt 1971, BIT 11).
+    fn down(&self, ray: &Ray, (from, end): Gap) -> Result<Option<f64>, Error> {
         let (mut good, mut bad) = (end, None);
         for _ in 0..STEPS_DOWN {
-            if meets(good)? {
-                let Some(mut bad) = bad else {
-                    return Ok(Some(good));
-                };
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (good + bad);
-                    if meets(middle)? {
-                        good = middle;
-                    } else {
-                        bad = middle;
-                    }
+            let short = self.missed(&ray.at(good))?;
+            if short > 0.0 {
+                bad = Some((good, short));
+                good *= DOWN;
+                if good <= from {
+                    return Ok(None);
                 }
+                continue;
+            }
+            let Some((mut bad, mut over)) = bad else {
                 return Ok(Some(good));
+            };
+            let mut under = short;
+            for _ in 0..HALVINGS {
+                let share = under / (under - over);
+                let is_known = share.is_finite() && over.is_finite();
+                let middle = good + (bad - good) * if is_known { share } else { 0.5 };
+                let found = self.missed(&ray.at(middle))?;
+                if found > 0.0 {
+                    (bad, over) = (middle, found);
+                    under *= 0.5;
+                } else {
+                    (good, under) = (middle, found);
+                    over *= 0.5;
+                }
+                if (bad - good) <= KNOWN * good || (found <= 0.0 && found > -KNOWN) {
+                    break;
+                }
             }
-            bad = Some(good);
-            good *= DOWN;
-            if good <= from {
-                break;
-            }
+            return Ok(Some(good));
         }
         Ok(None)
     }
 
     fn is_stable(&self, gains: &[f64]) -> Result<bool, Error> {
+        if let (false, Some(growth), Some((_, open))) =
+            (self.checks_all, self.growth.get(), self.seen.first())
+        {
+            return Ok((open.growth(gains) - growth).abs() < SAME_GROWTH);
+        }
         let count = if self.checks_all { self.seen.len() } else { 1 };
         for (place, _) in self.seen.iter().take(count) {
-            let of = self.posed.with(&self.posed.loops[*place], gains);
+            let of = self.posed.at(*place, gains);
             if !is_stable_loop(&of, self.task)? {
                 return Ok(false);
             }
+        }
+        if let Some((_, open)) = self.seen.first() {
+            self.growth.set(Some(open.growth(gains)));
         }
         Ok(true)
     }
@@ -434,7 +566,7 @@ impl<'a> Search<'a> {
         }
         let mut worst = 0.0f64;
         for (place, _) in &self.seen {
-            let of = self.posed.with(&self.posed.loops[*place], gains);
+            let of = self.posed.at(*place, gains);
             worst = worst.max(lasting(&of)?);
         }
         Ok(self.weights.load * worst)
@@ -452,7 +584,7 @@ impl<'a> Search<'a> {
         }
         let mut worst = least;
         for (place, _) in &self.seen {
-            let of = self.posed.with(&self.posed.loops[*place], gains);
+            let of = self.posed.at(*place, gains);
             let number = |found: f64| if found.is_nan() { NEVER } else { found };
             let of_step = |drive, is_settling: bool| -> Result<f64, Error> {
                 let found = figures(&of, drive, self.task)?.map(|found| found.deviation);
@@ -484,12 +616,17 @@ impl<'a> Search<'a> {
 }
 
 impl Posed {
-    /// One of the loops with these free gains.
-    pub fn with(&self, of: &ControlLoop, gains: &[f64]) -> ControlLoop {
+    /// A loop with these free gains.
+    fn with(&self, of: &ControlLoop, gains: &[f64]) -> ControlLoop {
         let pairs = self.free.iter().zip(gains);
         pairs.fold(of.clone(), |made, (place, gain)| {
             made.with_number(Place::Controller(*place), *gain)
         })
+    }
+
+    /// The loop in a place with these free gains.
+    fn at(&self, place: usize, gains: &[f64]) -> ControlLoop {
+        self.with(&self.loops[place], gains)
     }
 
     /// The gain that all others are in proportion to: the first free one.
