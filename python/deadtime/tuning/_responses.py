@@ -196,8 +196,9 @@ class Wanted:
         if row:
             found = self.gains(every, corners, shape=near[row][0])
         loop = problem.at(found.gains)
-        if given is None:
-            loop = loop.replace(controller=replace(loop.controller, weight=weight))
+        chosen = loop.controller
+        if given is None and isinstance(chosen, (PI, PID)):
+            loop = loop.replace(controller=replace(chosen, weight=weight))
         return found, loop
 
     def _trades(

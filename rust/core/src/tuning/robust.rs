@@ -152,6 +152,9 @@ struct Search<'a> {
     task: &'a Task,
 }
 
+/// Value, ratios and gains that meet the demands, with Ms of each loop.
+type Judged = (f64, Vec<f64>, Vec<f64>, Vec<Option<Peak>>);
+
 /// Gains on a ray.
 struct Ray {
     offset: Vec<f64>,
@@ -209,7 +212,7 @@ impl<'a> Search<'a> {
     fn run(mut self) -> Result<Best, Error> {
         let is_given = self.posed.shape.is_some();
         let mut shape = self.posed.shape.clone().unwrap_or_default();
-        let mut is_new = !is_given;
+        let (mut is_new, mut known) = (!is_given, None);
         for _ in 0..ROUNDS {
             if is_new {
                 shape = self.shape()?;
@@ -231,7 +234,16 @@ impl<'a> Search<'a> {
                 |(), place| sensitivity_of(&posed.at(place, &gains), task),
             )?;
             match self.learn(&gains, &peaks)? {
-                None => return self.judged(gains, &shape, &peaks),
+                None => {
+                    // The frequencies that were added sharpen what Ms allows of other ratios.
+                    let value = self.value(&gains, f64::INFINITY)?;
+                    let before = known.replace((value, shape.clone(), gains, peaks));
+                    if is_given || shape.is_empty() || before.is_some() {
+                        return self.judged(before, known);
+                    }
+                    shape = self.refined(shape)?;
+                    is_new = false;
+                }
                 Some(excess) => is_new = !is_given && excess > SMALL,
             }
         }
@@ -243,15 +255,14 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// The result, with the margins of the loops in which they may be least.
-    fn judged(
-        &self,
-        gains: Vec<f64>,
-        shape: &[f64],
-        peaks: &[Option<Peak>],
-    ) -> Result<Best, Error> {
-        let value = self.value(&gains, f64::INFINITY)?;
-        let neighbours = self.neighbours(shape, value)?;
+    /// The better of two results, with the margins of the loops in which they may be least.
+    fn judged(&self, before: Option<Judged>, last: Option<Judged>) -> Result<Best, Error> {
+        let both = before.into_iter().chain(last);
+        let best = both.min_by(|x, y| x.0.total_cmp(&y.0));
+        let Some((value, shape, gains, peaks)) = best else {
+            refuse!("no gains were found");
+        };
+        let neighbours = self.neighbours(&shape, value)?;
         let size = |place: &usize| peaks[*place].map_or(f64::INFINITY, |peak| peak.value);
         let mut order: Vec<usize> = (0..peaks.len()).collect();
         order.sort_by(|i, j| size(j).total_cmp(&size(i)));
@@ -385,6 +396,11 @@ impl<'a> Search<'a> {
                 self.posed.demands.max_sensitivity
             );
         };
+        self.refined(start)
+    }
+
+    /// Better ratios around a start.
+    fn refined(&self, start: Vec<f64>) -> Result<Vec<f64>, Error> {
         let axes = self.posed.axes();
         let sides: Vec<f64> = axes
             .iter()
