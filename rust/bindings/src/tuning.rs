@@ -365,10 +365,7 @@ pub(crate) fn tuning_rules(py: Python<'_>, of: &PyLoop) -> PyResult<Vec<RuleRow>
 
 /// Gain, lag, second lag and dead time in s of the plant of a loop by the half rule.
 #[pyfunction]
-pub(crate) fn half_rule(
-    of: &PyLoop,
-    with_second: bool,
-) -> PyResult<Option<(f64, f64, f64, f64)>> {
+pub(crate) fn half_rule(of: &PyLoop, with_second: bool) -> PyResult<Option<(f64, f64, f64, f64)>> {
     let found = converted(tuning::reduced(of.core(), with_second))?;
     Ok(found.map(|plant| (plant.gain, plant.lag, plant.second, plant.dead_time)))
 }

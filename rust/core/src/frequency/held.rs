@@ -5,11 +5,11 @@
 
 use super::circle::is_stable;
 use super::further_delay::further_delay;
+use super::gain_crossovers::{Crossover, FAR, crossovers, is_zero};
 use super::held_peaks::{held_peak, held_peaks};
+use super::margins::{Margins, degrees, least};
 use super::norms::Peaks;
 use super::peaks::Peak;
-use super::gain_crossovers::{Crossover, FAR, crossovers, is_zero};
-use super::margins::{Margins, degrees, least};
 use crate::order::sort_up;
 use crate::stability::{Crossing, HeldLoop, HeldNumbers};
 use crate::{Error, Task};

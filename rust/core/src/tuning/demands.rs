@@ -88,7 +88,11 @@ impl Demands {
         if self.settling_time.is_finite() && worst <= 0.0 {
             let settled = settling_time(of, task)?;
             let missed = settled / self.settling_time - 1.0;
-            worst = worst.max(if missed.is_nan() { f64::INFINITY } else { missed });
+            worst = worst.max(if missed.is_nan() {
+                f64::INFINITY
+            } else {
+                missed
+            });
         }
         Ok(worst)
     }
@@ -177,6 +181,9 @@ pub fn noise_gain(of: &ControlLoop, bandwidth: f64, task: &Task) -> Result<f64, 
             if size.is_nan() { 0.0 } else { size * size * w }
         })
         .collect();
-    let inner: f64 = squares.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).sum();
+    let inner: f64 = squares
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0] + pair[1]))
+        .sum();
     Ok((inner * step / bandwidth).sqrt())
 }

@@ -119,9 +119,8 @@ impl Open {
     /// alone differ by less than a quarter turn in it, all others by half a turn at least.
     pub(super) fn growth(&self, gains: &[f64]) -> f64 {
         let finite = self.values.iter().filter(|(omega, _)| omega.is_finite());
-        let values = finite.map(|(_, row)| {
-            1.0 + row.first().copied().unwrap_or_default() + sum(row, gains)
-        });
+        let values =
+            finite.map(|(_, row)| 1.0 + row.first().copied().unwrap_or_default() + sum(row, gains));
         let (mut total, mut last) = (0.0, None);
         for value in values {
             if let Some(before) = last.replace(value) {
@@ -241,9 +240,9 @@ impl Scale {
         let (n, d) = of.loop_gain()?;
         let ((above, zeros), (below, poles)) = (first_term(&n), first_term(&d));
         let sign = if above * below < 0.0 { -1.0 } else { 1.0 };
-        let top = values.sample_time.map_or(f64::INFINITY, |period| {
-            std::f64::consts::PI / period
-        });
+        let top = values
+            .sample_time
+            .map_or(f64::INFINITY, |period| std::f64::consts::PI / period);
         // At low frequencies each pole at zero turns by a quarter.
         let start = (f64::from(zeros) - f64::from(poles)) * std::f64::consts::FRAC_PI_2;
         let (sine, cosine) = sin_cos(start);
@@ -339,7 +338,11 @@ fn frequencies(crossover: f64, delay: f64, top: Option<f64>) -> Vec<f64> {
     while omega < end {
         found.push(omega);
         let step = (factor - 1.0) * omega;
-        let most = if delay * omega < TURNS { TURN / delay } else { step };
+        let most = if delay * omega < TURNS {
+            TURN / delay
+        } else {
+            step
+        };
         omega += step.min(most);
     }
     found.push(end);
