@@ -908,7 +908,7 @@ class FamilyFit:
     first_rows: Final[list[int]]
     causes: Final[list[tuple[str, float, float, float, int, float]]]
     rival_causes: Final[list[str]]
-    sensor_faults: Final[list[tuple[str, int, int, float, float]]]
+    sensor_faults: Final[list[tuple[str, int, int, float, float, float]]]
     at_rest: Final[bool]
     told: Final[int]
     asked: Final[int]

@@ -146,6 +146,73 @@ def test_what_a_sensor_did_not_read_is_left_out(name: str, rows: Any, left_out: 
     check_the_linear_part(fit)
 
 
+@pytest.mark.parametrize("rows", [3, 5, 9])
+def test_the_length_of_a_moving_mean_is_named(rows: int) -> None:
+    clean = flown()
+    padded = np.pad(clean.output, rows // 2, "edge")
+    smooth = np.convolve(padded, np.full(rows, 1.0 / rows), "valid")
+    fit = dtm.estimate_delay(dtm.Recording(clean.time, clean.reference, smooth, clean.command))
+    (fault,) = fit.sensor_faults
+    assert fault.name == "smoothed"
+    assert fault.size == pytest.approx(rows, abs=0.02)
+    assert f"found: {fault.in_words()}" in fit.summary()
+    assert fit.causes == ()
+    # As well known as if nothing were smoothed.
+    check_the_linear_part(fit)
+
+
+def test_a_filter_is_no_moving_mean() -> None:
+    clean = flown()
+    smooth = clean.output.copy()
+    for row in range(1, ROWS):
+        smooth[row] = smooth[row - 1] + 0.4 * (clean.output[row] - smooth[row - 1])
+    fit = dtm.estimate_delay(dtm.Recording(clean.time, clean.reference, smooth, clean.command))
+    assert fit.sensor_faults == ()
+
+
+def stepped(jitter: float, seed: int = 3) -> dtm.Recording:
+    """A process with a time constant of 8 s whose commands arrive late by a normal number of s."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(700.0)
+    command = np.zeros(time.size)
+    output = np.zeros(time.size)
+    level = 0.0
+    for row in range(30, time.size, 25):
+        step = rng.choice([-3.0, 3.0]) if level == 0.0 else -level
+        level += step
+        command[row:] += step
+        begun = row + 4.3 + jitter * rng.standard_normal()
+        output += 1.5 * step * -np.expm1(-np.maximum(time - begun, 0.0) / 8.0)
+    output += 0.02 * rng.standard_normal(time.size)
+    return dtm.Recording(time, None, output, command)
+
+
+def test_jitter_of_the_commands_is_named() -> None:
+    fit = dtm.estimate_delay(stepped(0.3), between="held")
+    (cause,) = fit.causes
+    assert cause.name == "jitter"
+    assert cause.size == pytest.approx(0.3, rel=0.35)
+    assert dtm.estimate_delay(stepped(0.0), between="held").causes == ()
+
+
+def test_flights_that_differ_widen_the_interval_of_the_vehicle() -> None:
+    def flights(*gains: float) -> list[dtm.Recording]:
+        return [
+            dtm.Recording(one.time, one.reference, one.output, one.command / gain)
+            for gain, one in zip(gains, (flown(seed=1), flown(seed=2)), strict=True)
+        ]
+
+    known = {"controller": [dtm.P(1.3)] * 2, "limit": 1.0, "causes": False}
+    alike = dtm.estimate_delay(flights(1.0, 1.0), **known)
+    differ = dtm.estimate_delay(flights(1.03, 0.97), **known)
+    widths = []
+    for fit in (alike, differ):
+        low, high = fit.at(2.0).gain_ci[:, 0]
+        assert low < GAIN / 2.0 / math.hypot(1.0, 2.0 * LAG) < high
+        widths.append(high - low)
+    assert widths[1] > 3.0 * widths[0]
+
+
 def test_equal_readings_of_a_coarse_sensor_are_readings() -> None:
     clean = flown()
     for step in (0.001, 0.01):

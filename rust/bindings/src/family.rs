@@ -165,12 +165,16 @@ impl FamilyFit {
         self.core.rivals.iter().map(|kind| kind.name()).collect()
     }
 
-    /// Rows that are no readings of the sensor: why, in which record, how many, from and to which time.
+    /// Rows that are no readings of the sensor: why, in which record, how many, from and to which time, and
+    /// the mean age of repeated readings, s, or the length of a moving mean, rows.
     #[getter]
-    fn sensor_faults(&self) -> Vec<(&'static str, usize, usize, f64, f64)> {
+    fn sensor_faults(&self) -> Vec<(&'static str, usize, usize, f64, f64, f64)> {
         let faults = self.core.sensor.iter();
         faults
-            .map(|one| (one.kind.name(), one.record, one.rows, one.from, one.to))
+            .map(|one| {
+                let (kind, rows) = (one.kind.name(), one.rows);
+                (kind, one.record, rows, one.from, one.to, one.size)
+            })
             .collect()
     }
 

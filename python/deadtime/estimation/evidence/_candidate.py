@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import deadtime.estimation._native as native
 from deadtime._base.digits import time_unit
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime.loops import FactoredPlant, FirstOrder, Integrator, Plant, RationalPlant
+
+#: Lead in BIC from which a plant explains a recording clearly better: 10 is "very strong" of Kass
+#: and Raftery (1995). Smaller: the second is ruled out by chance; larger: hulls are wider.
+CLEAR = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +127,23 @@ def candidate_of(found: native.FamilyCandidate, best: float) -> PlantCandidate:
         found.told,
         found.noise_std,
     )
+
+
+def plant_of(
+    names: Sequence[str], values: Sequence[float], integrator: bool
+) -> tuple[float, Plant]:
+    """The dead time and the plant with these numbers, by the names of the kernel."""
+    numbers = dict(zip(names, values, strict=True))
+    total, product = numbers.get("lag_sum", 0.0), numbers.get("lag_product", 0.0)
+    lags: tuple[float, ...] = (numbers["lag"],) if "lag" in numbers else ()
+    pair: dict[str, float] = {}
+    if product > 0.0 and total * total < 4.0 * product:
+        pair = {"pole_frequency": product**-0.5, "pole_damping": 0.5 * total * product**-0.5}
+    elif product > 0.0:
+        largest = 0.5 * (total + math.sqrt(total * total - 4.0 * product))
+        lags = (largest, product / largest)
+    zero = numbers.get("zero", 0.0)
+    return max(numbers["delay"], 0.0), _plant(numbers["gain"], lags, zero, integrator, pair)
 
 
 def _plant(

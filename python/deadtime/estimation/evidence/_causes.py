@@ -26,6 +26,7 @@ WORDS = {
     "drag": "a force of {size} times the square of the speed slows the motion",
     "gain ramp": "the gain changes by {share} over the recording",
     "gain by level": "the gain changes by {share} over the range of the output",
+    "jitter": "commands arrive at times that scatter by {size} s",
 }
 
 #: What to do about each.
@@ -43,6 +44,7 @@ REMEDIES = {
     "drag": "the gain holds for speeds as in this recording",
     "gain ramp": "look what changes, such as a battery or a temperature",
     "gain by level": "record around the level at which the loop is to work",
+    "jitter": "log the times at which commands are sent, or send them by a steady clock",
 }
 
 #: Both sides of a limit have one name.
@@ -50,8 +52,9 @@ NAMES = {"upper limit": "unequal limits", "lower limit": "unequal limits"}
 
 SENSOR_WORDS = {
     "frozen": "the sensor is frozen for {rows} rows from {start:.4g} to {stop:.4g} s",
-    "repeated": "the sensor repeats its reading in {rows} rows",
+    "repeated": "the sensor repeats its reading in {rows} rows, {size:.3g} s old in the mean",
     "glitch": "the sensor leaves and comes back in {rows} rows",
+    "smoothed": "the readings are a moving mean of {size:.3g} rows around each",
 }
 
 
@@ -64,10 +67,10 @@ class Cause:
     name : str
         ``"load"``, ``"output step"``, ``"delay change"``, ``"dead zone"``, ``"play"``,
         ``"stiction"``, ``"unequal limits"``, ``"rate limit"``, ``"slope limit"``, ``"drag"``,
-        ``"gain ramp"`` or ``"gain by level"``.
+        ``"gain ramp"``, ``"gain by level"`` or ``"jitter"`` of the times of commands.
     size : float
         In units of the command for a load, a dead zone, play, stiction and limits; of the output
-        for its step; a share for a gain that changes; s for a change of delay.
+        for its step; a share for a gain that changes; s for a change of delay and for jitter.
     ci : (float, float)
         Its 95 % interval.
     time : float or None
@@ -106,18 +109,22 @@ class Cause:
 
 @dataclass(frozen=True)
 class SensorFault:
-    """Rows of a recording that are no readings of the sensor; they are left out.
+    """Rows of a recording that are no readings of the sensor.
+
+    They are left out; from a moving mean, the readings are found back.
 
     Attributes
     ----------
-    name : {"frozen", "repeated", "glitch"}
+    name : {"frozen", "repeated", "glitch", "smoothed"}
         What the sensor did.
     recording : int
         The recording, from 0 on.
     rows : int
-        How many rows were left out.
+        How many rows are concerned.
     start, stop : float
         Times of the first and the last of them, s.
+    size : float
+        The mean age of repeated readings, s; the length of a moving mean, rows; NaN of others.
     """
 
     name: str
@@ -125,11 +132,12 @@ class SensorFault:
     rows: int
     start: float
     stop: float
+    size: float
 
     def in_words(self) -> str:
         """What the sensor did, and where."""
         words = SENSOR_WORDS[self.name]
-        return words.format(rows=self.rows, start=self.start, stop=self.stop)
+        return words.format(rows=self.rows, size=self.size, start=self.start, stop=self.stop)
 
 
 def causes_of(found: native.FamilyFit) -> tuple[Cause, ...]:

@@ -13,13 +13,12 @@ import numpy as np
 import deadtime.estimation._native as native
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._candidate import candidate_of
+from deadtime.estimation.evidence._candidate import CLEAR, candidate_of
 from deadtime.estimation.evidence._causes import causes_of, sensor_faults_of
 from deadtime.estimation.evidence._estimate import PlantEstimate
 from deadtime.estimation.evidence._numbers import FittedRecording
 from deadtime.estimation.evidence._question import Between, Question, questions_of
 from deadtime.estimation.evidence._words import (
-    CLEAR,
     LEVELS,
     ROUNDING,
     TAKEN_AT_REST,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,11 +15,15 @@ from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import one_dimensional
 from deadtime._base.verdicts import Verdict
-from deadtime.estimation.evidence._candidate import PlantCandidate
+from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, plant_of
 from deadtime.estimation.evidence._causes import Cause, SensorFault
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller, ControlLoop, Plant
 from deadtime.recordings import Recording
+
+#: Step of the derivatives over the numbers of a plant, in their errors. Larger: more curvature is
+#: lost; smaller: digits are.
+STEP = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +293,63 @@ class FoundPlant(ReadOnlyArrays):
         return ControlLoop(
             self.plant, controller, delay=self.delay, sample_time=sample_time, limit=limit
         )
+
+    def in_loop(
+        self,
+        controller: Controller,
+        of: Callable[[ControlLoop], float],
+        *,
+        sample_time: float | None = None,
+        limit: float | None = None,
+    ) -> tuple[float, tuple[float, float]]:
+        """A number of a loop around the plant, and its 95 % interval.
+
+        Parameters
+        ----------
+        controller : P, PI, PD, PV or PID
+            The controller.
+        of : callable
+            The number of a `ControlLoop`, such as the overshoot of its step response.
+        sample_time : float, optional
+            Time between its commands, s; continuous without.
+        limit : float, optional
+            Largest size of its command.
+
+        Returns
+        -------
+        float, (float, float)
+            That of the likeliest plant, and the interval over the kinds of plant that the recording
+            does not rule out, by the delta method.
+
+        Raises
+        ------
+        ValueError
+            If the verdict is ``"none"``.
+        """
+        if self.plant is None or self.verdict == "none":
+            raise ValueError(f"no plant: {self.reason}")
+        found = self._answer().candidates
+        least = min(one.bic for one in found)
+        near = [one for one in found if one.bic <= least + CLEAR and one.told == len(one.names)]
+        parts = []
+        for one in near or found[:1]:
+
+            def number(values: Array, one: native.FamilyCandidate = one) -> float:
+                delay, plant = plant_of(one.names, values.tolist(), one.integrating)
+                loop = ControlLoop(
+                    plant, controller, delay=delay, sample_time=sample_time, limit=limit
+                )
+                return float(of(loop))
+
+            steps = np.diag(STEP * np.array(one.errors))
+            values, n = np.array(one.values), len(one.names)
+            slopes = [(number(values + h) - number(values - h)) / 2.0 / STEP for h in steps]
+            unit = np.outer(one.errors, one.errors)
+            correlation = np.array(one.covariance).reshape(n, n) / np.where(unit > 0.0, unit, 1.0)
+            reach = one.quantile * math.sqrt(max(float(slopes @ correlation @ slopes), 0.0))
+            parts.append((number(values), reach))
+        low = min(value - reach for value, reach in parts)
+        return parts[0][0], (low, max(value + reach for value, reach in parts))
 
     @property
     def crossover_in_loop(self) -> float:

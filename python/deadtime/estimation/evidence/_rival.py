@@ -26,11 +26,10 @@ from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
 from deadtime.estimation._result import DelayEstimate, bic
 from deadtime.estimation.data._simulated import moves_between_rows
-from deadtime.estimation.evidence._candidate import PlantCandidate, candidate_of
+from deadtime.estimation.evidence._candidate import CLEAR, PlantCandidate, candidate_of
 from deadtime.estimation.evidence._find import is_outside
 from deadtime.estimation.evidence._question import PLANTS, Question, question_of
 from deadtime.estimation.evidence._screen import may_have_rivals
-from deadtime.estimation.evidence._words import CLEAR
 from deadtime.estimation.methods._method import Method, Run
 from deadtime.estimation.methods._output_error import OutputError
 from deadtime.loops import PAIR, FactoredPlant, FirstOrder, Integrator, P, Plant

@@ -19,8 +19,8 @@ from deadtime._base.arrays import Array
 from deadtime.estimation._native import FlightProfile, HeldResponse
 from deadtime.estimation._result import DelayEstimate
 from deadtime.estimation.data._checks import independent_samples
+from deadtime.estimation.evidence._candidate import CLEAR
 from deadtime.estimation.evidence._question import Question
-from deadtime.estimation.evidence._words import CLEAR
 from deadtime.estimation.likelihood._disturbances import Disturbance, whitened
 
 #: Lags of the columns, from so many rows to this share of the window, and how many. More: a plant

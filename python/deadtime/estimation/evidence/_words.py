@@ -12,14 +12,11 @@ from deadtime._base.digits import between, shown
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import OpenRange
 from deadtime._base.verdicts import rough
+from deadtime.estimation.evidence._candidate import CLEAR
 from deadtime.estimation.evidence._numbers import FoundPlant
 from deadtime.estimation.evidence._question import Question
 from deadtime.loops import Controller
 from deadtime.recordings import MINIMUM_SAMPLES
-
-#: Lead in BIC from which a plant explains a recording clearly better: 10 is "very strong" of Kass
-#: and Raftery (1995). Smaller: the second is ruled out by chance; larger: hulls are wider.
-CLEAR = 10.0
 
 #: Ratio of the ends of an interval of the gain below which it is shown for a frequency. Larger:
 #: frequencies that the command hardly moves are listed too.
@@ -228,7 +225,9 @@ def _beside(fit: FoundPlant) -> list[str]:
             "recording, and was moved"
         )
     lines += [f"found: {cause.in_words()}: {cause.remedy}" for cause in fit.causes]
-    lines += [f"left out: {fault.in_words()}" for fault in fit.sensor_faults]
+    for fault in fit.sensor_faults:
+        done = "found" if fault.name == "smoothed" else "left out"
+        lines.append(f"{done}: {fault.in_words()}")
     for place, run in enumerate(fit.runs, 1):
         rows = int((~_isnan(run.residuals)).sum())
         where = f" of recording {place}" if fit.others else ""

@@ -3,19 +3,16 @@
 use super::between::{Open, open};
 use super::class::{Class, Numbers};
 use super::dispersion::dispersion;
+use super::flexible::flexible;
+use super::information::{covariance, products};
 use super::loop_view::Seen;
 use super::minima::Minimum;
 use super::model::Point;
 use super::noise::{Coefficients, Noise};
-use super::series::{Series, Shown, shown};
 use super::tolerances::EVIDENCE;
 use crate::estimation::statistics::{chi_squared_beyond, student_reach};
-use crate::linear_algebra::cholesky::inverse_of_positive;
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::vectors::dot;
-
-/// The spread of a number about which the record says nothing, in its scale: errors end there.
-const UNKNOWN: f64 = 10.0;
 
 /// Share by which two sums of the same squares differ at most, as the records are added up.
 const ALIKE: f64 = 1e-9;
@@ -72,6 +69,8 @@ pub struct Candidate {
     pub deviations: Vec<f64>,
     /// Covariance of ln gain, delay, ln of the numbers of the lags, zero.
     pub(super) inner: Vec<f64>,
+    /// The plant and the covariance without an error of its class.
+    plain: Option<(Seen, Vec<f64>)>,
     row: f64,
 }
 
@@ -91,38 +90,42 @@ impl Candidate {
         let free = count.saturating_sub(model.parameters()).max(1) as f64;
         let variance = point.squares / free;
         let sensitivities = model.sensitivities(point);
-        let series = (may_be_wrong && rows.flexible).then(|| {
-            let series = Series::beside(seen.numbers.low_delay(), rows.row);
-            shown(model, point, &sensitivities, series, variance)
-        });
-        let series = series.flatten();
-        let left = series.as_ref().map_or(&point.whitened, |own| &own.left);
-        let (factor, freedom) = dispersion(&sensitivities, left, variance);
         let scales: Vec<f64> = (0..seen.count())
             .map(|at| seen.scale(at, rows.row))
             .collect();
+        let flexible = if may_be_wrong && rows.flexible {
+            flexible(found)
+        } else {
+            None
+        };
+        let mut bic = found.bic;
+        let places = rows.places();
         let information = products(&sensitivities, &scales, variance);
         let known = covariance(&information, &scales, 1.0);
         let open = open(model, point, &sensitivities, &known, variance);
-        let rest = factor / explained(&open, &information, &scales);
-        let (inner, factor) = if open.share > 0.0 {
-            (with_open(&open, known, rest.max(1.0)), rest.max(1.0))
-        } else if let Some(own) = &series {
-            let (moved, inner) = flexible(
-                &seen,
-                own,
-                point,
-                &sensitivities,
-                &scales,
-                factor * variance,
-            );
-            seen = moved;
-            (inner, factor)
+        let mut plain = None;
+        let (inner, factor, freedom) = if let Some(own) = flexible {
+            plain = Some((seen, known));
+            seen = own.seen;
+            bic = own.bic;
+            own.errors(rows.row, free, &places)
         } else {
-            (covariance(&information, &scales, factor), factor)
+            let (factor, freedom) = dispersion(&sensitivities, &point.whitened, variance, &places);
+            let rest = factor / explained(&open, &information, &scales);
+            if open.share > 0.0 {
+                (
+                    with_open(&open, known, rest.max(1.0)),
+                    rest.max(1.0),
+                    freedom,
+                )
+            } else {
+                (covariance(&information, &scales, factor), factor, freedom)
+            }
         };
-        let scatter =
-            |residual: &[f64]| (dot(residual, residual) / residual.len().max(1) as f64).sqrt();
+        let scatter = |residual: &[f64]| {
+            let known: Vec<f64> = residual.iter().copied().filter(|y| y.is_finite()).collect();
+            (dot(&known, &known) / known.len().max(1) as f64).sqrt()
+        };
         // Of one record the weight is 1, of several their sum of squares is that of white noise of size 1.
         let weights = &rows.weights;
         let mean_weight = (dot(weights, weights) / weights.len().max(1) as f64).sqrt();
@@ -139,7 +142,7 @@ impl Candidate {
             quantile: student_reach(level, freedom),
             freedom,
             deviance: found.deviance,
-            bic: found.bic,
+            bic,
             parameters: model.parameters(),
             told: told(&information, scales.len()),
             limit: found.limit(),
@@ -148,26 +151,31 @@ impl Candidate {
             } else {
                 whiteness(&point.whitened, model.noise.searched())
             },
-            deviation: scatter(&point.residual),
+            deviation: 0.0,
             innovation: variance.sqrt() / mean_weight,
             residuals: Vec::new(),
             fitted: Vec::new(),
             deviations: Vec::new(),
             inner,
+            plain,
             row: rows.row,
         };
         for (part, place) in rows.parts.iter().zip(rows.places()) {
             let own = &point.residual[place];
             let mut residuals = vec![f64::NAN; part.time.len()];
             let mut fitted = residuals.clone();
-            for ((at, residual), output) in part.used.iter().zip(own).zip(&part.output) {
+            let (own, output) = part.shown(own);
+            for ((at, residual), output) in part.used.iter().zip(&own).zip(output) {
                 residuals[*at] = *residual;
                 fitted[*at] = output + part.mean - residual;
             }
-            out.deviations.push(scatter(own));
+            out.deviations.push(scatter(&own));
             out.residuals.push(residuals);
             out.fitted.push(fitted);
         }
+        let each = rows.parts.iter().zip(rows.places());
+        let each = each.map(|(part, place)| part.shown(&point.residual[place]).0);
+        out.deviation = scatter(&each.flatten().collect::<Vec<f64>>());
         out.name_values();
         out
     }
@@ -232,52 +240,47 @@ impl Candidate {
         (1.0 / root, 0.5 * self.numbers.sum / root)
     }
 
+    /// Does the record show an error of its class?
+    pub(super) const fn errs(&self) -> bool {
+        self.seen.series.is_some()
+    }
+
     pub(super) const fn seen(&self) -> Seen {
         self.seen
     }
 
     /// A quantity and its interval.
     pub(super) fn interval(&self, of: impl Fn(&Seen) -> f64) -> (f64, f64, f64) {
-        let seen = self.seen();
-        let gradient = seen.gradient(self.row, &of);
+        self.interval_by(&self.seen, &self.inner, &of)
+    }
+
+    /// A number of the class and its interval. Where the class is in error, its numbers are less well known than
+    /// what a loop feels: they are those with the error and those without it.
+    pub(super) fn interval_of_class(&self, of: impl Fn(&Seen) -> f64) -> (f64, f64, f64) {
+        let with = self.interval(&of);
+        let Some((seen, inner)) = &self.plain else {
+            return with;
+        };
+        let without = self.interval_by(seen, inner, &of);
+        (without.0, with.1.min(without.1), with.2.max(without.2))
+    }
+
+    fn interval_by(
+        &self,
+        seen: &Seen,
+        inner: &[f64],
+        of: &dyn Fn(&Seen) -> f64,
+    ) -> (f64, f64, f64) {
+        let gradient = seen.gradient(self.row, of);
         let n = gradient.len();
         let mut variance = 0.0;
         for (i, left) in gradient.iter().enumerate() {
-            variance += left * dot(&self.inner[i * n..][..n], &gradient);
+            variance += left * dot(&inner[i * n..][..n], &gradient);
         }
         let reach = self.quantile * variance.max(0.0).sqrt();
-        let value = of(&seen);
+        let value = of(seen);
         (value, value - reach, value + reach)
     }
-}
-
-/// The plant with the error of its class, as far as the record shows it, and the covariance of all numbers.
-fn flexible(
-    seen: &Seen,
-    shown: &Shown,
-    point: &Point,
-    sensitivities: &[Vec<f64>],
-    scales: &[f64],
-    variance: f64,
-) -> (Seen, Vec<f64>) {
-    let mut columns = sensitivities.to_vec();
-    columns.extend_from_slice(&shown.columns);
-    let mut scales = scales.to_vec();
-    scales.resize(columns.len(), shown.deviation / UNKNOWN);
-    let inner = covariance(&products(&columns, &scales, variance), &scales, 1.0);
-    let scores: Vec<f64> = columns
-        .iter()
-        .map(|column| dot(column, &point.whitened) / variance)
-        .collect();
-    let mut out = Seen {
-        series: Some(shown.series),
-        ..*seen
-    };
-    for (at, row) in inner.chunks_exact(scores.len()).enumerate() {
-        out = out.moved(at, dot(row, &scores));
-    }
-    out.numbers.delay = out.numbers.delay.max(0.0);
-    (out, inner)
 }
 
 /// The covariance with what the rows of the command leave open, times a dispersion.
@@ -303,47 +306,6 @@ fn explained(open: &Open, information: &[f64], scales: &[f64]) -> f64 {
 /// Are the residuals smaller than what is taken for the rounding of the output?
 fn is_rounding(point: &Point) -> bool {
     dot(&point.whitened, &point.whitened) < (1.0 - ALIKE) * point.squares
-}
-
-/// WᵀW/σ² in the scale of each number.
-fn products(columns: &[Vec<f64>], scales: &[f64], variance: f64) -> Vec<f64> {
-    let mut out = Vec::with_capacity(columns.len() * columns.len());
-    for (left, a) in columns.iter().zip(scales) {
-        for (right, b) in columns.iter().zip(scales) {
-            out.push(dot(left, right) * a * b / variance);
-        }
-    }
-    out
-}
-
-/// The covariance from the information, with the little that is known without a record.
-fn covariance(information: &[f64], scales: &[f64], factor: f64) -> Vec<f64> {
-    let n = scales.len();
-    let mut matrix = information.to_vec();
-    for i in 0..n {
-        matrix[i * n + i] = matrix[i * n + i] / factor + 1.0 / (UNKNOWN * UNKNOWN);
-        for j in 0..n {
-            if i != j {
-                matrix[i * n + j] /= factor;
-            }
-        }
-    }
-    let mut out = inverse_of_positive(&matrix, n, 0.0).unwrap_or_else(|| {
-        let unknown = |at: usize| {
-            if at.is_multiple_of(n + 1) {
-                UNKNOWN * UNKNOWN
-            } else {
-                0.0
-            }
-        };
-        (0..n * n).map(unknown).collect()
-    });
-    for i in 0..n {
-        for j in 0..n {
-            out[i * n + j] *= scales[i] * scales[j];
-        }
-    }
-    out
 }
 
 /// How many combinations of numbers stand out of the noise.

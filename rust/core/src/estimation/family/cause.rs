@@ -29,10 +29,12 @@ pub enum CauseKind {
     GainRamp,
     /// The gain changes by this share over the range of the output.
     GainByLevel,
+    /// Commands arrive at times that scatter by this, s.
+    Jitter,
 }
 
 impl CauseKind {
-    /// All of them.
+    /// All that are columns beside a plant.
     pub(super) const ALL: [Self; 13] = [
         Self::Load,
         Self::OutputStep,
@@ -65,6 +67,7 @@ impl CauseKind {
             Self::Drag => "drag",
             Self::GainRamp => "gain ramp",
             Self::GainByLevel => "gain by level",
+            Self::Jitter => "jitter",
         }
     }
 

@@ -4,25 +4,56 @@
 //! gᵀ(I − A)⁻¹g over the blocks is p σ² where the model is right (Bell & McCaffrey 2002, CR2). Where no
 //! block has much leverage, the jackknife takes its place: gᵀ(I − A)⁻²g (m − 1)/m.
 
-use super::projection::Projection;
+use std::ops::Range;
 
+use super::projection::Projection;
 use super::tolerances::BLOCKS;
-use crate::estimation::statistics::chi_squared_beyond;
+use crate::estimation::statistics::{chi_squared_beyond, student_reach};
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::lu::Lu;
 use crate::linear_algebra::vectors::dot;
 
-/// The factor of the variance, at least 1, and the degrees of freedom that go with it.
+/// The factor of the variance, at least 1, and the degrees of freedom that go with it: of blocks of rows, or of
+/// the records at these places where they differ by more. Records of one plant that differ widen what is known of it.
 pub(super) fn dispersion(
     sensitivities: &[Vec<f64>],
     residual: &[f64],
     variance: f64,
+    places: &[Range<usize>],
 ) -> (f64, f64) {
     let basis = Projection::new(sensitivities.to_vec()).into_columns();
+    let own = blocks(&basis, residual.len());
+    let factor = scatter(&basis, residual, &own) / variance;
+    let freedom = BLOCKS.freedom * (basis.len() * (own.len() - 1)) as f64;
+    let within = if chi_squared_beyond(factor * freedom, freedom) > BLOCKS.chance {
+        // As the model says, whose own scatter then counts as more blocks would.
+        let weight = 1.0 + BLOCKS.prior;
+        let own = ((factor + BLOCKS.prior) / weight).max(1.0);
+        (own, weight * freedom)
+    } else {
+        (if factor > 1.0 { factor } else { 1.0 }, freedom)
+    };
+    if places.len() < 2 {
+        return within;
+    }
+    // Scores of records are independent.
+    let freedom = (basis.len() * (places.len() - 1)) as f64;
+    let between = (scatter(&basis, residual, places) / variance, freedom);
+    let reach =
+        |(factor, freedom): (f64, f64)| factor.sqrt() * student_reach(BLOCKS.level, freedom);
+    let differ = chi_squared_beyond(between.0 * freedom, freedom) <= BLOCKS.chance;
+    if differ && reach(between) > reach(within) {
+        between
+    } else {
+        within
+    }
+}
+
+/// The mean square of the scores of some blocks.
+fn scatter(basis: &[Vec<f64>], residual: &[f64], blocks: &[Range<usize>]) -> f64 {
     let p = basis.len();
-    let freedom = BLOCKS.freedom * (p * (BLOCKS.count - 1)) as f64;
     let (mut corrected, mut jackknifed, mut most) = (0.0, 0.0, 0.0_f64);
-    for block in blocks(&basis, residual.len()) {
+    for block in blocks {
         let own: Vec<&[f64]> = basis.iter().map(|column| &column[block.clone()]).collect();
         let score: Vec<f64> = own
             .iter()
@@ -45,26 +76,17 @@ pub(super) fn dispersion(
         corrected += dot(&score, &solved);
         jackknifed += dot(&solved, &solved);
     }
-    let count = BLOCKS.count as f64;
+    let count = blocks.len() as f64;
     let sum = if most <= BLOCKS.jackknife {
         jackknifed * (count - 1.0) / count
     } else {
         corrected
     };
-    let factor = sum / (p.max(1) as f64 * variance);
-    if chi_squared_beyond(factor * freedom, freedom) > BLOCKS.chance {
-        // As the model says, whose own scatter then counts as more blocks would.
-        let weight = 1.0 + BLOCKS.prior;
-        return (
-            ((factor + BLOCKS.prior) / weight).max(1.0),
-            weight * freedom,
-        );
-    }
-    (if factor > 1.0 { factor } else { 1.0 }, freedom)
+    sum / p.max(1) as f64
 }
 
 /// Blocks of rows of about equal leverage.
-fn blocks(basis: &[Vec<f64>], rows: usize) -> Vec<std::ops::Range<usize>> {
+fn blocks(basis: &[Vec<f64>], rows: usize) -> Vec<Range<usize>> {
     let leverage = |row: usize| basis.iter().map(|q| q[row] * q[row]).sum::<f64>();
     let share = basis.len() as f64 / BLOCKS.count as f64;
     let (mut out, mut start, mut sum) = (Vec::new(), 0, 0.0);

@@ -2,12 +2,13 @@
 
 use super::answer::{Family, check_level};
 use super::candidate::Candidate;
-use super::causes::with_causes;
+use super::causes::with_smoothing;
 use super::class::Class;
 use super::excitation::{excited, is_one_sine};
 use super::hull::{hull, turning};
 use super::minima::{Minimum, Plan, minima, seeds_of, without_plant};
 use super::noise::Noise;
+use super::reach::{as_likely, catching_up, within_reach};
 use super::refine::{Seed, beside};
 use super::rows::{Part, Record, Rows, Start};
 use super::sensors::without_faults;
@@ -75,7 +76,7 @@ pub fn fit_family(records: &[Record], question: &Question, task: &Task) -> Resul
         .map(|(place, record)| without_faults(record, place))
         .unzip();
     let mut out = of_readings(&read, question, task)?;
-    out.sensor = faults.concat();
+    out.sensor.extend(faults.concat());
     Ok(out)
 }
 
@@ -366,7 +367,7 @@ fn one_kind(
         let answered = |found: &[Minimum<'_>]| answer(found, silent, question, largest, task);
         let mut out = answered(&found)?;
         if rows.flexible {
-            out = with_causes(out, &plan, &found, &answered, task)?;
+            out = with_smoothing(out, &plan, &found, &answered, task)?;
         }
         (out.room, out.weights) = (room, weights);
         return Ok(out);
@@ -396,27 +397,6 @@ fn longest_delay(found: &[Minimum<'_>]) -> f64 {
     delays.fold(0.0, |longest, at| longest.max(found[at].point.x[0]))
 }
 
-/// The minima that may be the true one, those that are clearly more likely among them: of many rows BIC
-/// asks more of a number than its errors do. By their places.
-fn within_reach(found: &[Minimum<'_>]) -> Vec<usize> {
-    let best = found.first();
-    let (least, likely) = best.map_or((f64::INFINITY, f64::INFINITY), |one| {
-        (one.bic, one.deviance)
-    });
-    let is_near = |at: &usize| {
-        let one = &found[*at];
-        one.bic <= least + EVIDENCE.reach || one.deviance < likely - EVIDENCE.likely
-    };
-    (0..found.len()).filter(is_near).collect()
-}
-
-/// The best, and the minima that are as likely, whatever number of numbers they need. By their places.
-fn as_likely(found: &[Minimum<'_>]) -> Vec<usize> {
-    let best = found.first().map_or(f64::INFINITY, |best| best.deviance);
-    let is_likely = |at: &usize| *at == 0 || found[*at].deviance <= best + EVIDENCE.likely;
-    (0..found.len()).filter(is_likely).collect()
-}
-
 /// Those at some places.
 fn chosen(all: &[Candidate], places: Vec<usize>) -> Vec<Candidate> {
     places.into_iter().map(|at| all[at].clone()).collect()
@@ -440,17 +420,23 @@ fn answer(
         out
     };
     let all: Vec<Candidate> = found.iter().map(|one| made(one, false)).collect();
-    let reached = within_reach(found).into_iter().map(|at| {
-        if rows.is_some_and(|rows| rows.flexible) {
-            made(&found[at], true)
+    let is_flexible = rows.is_some_and(|rows| rows.flexible);
+    let near = within_reach(found);
+    let reached = near.iter().map(|at| {
+        if is_flexible {
+            made(&found[*at], true)
         } else {
-            all[at].clone()
+            all[*at].clone()
         }
     });
     let mut minima: Vec<Candidate> = reached.collect();
+    let others = catching_up(found, &near, &minima).into_iter();
+    minima.extend(others.map(|at| made(&found[at], true)));
+    minima.sort_by(|a, b| a.bic.total_cmp(&b.bic));
     // What is further behind in BIC, though more likely, counts where the record tells all of it.
     let reach = minima.first().map_or(0.0, |best| best.bic) + EVIDENCE.reach;
-    minima.retain(|one| one.bic <= reach || one.told == one.values.len());
+    let errs = minima.first().is_some_and(Candidate::errs);
+    minima.retain(|one| one.bic <= reach || !errs && one.told == one.values.len());
     leave_out_what_adds_nothing(&mut minima);
     let mut candidates: Vec<Candidate> = Vec::new();
     for one in &all {

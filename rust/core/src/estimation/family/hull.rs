@@ -99,7 +99,7 @@ impl Turning<'_> {
 
     /// The delay and its interval.
     pub(super) fn delay(&self) -> Triple {
-        self.candidate.interval(|seen| seen.numbers.delay)
+        self.candidate.interval_of_class(|seen| seen.numbers.delay)
     }
 
     pub(super) fn phase(&self, seen: &Seen, omega: f64) -> f64 {
@@ -215,14 +215,19 @@ pub(super) fn hull(all: &[Turning<'_>], largest_delay: f64) -> Vec<Named> {
     let mut out = vec![delays.within(largest_delay)];
     // An integrator beside a slow zero has the gain of neither.
     let alike = same().filter(|one| one.candidate.gain * best.candidate.gain > 0.0);
-    let gains = alike.map(|one| one.candidate.interval(|seen| seen.gain));
+    let gains = alike.map(|one| one.candidate.interval_of_class(Seen::static_gain));
     out.push(Named::new("gain", gains.collect()));
-    let times = same().map(|one| one.candidate.interval(|seen| seen.numbers.low_delay()));
+    let times = same().map(|one| {
+        let late = |seen: &Seen| seen.numbers.low_delay();
+        one.candidate.interval_of_class(late)
+    });
     out.push(Named::new("delay+lag", times.collect()));
     if let Some(largest) = best.candidate.numbers.lags().first() {
         let lag = |seen: &Seen| seen.numbers.lag();
         let real = same().filter(|one| !one.candidate.numbers.lags().is_empty());
-        let lags = real.map(|one| one.candidate.interval(lag)).collect();
+        let lags = real
+            .map(|one| one.candidate.interval_of_class(lag))
+            .collect();
         let mut lag = Named::new("lag", lags).within(f64::INFINITY);
         lag.value = *largest;
         out.push(lag);

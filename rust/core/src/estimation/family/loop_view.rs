@@ -90,6 +90,11 @@ impl Seen {
             - integrator
     }
 
+    /// The static gain, or that of the integrator.
+    pub(super) fn static_gain(&self) -> f64 {
+        self.gain * self.series.map_or(1.0, |series| series.at_rest())
+    }
+
     /// The gain is that at ω = 0, and may be negative where that at crossover is not.
     pub(super) fn sign(&self) -> f64 {
         1.0_f64.copysign(self.gain)

@@ -10,7 +10,7 @@
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
 //! leave open, `causes` what a linear plant lacks,
-//! `sensors` which readings are none, `series` the error of a class, `hull` intervals over all classes within reach, `verdict` what is claimed.
+//! `sensors` which readings are none, `series` the error of a class and `flexible` its search, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
 mod answer;
 mod aside;
@@ -22,18 +22,23 @@ mod class;
 mod dispersion;
 mod excitation;
 mod fit;
+mod flexible;
 mod hull;
+mod information;
 mod loop_view;
 mod minima;
 mod model;
 mod noise;
 mod projection;
+mod random;
+mod reach;
 mod refine;
 mod response;
 mod rows;
 mod search;
 mod sensors;
 mod series;
+mod smoothing;
 mod starts;
 mod tolerances;
 mod verdict;

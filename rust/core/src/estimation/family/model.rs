@@ -86,7 +86,8 @@ impl Model<'_> {
         let own: usize = self.rows.parts.iter().map(own).sum();
         let causes = self.rows.causes.iter().map(|cause| cause.parameters());
         let causes: usize = if self.responds { causes.sum() } else { 0 };
-        self.searched() + usize::from(self.responds) + own + causes
+        let smooth = self.rows.parts.iter().any(|part| part.smoothing.is_some());
+        self.searched() + usize::from(self.responds) + own + causes + usize::from(smooth)
     }
 
     pub(super) fn numbers(&self, x: &[f64]) -> Numbers {
@@ -210,7 +211,7 @@ impl Model<'_> {
     }
 
     /// The output, less its mean where a level is free.
-    fn output(&self) -> Vec<f64> {
+    pub(super) fn output(&self) -> Vec<f64> {
         let has_level = self.level || self.class.integrating;
         self.rows.joined(|part| {
             let mean = if has_level { 0.0 } else { part.mean };
@@ -233,7 +234,10 @@ impl Model<'_> {
 
     fn whiteners(&self, noise: &[f64]) -> Whiteners<'_> {
         let pairs = self.rows.parts.iter().zip(&self.rows.weights);
-        let own = pairs.map(|(part, weight)| Whitener::new(&part.gaps, self.noise, noise, *weight));
+        let own = pairs.map(|(part, weight)| {
+            let own = Whitener::new(&part.gaps, self.noise, noise, *weight);
+            own.behind(part.smoothing.as_ref())
+        });
         Whiteners {
             own: own.collect(),
             places: self.rows.places(),
@@ -251,8 +255,9 @@ impl Model<'_> {
         point: &Point,
     ) -> (std::ops::Range<usize>, Whitener<'_>) {
         let noise = &point.x[self.plant_numbers()..];
-        let (gaps, weight) = (&self.rows.parts[part].gaps, self.rows.weights[part]);
-        let own = Whitener::new(gaps, self.noise, noise, weight);
+        let (own, weight) = (&self.rows.parts[part], self.rows.weights[part]);
+        let smoothing = own.smoothing.as_ref();
+        let own = Whitener::new(&own.gaps, self.noise, noise, weight).behind(smoothing);
         (self.rows.places()[part].clone(), own)
     }
 
@@ -260,6 +265,11 @@ impl Model<'_> {
     pub(super) fn squares_of(&self, residual: &[f64], noise: &[f64]) -> f64 {
         let whitened = self.whiteners(noise).whiten(residual);
         dot(&whitened, &whitened)
+    }
+
+    /// The sum of squares of whitened residuals, not below that of rounding.
+    pub(super) fn floored(&self, x: &[f64], whitened: &[f64]) -> f64 {
+        self.whitener(x).squares(whitened, self.rows).iter().sum()
     }
 
     /// The likelihood at a point.
@@ -364,7 +374,7 @@ impl Model<'_> {
     }
 
     /// Derivatives of the model's output with respect to the numbers of the plant.
-    fn raw_slopes(&self, point: &Point) -> Vec<Vec<f64>> {
+    pub(super) fn raw_slopes(&self, point: &Point) -> Vec<Vec<f64>> {
         let own = self.explained(point, &point.response, &point.asides);
         let mut columns: Vec<Vec<f64>> = vec![own.by_delay];
         for at in 1..=self.class.order {

@@ -5,6 +5,7 @@
 //! covariance. With the factor e^(ln det/2n) on them, −2 ln L is n ln of their sum of squares.
 //! Searched are the partial correlations as x/√(1 + x²), below limits that keep roots from 1.
 
+use super::smoothing::Smoothing;
 use super::tolerances::RANGES;
 use crate::elementary::{exp, log};
 
@@ -134,6 +135,8 @@ struct Gain {
 pub(super) struct Whitener<'a> {
     gaps: &'a [usize],
     coefficients: Coefficients,
+    /// The mean that the record is.
+    smoothing: Option<&'a Smoothing>,
     /// None for white noise.
     gains: Vec<Gain>,
     /// What innovations are multiplied by where the filter has settled.
@@ -146,6 +149,7 @@ impl<'a> Whitener<'a> {
         let coefficients = noise.coefficients(x);
         let mut out = Self {
             gaps,
+            smoothing: None,
             coefficients,
             gains: Vec::new(),
             factor: 1.0,
@@ -155,6 +159,15 @@ impl<'a> Whitener<'a> {
         }
         out.factor *= weight;
         out
+    }
+
+    /// That of white noise behind a mean.
+    pub(super) fn behind(mut self, smoothing: Option<&'a Smoothing>) -> Self {
+        if let Some(own) = smoothing {
+            self.factor *= exp(0.5 * own.log_det / self.gaps.len().max(1) as f64);
+        }
+        self.smoothing = smoothing;
+        self
     }
 
     fn transition(&self) -> Matrix {
@@ -223,6 +236,11 @@ impl<'a> Whitener<'a> {
 
     /// The innovations of a column, scaled.
     pub(super) fn whiten(&self, column: &[f64]) -> Vec<f64> {
+        if let Some(smoothing) = self.smoothing {
+            let mut out = smoothing.whiten(column);
+            out.iter_mut().for_each(|entry| *entry *= self.factor);
+            return out;
+        }
         if self.gains.is_empty() {
             return column.iter().map(|entry| entry * self.factor).collect();
         }

@@ -2,6 +2,7 @@
 
 use super::aside::Aside;
 use super::cause::CauseKind;
+use super::smoothing::Smoothing;
 use super::tolerances::{REST, SEARCH};
 use crate::Error;
 
@@ -206,6 +207,8 @@ pub(super) struct Part {
     pub(super) start: Start,
     /// What each cause of the rows adds here.
     pub(super) asides: Vec<Option<Aside>>,
+    /// The mean that the record is of the output.
+    pub(super) smoothing: Option<Smoothing>,
 }
 
 impl Part {
@@ -234,6 +237,7 @@ impl Part {
             rounding: 0.0,
             start,
             asides: Vec::new(),
+            smoothing: None,
         };
         let count = out.used.len().max(1) as f64;
         out.mean = out.used.iter().map(|at| record.output[*at]).sum::<f64>() / count;
@@ -244,6 +248,19 @@ impl Part {
         out.rounding = (SEARCH.rounding * deviation).max(step / 12.0_f64.sqrt());
         out.measure_gaps();
         out
+    }
+
+    /// Residuals of the record and its values, where they are means of those of the output.
+    pub(super) fn shown(&self, residual: &[f64]) -> (Vec<f64>, &[f64]) {
+        match &self.smoothing {
+            Some(smoothing) => (smoothing.shown(residual), smoothing.readings()),
+            None => (residual.to_vec(), &self.output),
+        }
+    }
+
+    /// Does no row lack between the first and the last that counts?
+    pub(super) fn is_whole(&self) -> bool {
+        self.gaps.iter().all(|gap| *gap == 1)
     }
 
     fn measure_gaps(&mut self) {
@@ -257,8 +274,11 @@ impl Part {
     /// Every so many of the rows that count.
     fn thinned(&self, every: usize) -> Self {
         let mut out = self.clone();
+        if let Some(smoothing) = out.smoothing.take() {
+            out.output = smoothing.readings().to_vec();
+        }
         out.used = self.used.iter().copied().step_by(every).collect();
-        out.output = self.output.iter().copied().step_by(every).collect();
+        out.output = out.output.iter().copied().step_by(every).collect();
         out.measure_gaps();
         out
     }

@@ -17,6 +17,8 @@ pub enum SensorKind {
     Repeated,
     /// It left for a few rows and came back.
     Glitch,
+    /// Its readings were replaced by their moving mean.
+    Smoothed,
 }
 
 impl SensorKind {
@@ -26,11 +28,12 @@ impl SensorKind {
             Self::Frozen => "frozen",
             Self::Repeated => "repeated",
             Self::Glitch => "glitch",
+            Self::Smoothed => "smoothed",
         }
     }
 }
 
-/// Rows that were left out of a record.
+/// Rows that were left out of a record, or smoothed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorFault {
     /// Why.
@@ -39,6 +42,8 @@ pub struct SensorFault {
     pub record: usize,
     /// How many rows.
     pub rows: usize,
+    /// The mean age of repeated readings, s, or the length of a moving mean, rows; NaN of others.
+    pub size: f64,
     /// Times of the first and of the last of them, s.
     pub from: f64,
     /// The last.
@@ -62,11 +67,22 @@ pub(super) fn without_faults(record: &Record, place: usize) -> (Record, Vec<Sens
         let fitted = runs.iter().map(|run| run.start.max(first)..run.end);
         let runs: Vec<_> = fitted.filter(|run| !run.is_empty()).collect();
         let rows = runs.iter().map(ExactSizeIterator::len).sum();
+        let taken = |run: &std::ops::Range<usize>| record.time[known[run.start.max(1) - 1]];
+        let ages = runs.iter().flat_map(|run| {
+            let taken = taken(run);
+            run.clone().map(move |at| (at, taken))
+        });
+        let age: f64 = ages.map(|(at, taken)| record.time[known[at]] - taken).sum();
+        let size = match kind {
+            SensorKind::Repeated => age / rows as f64,
+            _ => f64::NAN,
+        };
         if let (Some(first), Some(last)) = (runs.first(), runs.last()) {
             faults.push(SensorFault {
                 kind,
                 record: place,
                 rows,
+                size,
                 from: record.time[known[first.start]],
                 to: record.time[known[last.end - 1]],
             });

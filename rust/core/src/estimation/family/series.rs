@@ -7,14 +7,10 @@
 //! class holds, s is zero and nothing changes. The functions act on the rows of the response, with
 //! Tustin's transform, so that their gain and phase are known exactly: s = (2/h) tan(ω h/2).
 
-use super::minima::Minimum;
-use super::model::{Model, Point};
-use super::projection::Projection;
+use super::rows::Rows;
 use super::tolerances::SERIES;
 use crate::elementary::{angle, log};
-use crate::linear_algebra::eigenvalues::eigenvalues;
-use crate::linear_algebra::lu::Lu;
-use crate::linear_algebra::vectors::dot;
+use crate::linear_algebra::vectors::add_multiple;
 
 /// Terms of the series: more see finer errors of a plant, and take rows for them.
 pub(super) const TERMS: usize = 6;
@@ -30,10 +26,10 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// Without an error, for a plant this late.
-    pub(super) fn beside(late: f64, row: f64) -> Self {
+    /// Without an error, for a plant this late: its pole is so many times one over that.
+    pub(super) fn beside(late: f64, row: f64, pole: f64) -> Self {
         Self {
-            pole: SERIES.pole / late.max(row),
+            pole: pole / late.max(row),
             row,
             factors: [0.0; TERMS],
         }
@@ -56,6 +52,13 @@ impl Series {
         (sum_re, sum_im)
     }
 
+    /// 1 + Σ c L(0).
+    pub(super) fn at_rest(&self) -> f64 {
+        let terms = self.factors.iter().enumerate();
+        let signed = terms.map(|(at, c)| if at % 2 == 0 { *c } else { -c });
+        1.0 + signed.sum::<f64>()
+    }
+
     /// ln of its gain.
     pub(super) fn log_gain(&self, omega: f64) -> f64 {
         let (re, im) = self.at(omega);
@@ -66,6 +69,27 @@ impl Series {
     pub(super) fn phase(&self, omega: f64) -> f64 {
         let (re, im) = self.at(omega);
         angle(im, re)
+    }
+
+    /// L_j of a column of the rows of all records.
+    pub(super) fn terms(&self, rows: &Rows, column: &[f64]) -> Vec<Vec<f64>> {
+        let mut out: Vec<Vec<f64>> = vec![Vec::with_capacity(column.len()); TERMS];
+        for (part, place) in rows.parts.iter().zip(rows.places()) {
+            let own = self.columns(&column[place], &part.gaps);
+            for (out, own) in out.iter_mut().zip(own) {
+                out.extend(own);
+            }
+        }
+        out
+    }
+
+    /// A column of the rows of all records behind 1 + Σ c L.
+    pub(super) fn passed(&self, rows: &Rows, column: &[f64]) -> Vec<f64> {
+        let mut out = column.to_vec();
+        for (factor, term) in self.factors.iter().zip(self.terms(rows, column)) {
+            add_multiple(&mut out, *factor, &term);
+        }
+        out
     }
 
     /// L_j of a column whose rows are these distances apart; it was constant before.
@@ -103,99 +127,6 @@ impl Series {
     }
 }
 
-/// A series that the record shows.
-pub(super) struct Shown {
-    pub(super) series: Series,
-    /// Whitened columns of its terms, beside the linear numbers.
-    pub(super) columns: Vec<Vec<f64>>,
-    /// The deviation of their factors.
-    pub(super) deviation: f64,
-    /// What is left of the whitened residuals.
-    pub(super) left: Vec<f64>,
-    /// The fall of −2 ln of the marginal likelihood.
-    fall: f64,
-}
-
-/// BIC of a minimum whose class may be in error.
-pub(super) fn flexible_bic(found: &Minimum<'_>) -> f64 {
-    let (model, point) = (&found.model, &found.point);
-    let rows = model.rows.count();
-    let free = rows.saturating_sub(model.parameters()).max(1) as f64;
-    let late = model.numbers(&point.x).low_delay();
-    let series = Series::beside(late, model.rows.row);
-    let sensitivities = model.sensitivities(point);
-    let shown = shown(model, point, &sensitivities, series, point.squares / free);
-    let fall = shown.map_or(0.0, |shown| shown.fall);
-    found.bic - (fall - log(rows as f64)).max(0.0)
-}
-
-/// The series that the record shows beside a point, if it shows one.
-pub(super) fn shown(
-    model: &Model<'_>,
-    point: &Point,
-    sensitivities: &[Vec<f64>],
-    series: Series,
-    variance: f64,
-) -> Option<Shown> {
-    let response = model.commanded(point);
-    let mut raw: Vec<Vec<f64>> = vec![Vec::new(); TERMS];
-    for (part, place) in model.rows.parts.iter().zip(model.rows.places()) {
-        let own = series.columns(&response[place], &part.gaps);
-        for (column, own) in raw.iter_mut().zip(own) {
-            column.extend(own);
-        }
-    }
-    let columns = model.beside_linear(point, raw);
-    let plant = Projection::new(sensitivities.to_vec());
-    let mut own = columns.clone();
-    own.iter_mut().for_each(|column| {
-        plant.taken(column);
-    });
-    let mut left = point.whitened.clone();
-    plant.taken(&mut left);
-    let mut products = Vec::with_capacity(TERMS * TERMS);
-    for one in &own {
-        products.extend(own.iter().map(|other| dot(one, other) / variance));
-    }
-    let scores: Vec<f64> = own.iter().map(|one| dot(one, &left) / variance).collect();
-    let values: Vec<f64> = eigenvalues(&products, TERMS)?
-        .iter()
-        .map(|value| value.re.max(0.0))
-        .collect();
-    let mut best = (0.0, 0.0, vec![0.0; TERMS]);
-    for step in 0..SERIES.sizes {
-        let share = step as f64 / (SERIES.sizes - 1) as f64;
-        let size = SERIES.least * (SERIES.most / SERIES.least).powf(share);
-        let square = size * size;
-        let mut matrix: Vec<f64> = products.iter().map(|entry| square * entry).collect();
-        (0..TERMS).for_each(|at| matrix[at * (TERMS + 1)] += 1.0);
-        let mut solved = scores.clone();
-        Lu::regular(matrix, TERMS)?.solve(&mut solved);
-        let determinant: f64 = values.iter().map(|value| log(1.0 + square * value)).sum();
-        let fall = square * dot(&scores, &solved) - determinant;
-        if fall > best.0 {
-            let factors = solved.iter().map(|one| square * one).collect();
-            best = (fall, size, factors);
-        }
-    }
-    let (fall, deviation, factors) = best;
-    if fall <= SERIES.fall {
-        return None;
-    }
-    for (column, factor) in own.iter().zip(&factors) {
-        for (left, entry) in left.iter_mut().zip(column) {
-            *left -= factor * entry;
-        }
-    }
-    Some(Shown {
-        series,
-        columns,
-        deviation,
-        left,
-        fall,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -203,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_functions_of_rows_have_their_gain_and_phase() {
-        let series = Series::beside(1.0, 0.1);
+        let series = Series::beside(1.0, 0.1, 2.0);
         let omega = 2.0;
         let count = 4000;
         let wave = |at: usize| sin_cos(omega * 0.1 * at as f64).0;

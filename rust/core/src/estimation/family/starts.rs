@@ -111,10 +111,19 @@ pub(super) fn nested(model: &Model<'_>, smaller: Class, numbers: &Numbers) -> Ve
     }
     if class.has_zero && !kind.has_zero {
         let zeros = |numbers: &Numbers| {
-            [0.0, 0.5].map(|share| Numbers {
-                zero: share * numbers.sum,
+            let with = |zero: f64, delay: f64| Numbers {
+                zero,
+                delay,
                 ..*numbers
-            })
+            };
+            // Also one that answers the wrong way at first, in the place of a half of the delay.
+            let half = 0.5 * numbers.delay;
+            let lead = 0.5 * numbers.sum;
+            [
+                with(0.0, numbers.delay),
+                with(lead, numbers.delay),
+                with(-half, half),
+            ]
         };
         current = current.iter().flat_map(zeros).collect();
     }

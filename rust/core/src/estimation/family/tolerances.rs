@@ -187,6 +187,8 @@ pub(super) struct Blocks {
     pub(super) most_leverage: f64,
     /// Leverage of each block up to which the jackknife holds.
     pub(super) jackknife: f64,
+    /// Level at which the scatter between records and within them is compared.
+    pub(super) level: f64,
 }
 
 pub(super) const BLOCKS: Blocks = Blocks {
@@ -196,6 +198,7 @@ pub(super) const BLOCKS: Blocks = Blocks {
     prior: 2.0,
     most_leverage: 0.98,
     jackknife: 0.5,
+    level: 0.95,
 };
 
 /// Causes beside the plant.
@@ -215,6 +218,8 @@ pub(super) struct Causes {
     pub(super) near: f64,
     /// Rows before a beginning and after it.
     pub(super) margin: usize,
+    /// BIC above the best plant without a cause, up to which all classes are fitted with one: more costs time.
+    pub(super) hopeful: f64,
     /// Causes that are fitted: more find what the score takes for another, and take longer.
     pub(super) followed: usize,
     /// How often a gain that changes follows the plant that was found with it.
@@ -229,6 +234,8 @@ pub(super) struct Causes {
     /// The same for a further one, as a share of the lead of the first: less takes for a second cause what
     /// is wrong with the first.
     pub(super) further: f64,
+    /// The same as a share of what the error of a class explains: less takes for a cause what remains of that error.
+    pub(super) beyond: f64,
     /// Share of the record within which a second load is the first one.
     pub(super) apart: f64,
     /// Fall of −2 ln L by a second load, as a share of that by the first, from which on both are a
@@ -240,6 +247,10 @@ pub(super) struct Causes {
     pub(super) sure: f64,
     /// Numbers of causes beside one plant: more than these are not looked for.
     pub(super) most: usize,
+    /// Share of the half of an interval of this level by which a cause moves gain or phase at crossover, so that
+    /// it is named: more keeps quiet what is small.
+    pub(super) matters: f64,
+    pub(super) level: f64,
 }
 
 pub(super) const CAUSES: Causes = Causes {
@@ -251,6 +262,7 @@ pub(super) const CAUSES: Causes = Causes {
     fine: 0.25,
     near: 0.02,
     margin: 8,
+    hopeful: 20.0,
     followed: 4,
     rounds: 1,
     refined: 8,
@@ -258,11 +270,64 @@ pub(super) const CAUSES: Causes = Causes {
     adopted: 6.0,
     certain: 40.0,
     further: 0.04,
+    beyond: 0.05,
     apart: 0.1,
     again: 0.3,
     between: 8,
     sure: 3.0,
     most: 3,
+    matters: 0.25,
+    level: 0.95,
+};
+
+/// Times of commands that scatter.
+pub(super) struct Jitter {
+    /// The least and the largest deviation that is tried, in rows.
+    pub(super) least: f64,
+    pub(super) most: f64,
+    /// Changes of the command that are followed, and the least of them as a share of the largest: more see less
+    /// jitter and take longer.
+    pub(super) changes: usize,
+    pub(super) share: f64,
+    /// The length of an impulse, in rows.
+    pub(super) width: f64,
+    /// How often the noise is found anew, and the least share of the squares that it keeps.
+    pub(super) rounds: usize,
+    pub(super) left: f64,
+}
+
+pub(super) const JITTER: Jitter = Jitter {
+    least: 0.01,
+    most: 10.0,
+    changes: 60,
+    share: 0.1,
+    width: 0.05,
+    rounds: 3,
+    left: 0.01,
+};
+
+/// Moving means that readings may be.
+pub(super) struct Means {
+    /// Rows beyond one: the least and the most that are tried, and how many lengths.
+    pub(super) least: f64,
+    pub(super) most: f64,
+    pub(super) lengths: usize,
+    /// Variance that was added to a mean, in units of that of a reading, and the share of a length to which it is
+    /// found with that: less needs the length to a smaller share.
+    pub(super) added: [(f64, f64); 4],
+    /// The reach of the next search, in multiples of that share.
+    pub(super) again: f64,
+    /// Share of a length within which an odd whole number of rows is tried.
+    pub(super) whole: f64,
+}
+
+pub(super) const MEANS: Means = Means {
+    least: 0.1,
+    most: 40.0,
+    lengths: 36,
+    added: [(3e-2, 0.02), (1e-3, 2e-3), (1e-5, 2e-4), (1e-7, 2e-5)],
+    again: 2.0,
+    whole: 0.1,
 };
 
 /// Readings that are no readings.
@@ -305,23 +370,27 @@ pub(super) const SENSORS: Sensors = Sensors {
 
 /// The series that stands for a plant's error.
 pub(super) struct Flexible {
-    /// Its pole in multiples of one over the delay and lags: more sees errors at higher frequencies.
-    pub(super) pole: f64,
+    /// Its poles that are tried, in multiples of one over the delay and lags: larger ones see errors at higher
+    /// frequencies.
+    pub(super) poles: [f64; 2],
     /// Half of the angle of a row from which on it stays as it is, below π/2.
     pub(super) highest: f64,
-    /// Deviations of its factors that are tried: the least, the largest, how many.
+    /// The least and the largest deviation of its factors that is tried.
     pub(super) least: f64,
     pub(super) most: f64,
-    pub(super) sizes: usize,
-    /// Fall of −2 ln L from which on a series is taken: more is narrower.
-    pub(super) fall: f64,
+    /// −2 ln of the marginal likelihood that the largest size may lack: more is wider and leans less on the class.
+    pub(super) slack: f64,
+    /// Steps that plant and series are searched together, and how often each is shortened.
+    pub(super) steps: usize,
+    pub(super) shortened: usize,
 }
 
 pub(super) const SERIES: Flexible = Flexible {
-    pole: 2.0,
+    poles: [2.0, 5.0],
     highest: 1.5,
     least: 1e-3,
     most: 1.0,
-    sizes: 25,
-    fall: 0.0,
+    slack: 1.0,
+    steps: 12,
+    shortened: 5,
 };

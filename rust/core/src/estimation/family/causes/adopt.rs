@@ -7,10 +7,10 @@ use super::super::model::Model;
 use super::super::noise::Noise;
 use super::super::rows::Rows;
 use super::super::search::minimum;
-use super::super::series::flexible_bic;
 use super::super::tolerances::{CAUSES, EVIDENCE, STARTS};
 use super::asides::{columns_from, moving};
 use super::commands::Shape;
+use super::jitter::jitter;
 use super::screen::{Suspect, begins_again, suspects};
 use crate::elementary::log;
 use crate::{Error, Task};
@@ -211,6 +211,7 @@ pub(crate) fn with_causes(
     answer: &Answer<'_>,
     task: &Task,
 ) -> Result<Family, Error> {
+    let known_kinds = plan.rows.causes.len();
     let known = plan.rows.causes.iter().map(|kind| kind.parameters());
     if known.sum::<usize>() >= CAUSES.most {
         return Ok(own);
@@ -218,10 +219,18 @@ pub(crate) fn with_causes(
     let Some(best) = found.first() else {
         return Ok(own);
     };
+    // Plants whose class is in error explain what a cause would.
+    let near = own.minima.iter().map(|one| one.bic);
+    let linear = near.fold(best.bic, f64::min);
     let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
     for mut suspect in suspects(plan.rows, found, task)? {
         let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
-        tried.push((suspect, rows, size));
+        let model = beside(&suspect, &rows);
+        let start = model.at(suspect.x.clone());
+        let fitted = Minimum::new(model, minimum(&model, start, f64::INFINITY, task)?);
+        if fitted.bic < linear + CAUSES.hopeful {
+            tried.push((suspect, rows, size));
+        }
     }
     let seeds = seeds_of(found);
     let thinned = tried.iter().map(|(_, rows, _)| rows.thinned(STARTS.thin));
@@ -252,20 +261,28 @@ pub(crate) fn with_causes(
             .map_or(f64::INFINITY, |one: &Minimum<'_>| one.bic)
     };
     let winner = (0..fits.len()).min_by(|a, b| bic(*a).total_cmp(&bic(*b)));
-    // Plants whose class is in error explain what a cause would.
-    let near = found
-        .iter()
-        .filter(|one| one.bic < best.bic + EVIDENCE.reach);
-    let linear = near.map(flexible_bic).fold(best.bic, f64::min);
+    let goal = linear - CAUSES.adopted.max(CAUSES.beyond * (best.bic - linear));
+    let shaken = if known_kinds == 0 {
+        jitter(found)
+    } else {
+        None
+    };
+    let shaken = shaken.filter(|(_, with)| {
+        *with < goal && winner.is_none_or(|at| *with < bic(at) - CAUSES.adopted)
+    });
     let mut adopted = None;
-    if let Some(at) = winner.filter(|at| bic(*at) < linear - CAUSES.adopted)
+    if shaken.is_none()
+        && let Some(at) = winner.filter(|at| bic(*at) < goal)
         && is_there(&families[at].causes, &fits[at], plan, task)?
     {
         adopted = Some(at);
     }
     let (mut out, floor) = match adopted {
         Some(at) => {
-            let family = families[at].clone();
+            let mut family = families[at].clone();
+            if !matters(&own, &family, task)? {
+                family.causes.pop();
+            }
             let deeper = with_causes(family, &plans[at], &fits[at], answer, task)?;
             (deeper, bic(at) + EVIDENCE.reach)
         }
@@ -282,8 +299,25 @@ pub(crate) fn with_causes(
             out.rivals.extend(last.map(|cause| cause.kind));
         }
     }
+    out.causes.extend(shaken.map(|(cause, _)| cause));
     out.rehull(task)?;
     Ok(out)
+}
+
+/// Does the last cause move gain or phase at crossover by a part of their intervals? One that does not is in the
+/// model, and is not worth a name.
+fn matters(without: &Family, with: &Family, task: &Task) -> Result<bool, Error> {
+    let Some(crossover) = with.hull.iter().find(|one| one.name == "crossover") else {
+        return Ok(true);
+    };
+    let seen = |family: &Family| family.at(&[crossover.value], CAUSES.level, task);
+    let (before, after) = (seen(without)?, seen(with)?);
+    let pairs = before.iter().flatten().zip(after.iter().flatten());
+    let mut moves = pairs.map(|(before, after)| {
+        let half = 0.5 * (after.2 - after.1);
+        (after.0 - before.0).abs() / half
+    });
+    Ok(moves.any(|share| share.is_nan() || share > CAUSES.matters))
 }
 
 /// Is the last of these causes there: of a size that is not zero, better than the same plant under the same

@@ -7,11 +7,14 @@
 //! ```
 //! `commands` has the first kind, `asides` the second, with a step of the output, which is a sensor's.
 //! `screen` scores all sizes against what plants without a cause leave, `adopt` fits what may be one
-//! with the whole family and compares it by BIC with the most flexible plant.
+//! with the whole family and compares it by BIC with the most flexible plant. `jitter` is that of the times of commands. `smoothed` finds the length of
+//! a moving mean that the readings are.
 
 mod adopt;
 mod asides;
 mod commands;
+mod jitter;
 mod screen;
+mod smoothed;
 
-pub(super) use adopt::with_causes;
+pub(super) use smoothed::with_smoothing;

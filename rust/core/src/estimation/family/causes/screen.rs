@@ -37,17 +37,17 @@ pub(super) struct Suspect {
 }
 
 /// A plant beside which causes are scored.
-struct Frame<'a> {
-    model: Model<'a>,
-    point: Point,
+pub(super) struct Frame<'a> {
+    pub(super) model: Model<'a>,
+    pub(super) point: Point,
     slopes: Projection,
-    left: Vec<f64>,
-    squares: f64,
-    bic: f64,
+    pub(super) left: Vec<f64>,
+    pub(super) squares: f64,
+    pub(super) bic: f64,
 }
 
 impl<'a> Frame<'a> {
-    fn new(model: Model<'a>, point: Point) -> Self {
+    pub(super) fn new(model: Model<'a>, point: Point) -> Self {
         let slopes = Projection::new(model.slopes(&point));
         let mut left = point.whitened.clone();
         slopes.taken(&mut left);
@@ -63,6 +63,14 @@ impl<'a> Frame<'a> {
             left,
             squares,
         }
+    }
+
+    /// A column, whitened and beside the numbers of the plant.
+    pub(super) fn beside(&self, raw: &[f64]) -> Vec<f64> {
+        let mut column = self.model.whitener(&self.point.x).whiten(raw);
+        self.point.projection.taken(&mut column);
+        self.slopes.taken(&mut column);
+        column
     }
 
     /// The fall of −2 ln L by a further column, and its factor.
@@ -106,7 +114,7 @@ impl<'a> Frame<'a> {
 
 /// Plants beside which causes are scored: the best of some classes, also under white noise, for coloured
 /// noise may stand for what the plant lacks.
-fn frames<'a>(found: &[Minimum<'a>]) -> Vec<Frame<'a>> {
+pub(super) fn frames<'a>(found: &[Minimum<'a>]) -> Vec<Frame<'a>> {
     let Some(best) = found.first() else {
         return Vec::new();
     };
