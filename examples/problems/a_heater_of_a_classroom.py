@@ -2,9 +2,9 @@
 A heater of a classroom: one lag or two?
 ========================================
 
-The Temperature Control Lab is a board with a heater and a sensor. Its heater stepped from 0 to 50 %,
-and the temperature was recorded for 800 s. Which dead time does it have, and which PI controller
-suits it?
+The Temperature Control Lab is a board with a heater and a sensor. Its heater stepped from 0 to
+50 %, and the temperature was recorded for 800 s. Which dead time does it have, and which PI
+controller suits it?
 
 One step does not tell a dead time from a second lag: both explain this record. The answer is an
 indication that says so. Each plant alone gives gains; those of the plant with the dead time are the
