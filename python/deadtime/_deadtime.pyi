@@ -410,7 +410,9 @@ class Candidates:
 class RobustGains:
     gains: Final[list[float]]
     value: Final[float]
+    worst: Final[int]
     margins: Final[list[Margins]]
+    neighbours: Final[list[tuple[list[float], list[float], float]]]
 
 def robust_gains(
     loops: list[Loop],
@@ -419,6 +421,10 @@ def robust_gains(
     wish: tuple[float, bool, bool],
     demands: tuple[float, float, float, float, float, float, float],
     bounds: list[_Pair] | None = None,
+    threads: int | None = None,
+    *,
+    shape: list[float] | None = None,
+    slack: float = 0.0,
 ) -> RobustGains: ...
 def noise_gain(of: Loop, bandwidth: float) -> float: ...
 def lasting_load(of: Loop) -> float: ...

@@ -105,6 +105,8 @@ ORDER = {
         "open",
         "responses",
         "demands",
+        "posed",
+        "reach",
         "robust",
         "rules",
     ],

@@ -33,12 +33,12 @@ def test_moderate_gains_of_a_known_loop_pass():
 @pytest.mark.parametrize(
     ("gains", "options", "reason"),
     [
-        ({"Kp": 9.0}, {"flown": dtm.P(8.0)}, "not stable"),
+        ({"Kp": 9.0}, {"flown": dtm.P(8.0)}, "not stable|Ms is"),
         ({"Kp": 3.0}, {"flown": dtm.P(2.9)}, "Ms is .* above 2"),
         ({"Kp": 1.5}, {"flown": {"Kp": 0.5}}, "Kp changes from 0.5 to 1.5, by more than"),
         ({"Kp": 1.5}, {"flown": {"Kp": -1.5}}, "changes its sign"),
         ({"Kp": 1.5}, {"noise": 0.2}, "noise on the command"),
-        ({"Kp": 1.5}, {"loops": [LOOP.replace(delay=0.9)]}, "not stable with .*delay = 0.9"),
+        ({"Kp": 2.2}, {"loops": [LOOP.replace(delay=0.9)]}, "not stable with .*delay = 0.9"),
     ],
 )
 def test_each_refusal_has_its_reason(gains, options, reason):
@@ -56,7 +56,7 @@ def test_hidden_modes_are_refused():
     slow = dtm.ControlLoop(dtm.FirstOrder(1.0, 100.0), dtm.PI(20.0, 0.2), delay=1.0)
     found = dtm.check_gains(slow, {"Kp": 20.0})
     assert any("hides the slow pole" in reason for reason in found.reasons)
-    assert dtm.check_gains(slow, {"Kp": 20.0, "Ki": 0.5}).passed
+    assert dtm.check_gains(slow, {"Kp": 20.0, "Ki": 0.35}).passed
 
 
 def test_a_step_that_the_limit_never_lets_rest_is_refused():
@@ -88,5 +88,5 @@ def test_a_design_has_its_gate():
     fit = estimate()
     best = dtm.design(fit, controller=dtm.P)
     assert best.gate(flown=dtm.P(1.6)).passed
-    with pytest.raises(TypeError, match="give a DelayEstimate or a ControlLoop"):
+    with pytest.raises(TypeError, match="give a DelayEstimate, a PlantEstimate"):
         dtm.check_gains(3.0, {"Kp": 1.0})

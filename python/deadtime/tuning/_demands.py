@@ -75,3 +75,9 @@ def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:
         return half if bandwidth is None else min(bandwidth, half)
     late = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0)
     return bandwidth or _BANDWIDTH / (late or 1.0)
+
+
+def largest_command(loop: ControlLoop) -> float:
+    """The largest size of the command in both directions; inf without a limit."""
+    low, high = loop.specification.bounds
+    return min(-low, high)

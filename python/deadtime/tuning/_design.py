@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 from deadtime._base.validation import finite
 from deadtime.estimation import PlantEstimate
@@ -200,6 +200,9 @@ def design(
         weight = _load_weight(objective, load_weight)
         others = _loops_of(plants, template)
         return Wanted(problem, objective, weight, demands, others, doubt).design()
+    names = get_args(ObjectiveName)
+    if objective not in names:
+        raise ValueError(f"objective={objective!r}: give one of {', '.join(map(repr, names))}")
     goal = objective_named(objective)
     _refuse_responses(objective, demands, load_weight, plants)
     if filter != "auto":

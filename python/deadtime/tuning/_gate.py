@@ -12,7 +12,7 @@ from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.validation import finite, positive
 from deadtime.estimation import DelayEstimate, PlantEstimate
 from deadtime.loops import Controller, ControlLoop
-from deadtime.tuning._demands import white_to
+from deadtime.tuning._demands import largest_command, white_to
 from deadtime.tuning._found_plants import loops_around, refusal
 from deadtime.tuning._native import noise_gain
 from deadtime.tuning._region import NUMBERS, region_of
@@ -321,15 +321,18 @@ class _Judge:
             command = loop.specification.command_at_rest(1.0)
             height = amplitude
             if height is None:
-                most = abs(loop.limit or 0.0)
+                most = largest_command(loop)
                 # An integrator rests at any output: the step that the gain drives to the limit.
                 need = abs(command) if command else max(map(abs, loop.controller.gains.values()))
                 height = 0.5 * most / need if need else 1.0
-            response = loop.step_response(amplitude=height)
-            if not math.isfinite(response.info()["settling_time"]):
+            try:
+                settled = loop.step_response(amplitude=height).info()["settling_time"]
+            except ValueError:
+                settled = math.nan
+            if not math.isfinite(settled):
                 self.reasons.append(
                     f"a step of {height:.3g} does not come to rest within the limit of "
-                    f"{loop.limit:g} with {_told(loop)}"
+                    f"{largest_command(loop):g} with {_told(loop)}"
                 )
                 return
 
@@ -345,8 +348,8 @@ class _Judge:
             return
         gains = [noise_gain(loop.specification.kernel, white_to(loop, bandwidth)) for loop in every]
         self.on_command = max(gains) * size
-        limit = every[0].limit
-        if limit is None:
+        limit = largest_command(every[0])
+        if math.isinf(limit):
             return
         self.checked.append("noise")
         if self.on_command > share * limit:

@@ -18,7 +18,6 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import get_args
 
 import numpy as np
 
@@ -153,9 +152,7 @@ _OBJECTIVES = {one.name: one for one in (_Abscissa(), _Damping(), _SettlingTime(
 def objective_named(name: str) -> Objective:
     """The objective of that name."""
     if name not in _OBJECTIVES:
-        raise ValueError(
-            f"objective={name!r}: give one of {', '.join(map(repr, get_args(ObjectiveName)))}"
-        )
+        raise ValueError(f"objective={name!r}: give one of {', '.join(map(repr, _OBJECTIVES))}")
     return _OBJECTIVES[name]
 
 
@@ -181,8 +178,7 @@ def _figures(
         threads=problem.threads,
     )
     # An output that the limit keeps away from its rest has not settled, even if it is constant.
-    loop = problem.loop
-    limit = np.inf if loop.limit is None else loop.limit
-    command = commands_at_rest(loop, values, problem.amplitude)
-    short = np.abs(command) > limit
+    low, high = problem.loop.specification.bounds
+    command = commands_at_rest(problem.loop, values, problem.amplitude)
+    short = (command > high) | (command < low)
     return np.where(short, np.nan, found["settling_time"]), found["overshoot"]

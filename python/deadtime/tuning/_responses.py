@@ -38,7 +38,11 @@ MAX_SENSITIVITY = 1.6
 _ACTIVE = 1.0 + 1e-3
 
 #: Weights of the reference that are tried: more of them settle a little earlier.
-_WEIGHTS = np.linspace(0.0, 1.0, 41)
+_WEIGHTS = np.linspace(0.0, 1.0, 21)
+
+#: Part of the best response to a load that may be given for a step that settles earlier: the
+#: response is flat along the ratios of the gains, where the settling time is not.
+_SLACK = 0.1
 
 #: Relative loss that counts as none.
 _NOTHING = 1e-3
@@ -58,8 +62,19 @@ class Wanted:
     #: Why the estimate behind it cannot be relied on.
     doubt: str | None = None
 
+    @property
+    def _slack(self) -> float:
+        """Part of the best response to a load that an earlier end of a step may cost."""
+        return _SLACK if self.weight == 1.0 and self.objective == "load" else 0.0
+
     def gains(
-        self, scenarios: Sequence[Scenario], corners: int, demands: Demands | None = None
+        self,
+        scenarios: Sequence[Scenario],
+        corners: int,
+        demands: Demands | None = None,
+        *,
+        shape: list[float] | None = None,
+        slack: float = 0.0,
     ) -> RobustGains:
         """The best gains over these scenarios, of which the search begins with the corners."""
         problem, needed = self.problem, demands or self.demands
@@ -88,6 +103,9 @@ class Wanted:
                 needed.settling_time or math.inf,
             ),
             None if spans is None else [spans[name] for name in problem.free],
+            problem.threads,
+            shape=shape,
+            slack=slack,
         )
 
     def design(self) -> Design:
@@ -95,11 +113,12 @@ class Wanted:
         problem = self.problem
         corners = [problem.middle, *(one for one in problem.corners if one != problem.middle)]
         every = [*corners, *(one for one in fine(problem) if one not in corners)]
-        found = self.gains(every, len(corners))
-        gains, middle = found.gains, self._weighted(problem.at(found.gains), corners)
+        found, middle = self._weighted(
+            self.gains(every, len(corners), slack=self._slack), every, len(corners)
+        )
+        gains = found.gains
         judged = problem.candidates(corners)
         point = np.array([gains])
-        worst = max(range(len(every)), key=lambda place: found.margins[place].max_sensitivity)
         margins = _least(found)
         return Design(
             loop=middle,
@@ -114,7 +133,7 @@ class Wanted:
             value=found.value,
             step_info=step_info(middle, problem.amplitude),
             amplitude=problem.amplitude,
-            worst=every[worst],
+            worst=self._scenario(every, found.worst, len(corners)),
             checked=len(every) + len(self.others),
             proved=() if self.others else proved(problem, point[0], self.demands.margins),
             traded=self._trades(found, margins, every, len(corners)),
@@ -127,34 +146,60 @@ class Wanted:
             _doubt=self.doubt,
         )
 
-    def _weighted(self, loop: ControlLoop, scenarios: Sequence[Scenario]) -> ControlLoop:
-        """The loop with the weight of the reference with which a step settles first at its worst.
+    def _scenario(self, every: Sequence[Scenario], place: int, corners: int) -> Scenario:
+        """The scenario of a loop by its place; the middle one for a further plant."""
+        if place < corners:
+            return every[place]
+        place -= len(self.others)
+        return every[place] if place >= corners else every[0]
 
-        The weight moves no margin and no response to a load. A weight that is given stays.
+    def _weighted(
+        self, found: RobustGains, every: Sequence[Scenario], corners: int
+    ) -> tuple[RobustGains, ControlLoop]:
+        """The gains and the weight of the reference with which a step settles first at its worst.
+
+        Of the gains that lose no more than the slack of the response to a load. The weight moves
+        no margin and no such response. A weight that is given stays.
         """
+        problem = self.problem
+        loop = problem.at(found.gains)
         controller = loop.controller
-        if not isinstance(controller, (PI, PID)) or controller.weight is not None:
-            return loop
-        if not loop.plant.is_rational:
-            return loop
-        moving = loop.replace(controller=replace(controller, weight=1.0))
-        values = {"weight": _WEIGHTS[:, None]}
-        for name in self.problem.intervals:
-            values[name] = np.array([[one[name] for one in scenarios]])
-        found = sweep(
+        if not isinstance(controller, (PI, PID)) or not loop.plant.is_rational:
+            return found, loop
+        given = controller.weight
+        weights = _WEIGHTS if given is None else np.array([given])
+        moving = loop.replace(controller=replace(controller, weight=float(weights[-1])))
+        near = [([], found.gains, found.value), *found.neighbours]
+        points = np.array([gains for _, gains, _ in near])
+        values = {"weight": weights[None, :, None]}
+        for place, name in enumerate(problem.free):
+            values[name] = points[:, place, None, None]
+        for name in problem.intervals:
+            values[name] = np.array([one[name] for one in every[:corners]])[None, None, :]
+        swept = sweep(
             moving,
             values,
-            amplitude=self.problem.amplitude,
+            amplitude=problem.amplitude,
             metrics=("settling_time",),
-            threads=self.problem.threads,
+            threads=problem.threads,
         )
-        settled = np.where(np.isnan(found["settling_time"]), np.inf, found["settling_time"])
-        worst = settled.max(axis=1)
-        if not np.isfinite(worst.min()):
-            return loop
-        # The largest weight of those that are as good: its command is not slower than it must be.
-        best = np.flatnonzero(worst <= worst.min() * (1.0 + _NOTHING))[-1]
-        return moving.replace(weight=float(_WEIGHTS[best]))
+        settled = np.where(np.isnan(swept["settling_time"]), np.inf, swept["settling_time"])
+        worst = settled.max(axis=2)
+        least = worst.min()
+        if not np.isfinite(least):
+            return found, loop
+        # Of those that are as good the best response to a load, and the largest weight.
+        good = worst <= least * (1.0 + _NOTHING)
+        value = np.array([one for _, _, one in near])
+        row = int(np.argmin(np.where(good.any(axis=1), value, np.inf)))
+        weight = float(weights[np.flatnonzero(good[row])[-1]])
+        if row:
+            found = self.gains(every, corners, shape=near[row][0])
+        loop = problem.at(found.gains)
+        chosen = loop.controller
+        if given is None and isinstance(chosen, (PI, PID)):
+            loop = loop.replace(controller=replace(chosen, weight=weight))
+        return found, loop
 
     def _trades(
         self, found: RobustGains, margins: LeastMargins, every: Sequence[Scenario], corners: int

@@ -8,6 +8,8 @@ from functools import cached_property
 from math import isfinite, nan
 from typing import NamedTuple
 
+import numpy as np
+
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between
 from deadtime._base.drawing import Figure
@@ -45,8 +47,8 @@ class Trade(ReadOnlyArrays):
     Attributes
     ----------
     requirement : str
-        ``"gain_margin"``, ``"phase_margin"``, ``"delay_margin"``, ``"all_margins"``,
-        ``"interval"`` (of delay and gain) or ``"filter"``.
+        The name of a demand of `design`, ``"all_margins"``, ``"interval"`` (of delay and gain) or
+        ``"filter"``.
     required, achieved : float
         What was required and what the design has; NaN where that is no number.
     active : bool
@@ -88,12 +90,12 @@ class Design(ReadOnlyArrays, Pictured):
         Ends and middle of the delay's interval, s.
     gain : (float, float) or None
         Interval of the plant's gain, if one was given.
-    objective : {"abscissa", "damping", "settling_time", "overshoot"}
-        What was made best.
+    objective : str
+        What was made best, one of the objectives of `design`.
     value : float
-        What it came out at in the worst scenario: 1/s, a ratio, s or %. Of a settling time or an
-        overshoot the worst for gains half a percent beside these as well, so that they may be
-        rounded to three digits.
+        What it came out at in the worst scenario: an integral, 1/s, a ratio, s or %. Of a settling
+        time or an overshoot the worst for gains half a percent beside these as well, so that they
+        may be rounded to three digits.
     step_info : dict of str to float
         The step of `amplitude` in `loop`, hold and limit included: `Response.info`, and
         ``peak_command`` and ``time_at_limit`` (s, 0 without a limit). The settling time is proved
@@ -243,6 +245,9 @@ class Design(ReadOnlyArrays, Pictured):
             f"{name} = {value:.4g}{' (given)' if name in self.fixed else ''}"
             for name, value in self.gains.items()
         )
+        weight = getattr(self.loop.controller, "weight", None)
+        if weight is not None:
+            gains += f", weight of the set point {weight:.3g}"
         over = f"over a delay of {self._late()} s"
         if self.gain is not None:
             over += f" and a gain of {self.gain[0]:g} to {self.gain[1]:g}"
@@ -254,7 +259,7 @@ class Design(ReadOnlyArrays, Pictured):
         step = f"settles in {settled:.3g} s" if isfinite(settled) else "not proved to settle"
         step += f", overshoot {info['overshoot']:.2g} %, peak command {info['peak_command']:.3g}"
         if self.loop.limit is not None:
-            step += f", {info['time_at_limit']:.2g} s at the limit of {self.loop.limit:g}"
+            step += f", {info['time_at_limit']:.2g} s at the limit of {_shown(self.loop.limit)}"
         lines = [
             f"{type(self.loop.controller).__name__}: {gains}",
             f"worst {over}: {figure_in_words(self.objective, self.value)}; spectral abscissa "
@@ -290,6 +295,10 @@ class Design(ReadOnlyArrays, Pictured):
         return plot_design(self)
 
 
+def _shown(limit: float | tuple[float, float]) -> str:
+    return " to ".join(f"{bound:g}" for bound in np.atleast_1d(limit))
+
+
 def _in_words(region: ConfidenceRegion) -> str:
     """The region with the range of each number."""
     ranges = [
@@ -317,9 +326,9 @@ def figure_in_words(objective: ObjectiveName, value: float) -> str:
         "damping": f"damping ratio {value:.3g}",
         "settling_time": f"settling time {value:.4g} s",
         "overshoot": f"overshoot {value:.3g} %",
-        "load": f"load response {value:.4g}",
-        "load_ie": f"load response {value:.4g}",
-        "set_point": f"set-point response {value:.4g} s",
+        "load": f"response to a unit load {value:.4g} (IAE, or deviation at rest)",
+        "load_ie": f"response to a unit load {value:.4g} (IE, or deviation at rest)",
+        "set_point": f"response to a unit set point {value:.4g} (IAE)",
         "set_point_settling": f"settling time {value:.4g} s",
     }[objective]
 

@@ -23,8 +23,8 @@ _DOUBLINGS = 6
 #: Times at which the command is evaluated.
 _POINTS = 4001
 
-#: Part of the limit from which on a command counts as being at the limit.
-_AT_LIMIT = 1.0 - 1e-9
+#: Distance from a limit, as a part of it, within which a command counts as being at it.
+_AT_LIMIT = 1e-9
 
 
 class ProvedStep(NamedTuple):
@@ -40,7 +40,7 @@ def proved_steps(
     loop: ControlLoop, sets: Sequence[Mapping[str, float]], amplitude: float
 ) -> list[ProvedStep | None]:
     """Simulate steps, each with other numbers, until proved to rest; None where that fails."""
-    if not loop.plant.is_rational:
+    if not loop.plant.is_rational or not _is_plain(loop):
         return [None] * len(sets)
     late = {"delay": loop.specification.known_delay}
     values = {
@@ -81,8 +81,14 @@ def step_info(loop: ControlLoop, amplitude: float) -> dict[str, float]:
     known = {"settling_time": float("nan")} if proved is None else proved._asdict()
     info = response.info() | known
     time = np.linspace(0.0, response.time[-1], _POINTS)
-    command = np.abs(loop.simulate(time, amplitude).inputs)
-    limited = 0.0
-    if loop.limit is not None:
-        limited = float(np.mean(command >= _AT_LIMIT * loop.limit) * time[-1])
-    return info | {"peak_command": float(command.max()), "time_at_limit": limited}
+    command = loop.simulate(time, amplitude).inputs
+    low, high = loop.specification.bounds
+    at_limit = (command >= high - _AT_LIMIT * abs(high)) | (command <= low + _AT_LIMIT * abs(low))
+    limited = float(np.mean(at_limit) * time[-1]) if np.isfinite(high - low) else 0.0
+    return info | {"peak_command": float(np.abs(command).max()), "time_at_limit": limited}
+
+
+def _is_plain(loop: ControlLoop) -> bool:
+    """Whether a loop has no other bound than equal ones of its command, as the proof takes it."""
+    guard = getattr(loop.controller, "anti_windup", None)
+    return loop.rate_limit is None and guard is None and isinstance(loop.limit, float | None)

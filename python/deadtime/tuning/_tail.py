@@ -264,15 +264,16 @@ class Fundamental:
             acts = np.full(x.shape[1:], before)
             if first:
                 acts = command[:, first - cells : first][:, : x.shape[-1]]
-            drift = np.einsum("ij,jkl->ikl", self.within[:, :-1], np.abs(x))
+            flat = x.reshape(len(x), -1)
+            drift = (self.within[:, :-1] @ np.abs(flat)).reshape(x.shape)
             drift += self.within[:, -1][:, None, None] * acts
             state[..., part] = np.abs(x) + drift
             for row, direct, bound in (
                 (model.K, model.L, command),
                 (model.C, model.D, output),
             ):
-                bound[:, part] = np.abs(np.einsum("i,ijk->jk", row, x))
-                bound[:, part] += np.einsum("i,ijk->jk", np.abs(row), drift)
+                bound[:, part] = np.abs(row @ flat).reshape(x.shape[1:])
+                bound[:, part] += (np.abs(row) @ drift.reshape(len(x), -1)).reshape(x.shape[1:])
                 bound[:, part] += abs(direct) * acts
         return state, command, output
 

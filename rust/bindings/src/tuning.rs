@@ -271,12 +271,15 @@ pub(crate) struct GivenDemands(f64, f64, f64, f64, f64, f64, f64);
 pub(crate) struct RobustGains {
     gains: Vec<f64>,
     value: f64,
+    worst: usize,
     margins: Vec<Py<PyMargins>>,
+    neighbours: Vec<(Vec<f64>, Vec<f64>, f64)>,
 }
 
 /// The best of the gains in `free`, of which the search begins with the `first` loops.
 #[pyfunction]
-#[pyo3(signature = (loops, first, free, wish, demands, bounds=None))]
+#[pyo3(signature = (loops, first, free, wish, demands, bounds=None, threads=None, *, shape=None, slack=0.0))]
+#[expect(clippy::too_many_arguments, reason = "arguments of the Python call")]
 pub(crate) fn robust_gains(
     py: Python<'_>,
     loops: Vec<Bound<'_, PyLoop>>,
@@ -285,6 +288,9 @@ pub(crate) fn robust_gains(
     wish: GivenWish,
     demands: GivenDemands,
     bounds: Option<Vec<(f64, f64)>>,
+    threads: Option<usize>,
+    shape: Option<Vec<f64>>,
+    slack: f64,
 ) -> PyResult<RobustGains> {
     let loops = loops.iter();
     let posed = Posed {
@@ -306,13 +312,21 @@ pub(crate) fn robust_gains(
             settling_time: demands.6,
         },
         bounds,
+        shape,
+        slack,
     };
-    let found = run_here(py, |task| tuning::best(&posed, task))?;
+    let found = run(py, threads, None, |task| tuning::best(&posed, task))?;
     let margins = found.margins.into_iter();
     let margins = margins.map(|each| Py::new(py, PyMargins::new(py, each)));
     Ok(RobustGains {
         gains: found.gains,
         value: found.value,
+        worst: found.worst,
+        neighbours: found
+            .neighbours
+            .into_iter()
+            .map(|near| (near.shape, near.gains, near.value))
+            .collect(),
         margins: margins.collect::<PyResult<_>>()?,
     })
 }
@@ -351,10 +365,7 @@ pub(crate) fn tuning_rules(py: Python<'_>, of: &PyLoop) -> PyResult<Vec<RuleRow>
 
 /// Gain, lag, second lag and dead time in s of the plant of a loop by the half rule.
 #[pyfunction]
-pub(crate) fn half_rule(
-    of: &PyLoop,
-    with_second: bool,
-) -> PyResult<Option<(f64, f64, f64, f64)>> {
+pub(crate) fn half_rule(of: &PyLoop, with_second: bool) -> PyResult<Option<(f64, f64, f64, f64)>> {
     let found = converted(tuning::reduced(of.core(), with_second))?;
     Ok(found.map(|plant| (plant.gain, plant.lag, plant.second, plant.dead_time)))
 }

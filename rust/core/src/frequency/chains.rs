@@ -105,7 +105,13 @@ impl Lead {
     /// as well, the ratio is largest there; of two terms it is monotone in Re z_1.
     pub(super) fn largest_ratio(&self) -> Option<f64> {
         let first = self.pairs.first().map_or(0.0, |(a, _)| *a);
-        let turn = |place: usize, a: f64| if place > 0 && a * first > 0.0 { -1.0 } else { 1.0 };
+        let turn = |place: usize, a: f64| {
+            if place > 0 && a * first > 0.0 {
+                -1.0
+            } else {
+                1.0
+            }
+        };
         let shared = self.pairs.iter().enumerate();
         let shared = shared.filter(|(_, (a, b))| *a != 0.0 && *b != 0.0);
         let signs: Vec<bool> = shared.map(|(i, (a, b))| turn(i, *a) * b > 0.0).collect();

@@ -5,10 +5,11 @@
 
 use super::circle::is_stable;
 use super::further_delay::further_delay;
-use super::held_peaks::held_peaks;
-use super::norms::Peaks;
 use super::gain_crossovers::{Crossover, FAR, crossovers, is_zero};
+use super::held_peaks::{held_peak, held_peaks};
 use super::margins::{Margins, degrees, least};
+use super::norms::Peaks;
+use super::peaks::Peak;
 use crate::order::sort_up;
 use crate::stability::{Crossing, HeldLoop, HeldNumbers};
 use crate::{Error, Task};
@@ -33,6 +34,20 @@ pub fn held_margins(held: HeldLoop<'_>, delay_margin: bool, task: &Task) -> Resu
         _ => (f64::NAN, f64::NAN),
     };
     with_verdict(&numbers, &found, stable, late, task)
+}
+
+/// The largest modulus of the sensitivity of a loop with a hold; `None` where it is not stable.
+///
+/// # Errors
+/// As [`held_margins`].
+pub fn held_sensitivity(held: HeldLoop<'_>, task: &Task) -> Result<Option<Peak>, Error> {
+    let numbers = held.at(held.delay())?;
+    let found = crossovers(&numbers, task)?;
+    if is_stable(&numbers, &found, task)? != Some(true) {
+        return Ok(None);
+    }
+    let places: Vec<f64> = found.iter().map(|at| at.omega).collect();
+    held_peak(&numbers, &places, task).map(Some)
 }
 
 /// Gain margin, phase margin in degrees and delay margin in s of a loop that is known to be stable.

@@ -43,6 +43,14 @@ struct OnCircle<'a> {
     which: Which,
 }
 
+/// The sensitivity alone of a stable loop.
+///
+/// # Errors
+/// As [`held_peaks`].
+pub(super) fn held_peak(numbers: &HeldNumbers, places: &[f64], task: &Task) -> Result<Peak, Error> {
+    largest(numbers, Which::Sensitivity, places, task)
+}
+
 /// The sensitivities of a stable loop; `places` are frequencies near which their largest values may be.
 ///
 /// # Errors
@@ -52,27 +60,34 @@ pub(super) fn held_peaks(
     places: &[f64],
     task: &Task,
 ) -> Result<Peaks, Error> {
-    let (a, b) = numbers.polynomials();
-    let zeros = |row: &[f64]| row.iter().take_while(|c| **c == 0.0).count();
-    let common = zeros(a).min(zeros(b));
-    let of = |which| {
-        let of = OnCircle {
-            numbers,
-            a: a.get(common..).unwrap_or_default(),
-            b: b.get(common..).unwrap_or_default(),
-            which,
-        };
-        let top = of.top();
-        let octaves = (0..OCTAVES).map(|k| libm::ldexp(top, -k));
-        let start = [0.0].into_iter().chain(octaves);
-        let mut start: Vec<f64> = start.chain(places.iter().copied()).collect();
-        highest(&of, Peak::NONE, &mut start, task)
-    };
+    let of = |which| largest(numbers, which, places, task);
     Ok(Peaks {
         sensitivity: of(Which::Sensitivity)?,
         complementary: of(Which::Complementary)?,
         disk: of(Which::Disk)?,
     })
+}
+
+fn largest(
+    numbers: &HeldNumbers,
+    which: Which,
+    places: &[f64],
+    task: &Task,
+) -> Result<Peak, Error> {
+    let (a, b) = numbers.polynomials();
+    let zeros = |row: &[f64]| row.iter().take_while(|c| **c == 0.0).count();
+    let common = zeros(a).min(zeros(b));
+    let of = OnCircle {
+        numbers,
+        a: a.get(common..).unwrap_or_default(),
+        b: b.get(common..).unwrap_or_default(),
+        which,
+    };
+    let top = of.top();
+    let octaves = (0..OCTAVES).map(|k| libm::ldexp(top, -k));
+    let start = [0.0].into_iter().chain(octaves);
+    let mut start: Vec<f64> = start.chain(places.iter().copied()).collect();
+    highest(&of, Peak::NONE, &mut start, task)
 }
 
 impl OnCircle<'_> {

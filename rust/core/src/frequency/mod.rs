@@ -43,15 +43,15 @@ pub use bounds::end_of_gain;
 pub use crossings::{Crossings, crossings};
 pub use delays::{delay_margin, delay_range};
 pub use further_delay::{further_delay, held_delay_range};
-pub use held::{held_margins, held_margins_of_stable};
+pub use held::{held_margins, held_margins_of_stable, held_sensitivity};
 pub use held_gain::{held_gain, held_phase};
 pub use held_gain_range::gain_range_held;
 pub use held_range::{Members, Number, held_range};
 pub use margins::{Margins, margins, margins_of_ratio, margins_of_stable};
 pub use norms::{Peaks, hinf_norm, peak, peaks};
 pub use passage::Crossing;
-pub(crate) use polynomial::roots as small_roots;
 pub use peaks::Peak;
+pub(crate) use polynomial::roots as small_roots;
 pub use ranges::{corner_range, damping_range, gain_range};
 pub use ratio::{first_term, ratio};
 

@@ -78,7 +78,10 @@ pub fn hinf_norm(n: &QuasiPolynomial, d: &QuasiPolynomial, task: &Task) -> Resul
     if n.degree() > d.degree() {
         return Ok(unbounded(f64::INFINITY));
     }
-    if !Ratio::new(n.clone(), d.clone()).stability(true, task)?.stable {
+    if !Ratio::new(n.clone(), d.clone())
+        .stability(true, task)?
+        .stable
+    {
         return Ok(unbounded(f64::NAN));
     }
     peak(n, d, &[], task)

@@ -38,7 +38,11 @@ impl Peak {
 
     /// The larger of two.
     pub(super) fn or(self, other: Self) -> Self {
-        if other.value > self.value { other } else { self }
+        if other.value > self.value {
+            other
+        } else {
+            self
+        }
     }
 }
 

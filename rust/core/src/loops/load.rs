@@ -5,7 +5,7 @@
 //! loop, until what was integrated agrees with that. A slow tail below [`QUIET`] is found in this way.
 
 use crate::dde::{
-    Deviation, DeviationMetrics, Kick, LinearLoop, Reference, RequestedOutput, Start,
+    Deviation, DeviationMetrics, Ending, Kick, LinearLoop, Reference, RequestedOutput, Start,
 };
 use crate::{Error, Task};
 
@@ -28,16 +28,21 @@ const INTEGRAL: f64 = 1e-7;
 const QUIET_FOR: f64 = 0.2;
 const QUIET_WAITS: f64 = 3.0;
 
-/// The first run lasts so many waits for a delay, and time constants of the loop without it: fewer repeat
-/// more runs, more make them longer.
+/// No run is shorter than so many waits for a delay, and time constants of the loop without it: less takes
+/// a pass through the rest for it, more makes runs longer. Where the integral is known, it shows that.
 const FIRST: (f64, f64) = (20.0, 12.0);
+const FIRST_KNOWN: (f64, f64) = (4.0, 2.0);
 
-/// Most doublings of a run: more settle slower loops and take longer.
-const DOUBLINGS: usize = 10;
+/// No run is longer than so many of these: more settle slower loops and take longer.
+const LONGEST: f64 = 2048.0;
 
-/// Growth of the peak from one run to one of twice its length that no loop with a rest shows three
-/// times: less gives up slow loops, more takes unstable loops longer.
+/// No run of a continuous loop is longer than so many delays: the steppers refuse twice as many.
+const MOST_DELAYS: f64 = 1e7;
+
+/// Growth of the peak over a doubling of the time that no loop with a rest shows so many times: less
+/// gives up slow loops, more takes unstable loops longer.
 const GROWTH: f64 = 3.0;
+const GROWTHS: u32 = 3;
 
 /// What steps, and how its response is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,42 +133,41 @@ impl ControlLoop {
             is_settled,
         };
         if let Some(span) = asked.span {
-            let found = run.over(span)?;
+            let (found, ..) = run.over(span, None)?;
             return Ok(figures(found, span, found.recovery_time.is_finite()));
         }
         let wait = self.values().delay + self.values().sample_time.unwrap_or(0.0);
-        let mut span = FIRST.0 * wait + FIRST.1 * self.time_without_delay()?;
-        if span == 0.0 {
-            span = 1.0;
+        let slow = self.time_without_delay()?;
+        let parts = if known.is_nan() { FIRST } else { FIRST_KNOWN };
+        let mut least = parts.0 * wait + parts.1 * slow;
+        if least == 0.0 {
+            least = 1.0;
         }
-        let (mut growths, mut last) = (0, f64::INFINITY);
-        for _ in 0..DOUBLINGS {
-            let mut found = run.over(span)?;
-            let quiet = span - found.loud_until;
-            let offset = output - level;
-            let off_rest = found.ie - offset * span;
-            let agrees = known.is_nan() || (off_rest - known).abs() <= INTEGRAL * found.iae;
-            if quiet >= QUIET_FOR * span && quiet >= QUIET_WAITS * wait && agrees {
-                if offset.abs() > QUIET * found.peak {
-                    found.iae = f64::INFINITY;
-                    found.ie = offset.signum() * f64::INFINITY;
-                } else if known.is_finite() {
-                    found.ie = known;
-                }
-                return Ok(figures(found, span, true));
-            }
-            growths = if found.peak > GROWTH * last {
-                growths + 1
-            } else {
-                0
-            };
-            if growths == 3 || output.is_nan() {
-                break;
-            }
-            last = found.peak;
-            span *= 2.0;
+        if output.is_nan() {
+            return Ok(figures(Figures::UNKNOWN.deviation, least, false));
         }
-        Ok(figures(Figures::UNKNOWN.deviation, span, false))
+        let ending = Ending {
+            least,
+            quiet: (QUIET_FOR, QUIET_WAITS * wait),
+            integral: (known, INTEGRAL),
+            growth: (GROWTH, GROWTHS),
+        };
+        let mut most = LONGEST * least;
+        if self.values().sample_time.is_none() && wait > 0.0 {
+            most = most.min(MOST_DELAYS * wait);
+        }
+        let (mut found, span, is_settled) = run.over(most, Some(ending))?;
+        if !is_settled {
+            return Ok(figures(Figures::UNKNOWN.deviation, span, false));
+        }
+        let offset = output - level;
+        if offset.abs() > QUIET * found.peak {
+            found.iae = f64::INFINITY;
+            found.ie = offset.signum() * f64::INFINITY;
+        } else if known.is_finite() {
+            found.ie = known;
+        }
+        Ok(figures(found, span, true))
     }
 
     /// The slowest time constant of the loop without its delay, at most, s.
@@ -199,7 +203,7 @@ impl ControlLoop {
     }
 }
 
-/// A response that is run over longer and longer times.
+/// A response that is measured.
 struct Run<'a> {
     plant: &'a LinearLoop,
     asked: &'a DeviationAsked,
@@ -210,7 +214,8 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn over(&self, span: f64) -> Result<Deviation, Error> {
+    /// The deviation over a time at most, the time reached, and whether the output came to rest.
+    fn over(&self, span: f64, ending: Option<Ending>) -> Result<(Deviation, f64, bool), Error> {
         let asked = self.asked;
         let is_step = asked.of == Drive::Reference;
         let mut start = Start {
@@ -232,9 +237,10 @@ impl Run<'_> {
         let end = [self.lead + span];
         let times = (self.lead, end[0]);
         let bands = (asked.band, QUIET);
-        let mut metrics = DeviationMetrics::new(times, (self.level, self.rest), bands);
+        let mut metrics = DeviationMetrics::new(times, (self.level, self.rest), bands, ending);
         let requested = RequestedOutput::new(&end, &[], 0.0)?.measured_by(&mut metrics);
         self.plant.serve(&start, &reference, requested, self.task)?;
-        Ok(metrics.found())
+        let (time, is_settled) = metrics.settled();
+        Ok((metrics.found(), time, is_settled))
     }
 }

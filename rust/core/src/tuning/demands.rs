@@ -5,7 +5,10 @@ use num_complex::Complex64;
 use super::responses::settling_time;
 use crate::dde::LinearLoop;
 use crate::elementary::exp;
-use crate::frequency::{Margins, held_gain, held_margins, margins, ratio};
+use crate::frequency::{
+    Margins, Peak, held_gain, held_margins, held_margins_of_stable, held_sensitivity, margins,
+    margins_of_stable, peak, ratio,
+};
 use crate::loops::{ControlLoop, Input};
 use crate::quasipoly::{QuasiPolynomial, modulus};
 use crate::roots::is_stable;
@@ -46,7 +49,24 @@ impl Demands {
             || self.settling_time.is_finite()
     }
 
-    /// By how much the figures of a loop miss the demands, relatively, that of Ms left out; not above
+    /// Gain, phase and delay margin of a stable loop as far as they are demanded.
+    fn margins_of_stable(&self, of: &ControlLoop, task: &Task) -> Result<[f64; 3], Error> {
+        let turns = self.phase_margin > 0.0 || self.delay_margin > 0.0;
+        // Twice the demand is enough to interpolate.
+        let most = 2.0 * self.gain_margin;
+        if of.values().sample_time.is_none() {
+            let (n, d) = of.loop_gain()?;
+            return margins_of_stable(&n, &d, most, turns, task);
+        }
+        if self.delay_margin > 0.0 {
+            let found = margins_of(of, true, task)?;
+            return Ok([found.gain_margin, found.phase_margin, found.delay_margin]);
+        }
+        let linear = of.linear(Input::Reference)?;
+        held_margins_of_stable(HeldLoop::new(&linear)?, most, turns, task)
+    }
+
+    /// By how much the figures of a stable loop miss the demands, relatively, that of Ms left out; not above
     /// zero where it meets them.
     ///
     /// # Errors
@@ -55,11 +75,10 @@ impl Demands {
         let mut worst = f64::NEG_INFINITY;
         let mut short = |had: f64, least: f64| worst = worst.max(1.0 - had / least);
         if self.gain_margin > 1.0 || self.phase_margin > 0.0 || self.delay_margin > 0.0 {
-            let found = margins_of(of, self.delay_margin > 0.0, task)?;
-            let had = [found.gain_margin, found.phase_margin, found.delay_margin];
+            let had = self.margins_of_stable(of, task)?;
             let least = [self.gain_margin, self.phase_margin, self.delay_margin];
             for (had, least) in had.into_iter().zip(least).filter(|pair| pair.1 > 0.0) {
-                short(if found.stable { had } else { 0.0 }, least);
+                short(had, least);
             }
         }
         if self.noise_gain.is_finite() {
@@ -69,7 +88,11 @@ impl Demands {
         if self.settling_time.is_finite() && worst <= 0.0 {
             let settled = settling_time(of, task)?;
             let missed = settled / self.settling_time - 1.0;
-            worst = worst.max(if missed.is_nan() { f64::INFINITY } else { missed });
+            worst = worst.max(if missed.is_nan() {
+                f64::INFINITY
+            } else {
+                missed
+            });
         }
         Ok(worst)
     }
@@ -91,6 +114,23 @@ pub(super) fn is_stable_loop(of: &ControlLoop, task: &Task) -> Result<bool, Erro
         Err(error) if error.ends_all() => Err(error),
         found => Ok(found.unwrap_or(false)),
     }
+}
+
+/// The largest modulus of the sensitivity; `None` where the loop is not stable.
+///
+/// # Errors
+/// As [`margins_of`].
+pub(super) fn sensitivity_of(of: &ControlLoop, task: &Task) -> Result<Option<Peak>, Error> {
+    if of.values().sample_time.is_some() {
+        let linear = of.linear(Input::Reference)?;
+        return held_sensitivity(HeldLoop::new(&linear)?, task);
+    }
+    let (n, d) = of.loop_gain()?;
+    let closed = d.add(&n)?;
+    if !is_stable(&closed, true, task)? {
+        return Ok(None);
+    }
+    peak(&d, &closed, &[], task).map(Some)
 }
 
 /// All margins and sensitivities of a loop; without `delay_margin` that of a sampled one is NaN.
@@ -141,6 +181,9 @@ pub fn noise_gain(of: &ControlLoop, bandwidth: f64, task: &Task) -> Result<f64, 
             if size.is_nan() { 0.0 } else { size * size * w }
         })
         .collect();
-    let inner: f64 = squares.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).sum();
+    let inner: f64 = squares
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0] + pair[1]))
+        .sum();
     Ok((inner * step / bandwidth).sqrt())
 }

@@ -47,8 +47,8 @@ enum Parts {
 #[derive(Debug)]
 pub(super) struct Open {
     parts: Parts,
-    /// L₀, then each L_i, at each frequency.
-    values: Vec<Vec<Complex64>>,
+    /// Each frequency, and L₀ and each L_i there; the lowest first.
+    values: Vec<(f64, Vec<Complex64>)>,
 }
 
 /// An interval of k.
@@ -89,7 +89,8 @@ impl Open {
         if omega > 0.0 && omega.is_finite() {
             let row = self.parts.at(omega, task)?;
             if row.iter().all(|value| value.is_finite()) {
-                self.values.push(row);
+                let place = self.values.partition_point(|known| known.0 < omega);
+                self.values.insert(place, (omega, row));
             }
         }
         Ok(())
@@ -108,20 +109,33 @@ impl Open {
         let own = lead(below);
         let row: Vec<Complex64> = above.iter().map(|n| (lead(n) / own).into()).collect();
         if row.iter().any(|value| *value != Complex64::ZERO) {
-            self.values.push(row.iter().map(|value| -value).collect());
-            self.values.push(row);
+            let other = row.iter().map(|value| -value).collect();
+            self.values.push((f64::INFINITY, other));
+            self.values.push((f64::INFINITY, row));
         }
+    }
+
+    /// The growth of the argument of 1 + L over the frequencies: stable loops that differ in their gains
+    /// alone differ by less than a quarter turn in it, all others by half a turn at least.
+    pub(super) fn growth(&self, gains: &[f64]) -> f64 {
+        let finite = self.values.iter().filter(|(omega, _)| omega.is_finite());
+        let values =
+            finite.map(|(_, row)| 1.0 + row.first().copied().unwrap_or_default() + sum(row, gains));
+        let (mut total, mut last) = (0.0, None);
+        for value in values {
+            if let Some(before) = last.replace(value) {
+                let turn: Complex64 = value * Complex64::conj(&before);
+                total += angle(turn.im, turn.re);
+            }
+        }
+        total
     }
 
     /// Put the intervals of k in which gains `offset` + k `ray` come closer to −1 than `least` to a list.
     pub(super) fn exclude(&self, offset: &[f64], ray: &[f64], least: f64, list: &mut Vec<Gap>) {
-        for row in &self.values {
-            let sum = |gains: &[f64]| -> Complex64 {
-                let pairs = row.iter().skip(1).zip(gains);
-                pairs.map(|(value, gain)| value * gain).sum()
-            };
+        for (_, row) in &self.values {
             let first = row.first().copied().unwrap_or_default();
-            let (fixed, along) = (1.0 + first + sum(offset), sum(ray));
+            let (fixed, along) = (1.0 + first + sum(row, offset), sum(row, ray));
             let (a, b) = (along.norm_sqr(), (fixed.conj() * along).re);
             let root = b * b - a * (fixed.norm_sqr() - least * least);
             if root > 0.0 {
@@ -132,6 +146,12 @@ impl Open {
             }
         }
     }
+}
+
+/// Σ g_i L_i.
+fn sum(row: &[Complex64], gains: &[f64]) -> Complex64 {
+    let pairs = row.iter().skip(1).zip(gains);
+    pairs.map(|(value, gain)| value * gain).sum()
 }
 
 /// What no interval of a list excludes above `low`, from the highest down.
@@ -220,9 +240,9 @@ impl Scale {
         let (n, d) = of.loop_gain()?;
         let ((above, zeros), (below, poles)) = (first_term(&n), first_term(&d));
         let sign = if above * below < 0.0 { -1.0 } else { 1.0 };
-        let top = values.sample_time.map_or(f64::INFINITY, |period| {
-            std::f64::consts::PI / period
-        });
+        let top = values
+            .sample_time
+            .map_or(f64::INFINITY, |period| std::f64::consts::PI / period);
         // At low frequencies each pole at zero turns by a quarter.
         let start = (f64::from(zeros) - f64::from(poles)) * std::f64::consts::FRAC_PI_2;
         let (sine, cosine) = sin_cos(start);
@@ -318,7 +338,11 @@ fn frequencies(crossover: f64, delay: f64, top: Option<f64>) -> Vec<f64> {
     while omega < end {
         found.push(omega);
         let step = (factor - 1.0) * omega;
-        let most = if delay * omega < TURNS { TURN / delay } else { step };
+        let most = if delay * omega < TURNS {
+            TURN / delay
+        } else {
+            step
+        };
         omega += step.min(most);
     }
     found.push(end);

@@ -229,7 +229,9 @@ fn factors(of: &ControlLoop) -> Result<Option<Factors>, Error> {
     let times = |row: &[f64]| -> Option<Vec<f64>> {
         let row: Vec<Complex64> = row.iter().map(|c| Complex64::from(*c)).collect();
         let roots = small_roots(&row);
-        let fastest = roots.iter().fold(0.0f64, |most, root| most.max(root.norm()));
+        let fastest = roots
+            .iter()
+            .fold(0.0f64, |most, root| most.max(root.norm()));
         let mut found = Vec::new();
         for root in roots {
             let size = root.norm();
@@ -290,14 +292,22 @@ fn by_simc(plant: Reduced) -> Ideal {
         dead_time,
     } = plant;
     let closed = 2.0 * dead_time;
-    let k = if lag.is_finite() { lag / gain } else { 1.0 / gain } / closed;
+    let k = if lag.is_finite() {
+        lag / gain
+    } else {
+        1.0 / gain
+    } / closed;
     let ti = lag.min(4.0 * closed);
     // Without a lag an integral alone remains: k/Ti = 1/(gain (τc + θ)).
     if ti == 0.0 {
         let small = 1e-6 * dead_time;
         return (small / (gain * closed), small, 0.0);
     }
-    (k * (1.0 + second / ti), ti + second, ti * second / (ti + second))
+    (
+        k * (1.0 + second / ti),
+        ti + second,
+        ti * second / (ti + second),
+    )
 }
 
 fn by_amigo(plant: Reduced, with_derivative: bool) -> Ideal {

@@ -1,11 +1,11 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::simplices;
 use super::{
     Candidates, Decisive, Goal, Loops, Objective, Scenario, Within, best_within, least, worst_delay,
 };
-use super::simplices;
-use crate::{Task, between};
 use crate::stability::{Affine, Family, Term};
+use crate::{Task, between};
 
 /// s + (Kp + Kv s) e^(−s T) with the parameters Kp, Kv, T, in scenarios of T.
 fn velocity_loops(delays: &[f64]) -> Candidates {
@@ -45,7 +45,10 @@ fn goal(required: [f64; 3]) -> Goal {
 fn margins_and_abscissae_of_proportional_control_are_the_closed_forms() {
     let (of, task) = (velocity_loops(&[0.36, 0.5]), Task::new());
     let exact = of.margins(&[1.2, 0.0], true, &task).unwrap();
-    let first: Vec<[f64; 3]> = exact.iter().map(|each| [each[0], each[1], each[2]]).collect();
+    let first: Vec<[f64; 3]> = exact
+        .iter()
+        .map(|each| [each[0], each[1], each[2]])
+        .collect();
     for margins in [first, of.all_margins(&[&[1.2, 0.0]], &task).unwrap()] {
         for (delay, [gain, phase, late]) in [0.36, 0.5].into_iter().zip(margins) {
             assert!((gain - FRAC_PI_2 / (1.2 * delay)).abs() < 1e-12);

@@ -27,6 +27,33 @@ pub struct Deviation {
     pub loud_until: f64,
 }
 
+/// When a run without a given end is over.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ending {
+    /// Not before this time, s.
+    pub(crate) least: f64,
+    /// The output must rest for this share of the run, and for this time.
+    pub(crate) quiet: (f64, f64),
+    /// The integral of the deviation from the rest, where it is known, and its relative error.
+    pub(crate) integral: (f64, f64),
+    /// Growth of the peak over a doubling of the time, and how many times in a row, that give a run up.
+    pub(crate) growth: (f64, u32),
+}
+
+/// How a run without a given end goes on.
+#[derive(Debug, Clone, Copy, Default)]
+struct Progress {
+    /// The time at which the peak is compared next.
+    mark: f64,
+    /// The peak at the mark before.
+    peak: f64,
+    growths: u32,
+    is_settled: bool,
+    is_lost: bool,
+    /// The time reached.
+    time: f64,
+}
+
 /// Measures a deviation between two times.
 #[derive(Debug, Clone)]
 pub(crate) struct DeviationMetrics {
@@ -37,6 +64,8 @@ pub(crate) struct DeviationMetrics {
     rest: f64,
     /// Half widths of the bands around level and rest, as shares of the peak.
     bands: (f64, f64),
+    ending: Option<Ending>,
+    progress: Progress,
     found: Deviation,
     zeros: Vec<f64>,
 }
@@ -48,6 +77,7 @@ impl DeviationMetrics {
         (start, end): (f64, f64),
         (level, rest): (f64, f64),
         bands: (f64, f64),
+        ending: Option<Ending>,
     ) -> Self {
         Self {
             start,
@@ -55,6 +85,11 @@ impl DeviationMetrics {
             level,
             rest,
             bands,
+            ending,
+            progress: Progress {
+                mark: ending.map_or(0.0, |ending| ending.least),
+                ..Progress::default()
+            },
             found: Deviation::default(),
             zeros: Vec::new(),
         }
@@ -63,6 +98,32 @@ impl DeviationMetrics {
     /// What was measured.
     pub(crate) fn found(&self) -> Deviation {
         self.found
+    }
+
+    /// The time reached, and whether the output came to rest before the end.
+    pub(crate) fn settled(&self) -> (f64, bool) {
+        (self.progress.time, self.progress.is_settled)
+    }
+
+    /// Is the run over at this time?
+    fn judge(&mut self, ending: &Ending, time: f64) {
+        let (found, progress) = (&self.found, &mut self.progress);
+        progress.time = time;
+        if time < progress.mark && progress.mark <= ending.least {
+            return;
+        }
+        let quiet = time - found.loud_until;
+        let off_rest = found.ie - (self.rest - self.level) * time;
+        let (known, error) = ending.integral;
+        let agrees = known.is_nan() || (off_rest - known).abs() <= error * found.iae;
+        let is_quiet = quiet >= ending.quiet.0 * time && quiet >= ending.quiet.1;
+        progress.is_settled |= is_quiet && agrees && found.peak > 0.0;
+        if time >= progress.mark {
+            let has_grown = progress.peak > 0.0 && found.peak > ending.growth.0 * progress.peak;
+            progress.growths = if has_grown { progress.growths + 1 } else { 0 };
+            progress.is_lost |= progress.growths == ending.growth.1;
+            (progress.peak, progress.mark) = (found.peak, 2.0 * time);
+        }
     }
 }
 
@@ -80,7 +141,8 @@ impl Measure for DeviationMetrics {
         };
         let mut off = *y;
         off.coefficients[0] -= self.level;
-        let time = |sigma: f64| (start + sigma * length - self.start).max(0.0);
+        let first = self.start;
+        let time = |sigma: f64| (start + sigma * length - first).max(0.0);
         let (low, high) = off.range();
         let found = &mut self.found;
 
@@ -133,6 +195,13 @@ impl Measure for DeviationMetrics {
             found.loud_until = found.loud_until.max(time(to));
         }
         self.zeros = zeros;
+        if let Some(ending) = self.ending {
+            self.judge(&ending, time(to));
+        }
+    }
+
+    fn is_enough(&self) -> bool {
+        self.progress.is_settled || self.progress.is_lost
     }
 }
 
@@ -164,7 +233,7 @@ mod tests {
     #[test]
     fn a_parabola_and_a_line_are_integrated_exactly() {
         // 4 t (1 − t/2) over 2 s, then −t over 1 s and back.
-        let mut metrics = DeviationMetrics::new((0.0, 4.0), (0.0, 0.0), (0.02, 1e-6));
+        let mut metrics = DeviationMetrics::new((0.0, 4.0), (0.0, 0.0), (0.02, 1e-6), None);
         metrics.segment(0.0, 2.0, 1.0, &Series::of(&[0.0, 8.0, -8.0]));
         metrics.segment(2.0, 2.0, 1.0, &Series::of(&[0.0, -4.0, 4.0]));
         let found = metrics.found();

@@ -67,11 +67,9 @@ impl<S: Scalar> Equations<S> {
 
     /// The change of the states over a time `h` with constant w, r and, of a back-calculation, v − u.
     pub(crate) fn over(&self, h: S) -> Propagator<S> {
-        if self.excess.is_empty() {
-            Propagator::new(&self.a, &[&self.b, &self.e], h)
-        } else {
-            Propagator::new(&self.a, &[&self.b, &self.e, &self.excess], h)
-        }
+        let columns = [&self.b[..], &self.e, &self.excess];
+        let present = columns.get(..self.inputs()).unwrap_or(&columns);
+        Propagator::new(&self.a, present, h)
     }
 
     /// Number of columns that drive the states: B, E and, where it is, G.

@@ -27,7 +27,7 @@ mod simulate;
 mod step_metrics;
 
 pub use deviation::Deviation;
-pub(crate) use deviation::DeviationMetrics;
+pub(crate) use deviation::{DeviationMetrics, Ending};
 pub use linear_loop::{Bounds, Equations, Kick, LinearLoop, Start, Update};
 pub use metrics::{Criteria, Metrics};
 pub use reference::Reference;

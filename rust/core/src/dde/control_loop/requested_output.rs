@@ -26,6 +26,11 @@ pub(crate) trait Measure: std::fmt::Debug {
 
     /// The command is at its limit from `start` to `end`.
     fn limited(&mut self, start: f64, end: f64);
+
+    /// Is enough of the response known?
+    fn is_enough(&self) -> bool {
+        false
+    }
 }
 
 /// Output and input times of a run, and the values so far.
@@ -92,6 +97,12 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
     /// Output and input times.
     pub(crate) fn times(&self) -> [&'a [f64]; 2] {
         [self.output_times, self.input_times]
+    }
+
+    /// Time of the next output, infinite if all are stored.
+    pub(crate) fn next_output(&self) -> f64 {
+        let next = self.output_times.get(self.trajectory.outputs.len());
+        next.copied().unwrap_or(f64::INFINITY)
     }
 
     /// The last requested time, 0 if there is none.
@@ -162,10 +173,15 @@ impl<'a, S: Scalar> RequestedOutput<'a, S> {
         };
     }
 
-    /// Are all values stored?
+    /// Are all values stored, or is enough measured?
     pub(crate) fn is_done(&self) -> bool {
-        self.trajectory.outputs.len() == self.output_times.len()
-            && self.trajectory.inputs.len() == self.input_times.len()
+        let is_stored = self.trajectory.outputs.len() == self.output_times.len()
+            && self.trajectory.inputs.len() == self.input_times.len();
+        is_stored
+            || self
+                .metrics
+                .as_ref()
+                .is_some_and(|metrics| metrics.is_enough())
     }
 }
 

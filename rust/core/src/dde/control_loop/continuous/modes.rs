@@ -64,6 +64,7 @@ pub(super) fn run<S: Scalar>(
         pieces: is_delayed.then(|| Pieces::new(start.command, plant.delay())),
         cursor,
         z,
+        forced: Vec::new(),
         t: S::default(),
         w: Series::constant(S::default()),
         r: 0.0,
@@ -129,6 +130,8 @@ struct Run<'a, 'r, S: Scalar> {
     pieces: Option<Pieces<S>>,
     cursor: Cursor<'a>,
     z: Vec<S>,
+    /// What acts on z′ besides z and w.
+    forced: Vec<S>,
     t: S,
     /// w on the element; zero without a delay.
     w: Series<S>,
@@ -339,8 +342,10 @@ impl<S: Scalar> Run<'_, '_, S> {
     /// Expand the states over an element; returns the part on which the series holds.
     fn expand(&mut self, h: S) -> f64 {
         let (field, expansion) = &mut self.fields[self.place];
-        let forced: Vec<S> = field.slopes.iter().map(|s| s.forced(self.r)).collect();
-        MARGIN * expansion.expand(&field.a, &field.b, &forced, &self.z, &self.w, h)
+        self.forced.clear();
+        let forced = field.slopes.iter().map(|s| s.forced(self.r));
+        self.forced.extend(forced);
+        MARGIN * expansion.expand(&field.a, &field.b, &self.forced, &self.z, &self.w, h)
     }
 
     /// A signal on the element.
@@ -359,6 +364,9 @@ impl<S: Scalar> Run<'_, '_, S> {
 
     /// The first change of mode on the element.
     fn change(&self, h: S) -> Option<Change> {
+        if self.plant.bounds().is_none() && self.plant.rate().is_none() {
+            return None;
+        }
         let mode = self.field().mode;
         let mut first: Option<Change> = None;
         let mut note = |series: &Series<S>, noise: f64, to: Mode| {
@@ -370,8 +378,15 @@ impl<S: Scalar> Run<'_, '_, S> {
         };
         let field = self.field();
         let u = self.series(&field.u);
+        let (least, most) = u.range();
+        let bounds = self.plant.bounds();
+        let is_inside =
+            bounds.is_none_or(|(low, high)| least >= low.value() && most <= high.value());
+        if is_inside && mode == Mode::FREE && self.plant.rate().is_none() {
+            return None;
+        }
         let noise = self.noise(&field.u);
-        if let Some((low, high)) = self.plant.bounds() {
+        if let Some((low, high)) = bounds {
             for (side, bound) in [(1, high), (-1, low)] {
                 if !bound.value().is_finite() || mode.integral == Integral::Slides {
                     continue;

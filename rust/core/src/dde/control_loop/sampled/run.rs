@@ -1,6 +1,7 @@
 //! Response of a sampled loop: sample by sample, exact, with output at any time.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 
 use crate::dde::control_loop::linear_loop::{Equations, LinearLoop, Start, Update, saturate};
 use crate::dde::control_loop::reference::{Cursor, Reference};
@@ -31,15 +32,13 @@ pub(crate) fn run<S: Scalar>(
     requested.reserve()?;
     let equations = plant.equations();
     let timing = Timing::new(plant.delay(), sample_time);
-    let is_measured = requested.is_measured();
     let stopped = plant.stops().filter(|_| plant.is_watched());
     let mut walk = Walk {
         plant,
         timing,
         fields: [
-            Some(Field::new(Cow::Borrowed(equations), timing, is_measured)),
-            stopped
-                .map(|state| Field::new(Cow::Owned(equations.stopped(state)), timing, is_measured)),
+            Some(Field::new(Cow::Borrowed(equations), timing)),
+            stopped.map(|state| Field::new(Cow::Owned(equations.stopped(state)), timing)),
         ],
         is_stopped: false,
         commands: Commands::new(start),
@@ -82,17 +81,16 @@ struct Field<'a, S: Scalar> {
     equations: Cow<'a, Equations<S>>,
     early: Propagator<S>,
     late: Propagator<S>,
-    /// For metrics, which begin at the first sample.
-    windows: Option<Windows>,
+    /// The output as polynomials, once it is asked for between samples, or measured.
+    windows: OnceCell<Windows>,
 }
 
 impl<'a, S: Scalar> Field<'a, S> {
-    fn new(equations: Cow<'a, Equations<S>>, timing: Timing<S>, is_measured: bool) -> Self {
-        let Timing { early, late, .. } = timing;
+    fn new(equations: Cow<'a, Equations<S>>, timing: Timing<S>) -> Self {
         Self {
-            early: equations.over(early),
-            late: equations.over(late),
-            windows: is_measured.then(|| Windows::new(&equations, early, late)),
+            early: equations.over(timing.early),
+            late: equations.over(timing.late),
+            windows: OnceCell::new(),
             equations,
         }
     }
@@ -287,39 +285,41 @@ impl<S: Scalar> Walk<'_, '_, S> {
             return;
         };
         let inputs: [S; INPUTS] = [w, self.held, self.excess];
-        if let Some(windows) = &field.windows {
-            let equations = windows.equations();
-            let values = inputs.map(S::value);
+        let equations = &*field.equations;
+        let columns: &[S] = inputs.get(..equations.inputs()).unwrap_or_default();
+        let until = (from + length).value() - tolerance;
+        let (x, scratch) = (&self.x, &mut self.scratch);
+        // Most times of a record are those of samples, at which the output is known.
+        let known = if S::MOVES {
+            until
+        } else {
+            until.min(from.value().next_up())
+        };
+        self.requested.outputs_before(known, |t| {
+            let h = t - from;
+            let h = h.pinned(h.value().max(0.0));
+            if h.is_nothing() {
+                return equations.output(x, w);
+            }
+            equations.over(h).apply(x, columns, scratch);
+            equations.output(scratch, w)
+        });
+        if self.requested.is_measured() || (!S::MOVES && self.requested.next_output() < until) {
+            let windows = &field.windows;
+            let own = windows.get_or_init(|| Windows::new(equations, self.timing));
             let other;
             let window = match part {
-                Part::Early => &windows.early,
-                Part::Late => &windows.late,
+                Part::Early => &own.early,
+                Part::Late => &own.late,
                 Part::Other => {
-                    other = Window::new(equations, length.value());
+                    other = Window::new(own.equations(), length.value());
                     &other
                 }
             };
-            window.measure(
-                equations,
-                &self.x,
-                values,
-                from.value(),
-                &mut self.requested,
-            );
+            let times = (from.value(), until);
+            let values = inputs.map(S::value);
+            window.serve(own.equations(), &self.x, values, times, &mut self.requested);
         }
-        let equations = &*field.equations;
-        let columns: &[S] = inputs.get(..equations.inputs()).unwrap_or_default();
-        let (x, scratch) = (&self.x, &mut self.scratch);
-        self.requested
-            .outputs_before((from + length).value() - tolerance, |t| {
-                let h = t - from;
-                let h = h.pinned(h.value().max(0.0));
-                if h.is_nothing() {
-                    return equations.output(x, w);
-                }
-                equations.over(h).apply(x, columns, scratch);
-                equations.output(scratch, w)
-            });
         let other;
         let over = match part {
             Part::Early => &field.early,

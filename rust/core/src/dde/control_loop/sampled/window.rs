@@ -15,6 +15,8 @@ use crate::dde::propagator::Propagator;
 use crate::dde::scalar::Scalar;
 use crate::linear_algebra::balance::balanced_norm;
 
+use super::timing::Timing;
+
 /// Largest ‖A‖ h of a step: 1/19! is below rounding errors.
 const REACH: f64 = 1.0;
 
@@ -76,13 +78,14 @@ impl Window {
         }
     }
 
-    /// Measure the output from `start` on, where the state is `x`.
-    pub(super) fn measure<S: Scalar>(
+    /// Measure the output from `start` on, where the state is `x`, and store it at all times before
+    /// `until`, unless numbers have slopes.
+    pub(super) fn serve<S: Scalar>(
         &self,
         equations: &Equations,
         x: &[S],
         inputs: [f64; INPUTS],
-        start: f64,
+        (start, until): (f64, f64),
         requested: &mut RequestedOutput<'_, S>,
     ) {
         let n = equations.states();
@@ -90,15 +93,34 @@ impl Window {
         let mut scratch = x.clone();
         let mut y = Series::constant(0.0);
         y.degree = self.rows.len() / (n + INPUTS);
+        let inverse = 1.0 / self.step;
         for number in 0..self.steps {
-            let [first, rest @ ..] = &mut y.coefficients;
-            *first = equations.output(&x, inputs[0]);
-            for (c, row) in rest.iter_mut().zip(self.rows.chunks_exact(n + INPUTS)) {
-                let (states, forced) = row.split_at(n);
-                *c = dot(states, &x) + dot(forced, &inputs);
+            let from = start + number as f64 * self.step;
+            let is_last = number + 1 == self.steps;
+            let end = if is_last {
+                until
+            } else {
+                until.min(from + self.step)
+            };
+            let is_read = !S::MOVES && requested.next_output() < end;
+            if requested.is_measured() || is_read {
+                let [first, rest @ ..] = &mut y.coefficients;
+                *first = equations.output(&x, inputs[0]);
+                for (c, row) in rest.iter_mut().zip(self.rows.chunks_exact(n + INPUTS)) {
+                    let (states, forced) = row.split_at(n);
+                    *c = dot(states, &x) + dot(forced, &inputs);
+                }
+                requested.measure(from, self.step, 1.0, &y);
+            } else if S::MOVES || requested.next_output() >= until {
+                return;
             }
-            requested.measure(start + number as f64 * self.step, self.step, 1.0, &y);
-            if number + 1 < self.steps {
+            if is_read {
+                requested.output_blocks(end, |times| {
+                    let sigmas = times.map(|time| ((time.value() - from) * inverse).max(0.0));
+                    y.at_each(sigmas).map(S::from)
+                });
+            }
+            if !is_last {
                 self.over_step
                     .apply(&x, &inputs[..equations.inputs()], &mut scratch);
                 std::mem::swap(&mut x, &mut scratch);
@@ -117,7 +139,7 @@ pub(super) struct Windows {
 
 impl Windows {
     /// For the parts of a sample.
-    pub(super) fn new<S: Scalar>(equations: &Equations<S>, early: S, late: S) -> Self {
+    pub(super) fn new<S: Scalar>(equations: &Equations<S>, timing: Timing<S>) -> Self {
         let values = |from: &[S]| from.iter().map(|v| v.value()).collect();
         let equations = Equations {
             a: values(&equations.a),
@@ -129,8 +151,8 @@ impl Windows {
             ..Equations::default()
         };
         Self {
-            early: Window::new(&equations, early.value()),
-            late: Window::new(&equations, late.value()),
+            early: Window::new(&equations, timing.early.value()),
+            late: Window::new(&equations, timing.late.value()),
             equations,
         }
     }
