@@ -14,6 +14,10 @@ from deadtime.tuning._result import Design
 from deadtime.tuning.proposal._possible import possible_loops
 
 
+#: Change of a gain, as a share, that is not worth a sentence.
+SAME = 1e-3
+
+
 @dataclass(frozen=True)
 class Gains:
     """Gains for an estimate.
@@ -103,7 +107,9 @@ def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller,
         if old := flown.gains.get(name, 0.0):
             low, high = sorted((old / LARGEST_CHANGE, old * LARGEST_CHANGE))
             gains[name] = min(max(gain, low), high)
-    changed = [name for name, gain in wanted.gains.items() if gains[name] != gain]
+    changed = [
+        name for name, gain in wanted.gains.items() if abs(gains[name] - gain) > SAME * abs(gain)
+    ]
     if not changed:
         return wanted, ()
     words = ", ".join(f"{name} = {wanted.gains[name]:.4g}" for name in changed)
