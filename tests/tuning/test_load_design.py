@@ -50,11 +50,11 @@ def test_the_default_is_the_best_load_response():
     assert best.objective == "load"
     assert best.value == pytest.approx(best.loop.load_response().iae, rel=1e-5)
     assert best.loop.margin().max_sensitivity == pytest.approx(1.6, rel=CLOSE)
-    # No gains along the boundary are better by more than a tenth.
+    # No gains along the boundary are better by more than 5 %.
     for Kp in np.linspace(0.6, 1.3, 15):
         Ki = brentq(lambda Ki, Kp=Kp: least_distance({"Kp": Kp, "Ki": Ki}) - 1.0 / 1.6, 1e-4, 1.0)
         other = PROCESS.replace(Kp=Kp, Ki=Ki).load_response().iae
-        assert other >= best.value / 1.1 * (1.0 - 1e-4)
+        assert other >= best.value / 1.05 * (1.0 - 1e-4)
 
 
 @pytest.mark.parametrize("controller", [dtm.P, dtm.PV, SMOOTH])
@@ -120,7 +120,7 @@ def test_ms_holds_over_intervals_and_plants():
     ("name", "least"), [("gain_margin", 5.0), ("phase_margin", 65.0), ("delay_margin", 6.0)]
 )
 def test_margins_are_demands(name, least):
-    free = dtm.design(PROCESS, controller=dtm.PI)
+    free = dtm.design(PROCESS, controller=dtm.PI, load_slack=0.0)
     assert getattr(free.margins, name) < least
     best = dtm.design(PROCESS, controller=dtm.PI, **{name: least})
     assert getattr(best.margins, name) >= least * (1 - CLOSE)
@@ -150,7 +150,7 @@ def test_a_settling_time_is_a_demand():
 
 
 def test_load_and_set_point_are_weighed():
-    load = dtm.design(PROCESS, controller=dtm.PI)
+    load = dtm.design(PROCESS, controller=dtm.PI, load_slack=0.0)
     point = dtm.design(PROCESS, controller=dtm.PI, objective="set_point")
     both = dtm.design(PROCESS, controller=dtm.PI, load_weight=0.5)
     iae = [one.loop.load_response().iae for one in (load, both, point)]
@@ -177,6 +177,7 @@ def test_pid_control_is_better_than_pi():
     [
         ({"max_sensitivity": 1.0}, "Ms is above 1"),
         ({"load_weight": 2.0}, "between 0 and 1"),
+        ({"load_slack": -0.1}, "load_slack"),
         ({"fixed": {"Ki": 0.1}}, "follows from Ki, which is given"),
         ({"noise_gain": -1.0}, "noise_gain"),
         ({"objective": "abscissa", "noise_gain": 1.0}, "noise_gain with objective='abscissa'"),

@@ -132,6 +132,23 @@ def test_no_gains_come_of_a_record_that_shows_no_plant():
             ask()
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_integrating_process_has_gains_of_its_sign(sign):
+    # A tank: 0.5 exp(-s)/s.
+    time = 0.1 * np.arange(500)
+    valve = 1.0 * ((time > 5.0) & (time < 12.0)) - 1.0 * ((time > 20.0) & (time < 27.0))
+    arrived = np.interp(time - 1.0, time, valve, left=0.0)
+    level = sign * 0.05 * np.cumsum(arrived)
+    level += np.random.default_rng(1).normal(0.0, 0.01, time.size)
+    found = dtm.tune(dtm.Recording(time, None, level, valve))
+    assert found.verdict == "reliable"
+    assert min(sign * gain for gain in found.controller.gains.values()) > 0.0
+    truth = dtm.ControlLoop(dtm.Integrator(0.5 * sign), found.controller, delay=0.95)
+    assert truth.is_stable()
+    assert truth.margin().max_sensitivity < 1.7
+    assert any("direct acting" in note for note in found.settings.notes) == (sign < 0.0)
+
+
 def test_a_closed_loop_is_drawn_under_its_own_set_point():
     truth = dtm.ControlLoop(TRUTH, dtm.PI(1.0, 0.02), delay=LATE, sample_time=1.0)
     time = np.arange(900.0)

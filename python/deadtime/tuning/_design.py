@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal, get_args
 
-from deadtime._base.validation import finite
+from deadtime._base.validation import finite, non_negative
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._demands import Demands
@@ -16,7 +16,7 @@ from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
 from deadtime.tuning._objectives import objective_named
 from deadtime.tuning._problem import ObjectiveName, controller_template, pose, with_filter
-from deadtime.tuning._responses import RESPONSES, Wanted
+from deadtime.tuning._responses import RESPONSES, SLACK, Wanted
 from deadtime.tuning._result import Design
 
 
@@ -28,6 +28,7 @@ def design(
     gain: float | tuple[float, float] | None = None,
     objective: ObjectiveName = "load",
     load_weight: float | None = None,
+    load_slack: float | None = None,
     plants: Sequence[object] = (),
     fixed: Mapping[str, float] | None = None,
     max_sensitivity: float | None = None,
@@ -83,6 +84,10 @@ def design(
         Weight of the load between 0 and 1 where load and set point both count, each in units of the
         best that can be had of it alone; the set point has the rest. 1 for the loads, 0 for the set
         points if not given.
+    load_slack : float, optional
+        Part of the best response to a load that may be lost where a step of the reference settles
+        earlier for it, with PI and PID control and ``"load"``; 0.05 if not given, and 0 with any
+        demand. The weight of the reference is chosen for that too, unless `controller` gives one.
     plants : sequence of ControlLoop or plants, optional
         Further ones that the same gains must hold for, with their own delays.
     fixed : mapping of str to float, optional
@@ -198,8 +203,10 @@ def design(
                 "its corner by 'abscissa', 'damping' or 'settling_time'"
             )
         weight = _load_weight(objective, load_weight)
+        slack = _load_slack(objective, weight, load_slack, demands)
         others = _loops_of(plants, template)
-        return Wanted(problem, objective, weight, demands, others, doubt).design()
+        wanted = Wanted(problem, objective, weight, demands, others, doubt, slack)
+        return wanted.design()
     names = get_args(ObjectiveName)
     if objective not in names:
         raise ValueError(f"objective={objective!r}: give one of {', '.join(map(repr, names))}")
@@ -219,6 +226,14 @@ def _load_weight(objective: ObjectiveName, given: float | None) -> float:
     if not 0.0 <= weight <= 1.0:
         raise ValueError(f"load_weight={weight}: give a part between 0 and 1")
     return weight
+
+
+def _load_slack(
+    objective: ObjectiveName, weight: float, given: float | None, demands: Demands
+) -> float:
+    if given is not None:
+        return non_negative("load_slack", given)
+    return SLACK if objective == "load" and weight == 1.0 and not demands.named else 0.0
 
 
 def _loops_of(plants: Sequence[object], template: Controller) -> tuple[ControlLoop, ...]:

@@ -40,9 +40,10 @@ _ACTIVE = 1.0 + 1e-3
 #: Weights of the reference that are tried: more of them settle a little earlier.
 _WEIGHTS = np.linspace(0.0, 1.0, 21)
 
-#: Part of the best response to a load that may be given for a step that settles earlier: the
-#: response is flat along the ratios of the gains, where the settling time is not.
-_SLACK = 0.1
+#: Part of the best response to a load that is given for a step that settles earlier, where no
+#: demand is made: the response is flat along the ratios of the gains, where the settling time is
+#: not.
+SLACK = 0.05
 
 #: Relative loss that counts as none.
 _NOTHING = 1e-3
@@ -61,11 +62,8 @@ class Wanted:
     others: tuple[ControlLoop, ...] = ()
     #: Why the estimate behind it cannot be relied on.
     doubt: str | None = None
-
-    @property
-    def _slack(self) -> float:
-        """Part of the best response to a load that an earlier end of a step may cost."""
-        return _SLACK if self.weight == 1.0 and self.objective == "load" else 0.0
+    #: Part of the best response to a load that an earlier end of a step may cost.
+    slack: float = 0.0
 
     def gains(
         self,
@@ -114,7 +112,7 @@ class Wanted:
         corners = [problem.middle, *(one for one in problem.corners if one != problem.middle)]
         every = [*corners, *(one for one in fine(problem) if one not in corners)]
         found, middle = self._weighted(
-            self.gains(every, len(corners), slack=self._slack), every, len(corners)
+            self.gains(every, len(corners), slack=self.slack), every, len(corners)
         )
         gains = found.gains
         judged = problem.candidates(corners)

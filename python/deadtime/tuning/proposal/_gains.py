@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import copysign, isfinite
 from typing import Any
 
 from deadtime.estimation import PlantEstimate
@@ -13,6 +14,9 @@ from deadtime.tuning._gate import LARGEST_CHANGE, LARGEST_SENSITIVITY, check_gai
 from deadtime.tuning._result import Design
 from deadtime.tuning.proposal._possible import possible_loops
 
+#: Least gain of an integrating plant that is tried, as a share of the largest. Larger: slow
+#: integrals are left out; smaller: their responses take long to come to rest.
+LEAST = 2e-3
 
 #: Change of a gain, as a share, that is not worth a sentence.
 SAME = 1e-3
@@ -70,7 +74,8 @@ def wanted_gains(
     """The best gains for all plants that an estimate leaves possible, one step from the flown."""
     likeliest = fit.loop(template, sample_time=sample_time, limit=limit)
     loops = tuple(possible_loops(fit, likeliest, level))
-    found = design(likeliest, controller=template, plants=loops[1:], **demands)
+    where = {"ranges": _ranges(fit, template)} | dict(demands)
+    found = design(likeliest, controller=template, plants=loops[1:], **where)
     chosen, remarks = _one_step(found.loop.controller, flown)
     if fit.verdict != "reliable":
         remarks = (f"Set aside: the estimate is an indication, {fit.reason}.", *remarks)
@@ -96,6 +101,20 @@ def refusals(
         noise=fit.noise_std,
     )
     return gate.reasons
+
+
+def _ranges(fit: PlantEstimate, template: Controller) -> dict[str, tuple[float, float]] | None:
+    """Where gains of an integrating plant are looked for; None where that is known otherwise.
+
+    By its largest proportional gain and the time in which half of that acts.
+    """
+    largest, time = abs(fit.largest_gain), 1.0 / fit.crossover
+    if not (fit.best.integrates and "Ki" in template.gains and isfinite(largest * time)):
+        return None
+    sign = copysign(1.0, fit.parameters["gain"])
+    units = {"Kp": largest, "Ki": largest / time, "Kd": largest * time}
+    ends = {name: (sign * LEAST * units[name], sign * units[name]) for name in template.gains}
+    return {name: (min(pair), max(pair)) for name, pair in ends.items()}
 
 
 def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller, tuple[str, ...]]:

@@ -205,14 +205,25 @@ impl<'a> Search<'a> {
         Ok(self.weights.load * worst)
     }
 
+    /// Is the integral of the modulus after a load what counts? Without an integral it is the rest.
+    fn is_absolute(&self) -> bool {
+        let first = self.posed.loops.first();
+        let integrates = first.is_some_and(|of| of.controller().kind.integrates());
+        integrates && !self.posed.wish.by_integral
+    }
+
+    /// Are responses simulated?
+    pub(super) fn simulates(&self) -> bool {
+        self.weights.set_point > 0.0 || self.is_absolute()
+    }
+
     /// The value of gains in the worst of the loops that are seen; where it is more than `most`, perhaps
     /// less than it is.
     pub(super) fn value(&self, gains: &[f64], most: f64) -> Result<f64, Error> {
         let (wish, weights) = (&self.posed.wish, self.weights);
-        let integrates = self.posed.loops[0].controller().kind.integrates();
-        let simulates = integrates && !wish.by_integral;
+        let is_absolute = self.is_absolute();
         let least = self.least(gains)?;
-        if (weights.set_point == 0.0 && !simulates) || least > most {
+        if !self.simulates() || least > most {
             return Ok(least);
         }
         let mut worst = least;
@@ -229,7 +240,7 @@ impl<'a> Search<'a> {
                     }
                 })))
             };
-            let load = match (weights.load > 0.0, simulates) {
+            let load = match (weights.load > 0.0, is_absolute) {
                 (false, _) => 0.0,
                 (true, false) => lasting(&of)?,
                 (true, true) => of_step(Drive::Load, false)?,

@@ -25,6 +25,12 @@ const ALONG: usize = 40;
 const RATIO_KNOWN: f64 = 1e-6;
 const RATIOS_KNOWN: f64 = 1e-4;
 
+/// The first of these accuracies where responses are simulated.
+const SIMULATED_KNOWN: f64 = 1e-4;
+
+/// Part of the first surroundings that is searched again once Ms is sharp.
+const AGAIN: f64 = 0.1;
+
 /// Rounds of the exchange, and the relative excess of Ms that counts as none: more than that by which
 /// the search aims below the demand.
 const ROUNDS: usize = 40;
@@ -42,8 +48,8 @@ const LATEST: usize = 2;
 
 /// How far around the best ratios neighbours are looked for, in the units of the grid, and at how many
 /// points of each of one or two ratios.
-const AROUND_ONE: (f64, usize) = (1.6, 33);
-const AROUND_TWO: (f64, usize) = (0.8, 7);
+const AROUND_ONE: (f64, usize) = (1.6, 21);
+const AROUND_TWO: (f64, usize) = (0.8, 5);
 
 /// Most loops, those with the largest Ms, whose margins are all computed.
 const WORST: usize = 12;
@@ -106,7 +112,7 @@ impl Search<'_> {
                     if is_given || shape.is_empty() || before.is_some() {
                         return self.judged(before, known);
                     }
-                    shape = self.refined(shape)?;
+                    shape = self.refined(shape, AGAIN)?;
                     is_new = false;
                 }
                 Some(excess) => is_new = !is_given && excess > SMALL,
@@ -261,15 +267,15 @@ impl Search<'_> {
                 self.posed.demands.max_sensitivity
             );
         };
-        self.refined(start)
+        self.refined(start, 1.0)
     }
 
-    /// Better ratios around a start.
-    fn refined(&self, start: Vec<f64>) -> Result<Vec<f64>, Error> {
+    /// Better ratios around a start, within a part of a cell of the grid.
+    fn refined(&self, start: Vec<f64>, part: f64) -> Result<Vec<f64>, Error> {
         let axes = self.posed.axes();
         let sides: Vec<f64> = axes
             .iter()
-            .map(|(low, high, count)| (high - low) / (*count - 1) as f64)
+            .map(|(low, high, count)| part * (high - low) / (*count - 1) as f64)
             .collect();
         let cost = |shape: &[f64], most: f64| {
             self.task.check()?;
@@ -283,7 +289,12 @@ impl Search<'_> {
             ([x], [side]) => {
                 let ends = (x - side, x + side);
                 let along = |x: f64| cost(&[x], f64::INFINITY);
-                let (place, least) = minimum(along, ends, RATIO_KNOWN, ALONG)?;
+                let known = if self.simulates() {
+                    SIMULATED_KNOWN
+                } else {
+                    RATIO_KNOWN
+                };
+                let (place, least) = minimum(along, ends, known, ALONG)?;
                 Ok(vec![if least <= cost(&[*x], f64::INFINITY)? {
                     place
                 } else {
