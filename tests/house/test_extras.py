@@ -75,6 +75,7 @@ DRAWN = {
     "Identifiability.plot": lambda: planned().plot(),
     "PlantEstimate.plot": lambda: found_plant().plot(),
     "Latency.plot": lambda: told().plot(),
+    "LoadResponse.plot": lambda: LOOP.load_response().plot(),
     "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),
     "Response.plot": lambda: LOOP.step_response().plot(),
     "RobustMap.plot": lambda: dtm.robust_map(
