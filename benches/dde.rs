@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use deadtime::Task;
 use deadtime::dde::ensemble::{self, Measures, Sets};
-use deadtime::dde::fixed_step::{self, Blocks, Path, Rest, Settings, Solver};
+use deadtime::dde::fixed_step::{self, Blocks, Driven, Path, Rest, Settings, Solver};
 use deadtime::dde::sampled;
 use deadtime::dde::{Criteria, Equations, LinearLoop, Reference, Start};
 
@@ -207,15 +207,21 @@ fn fixed_steps(criterion: &mut Criterion) {
         state: vec![0.0],
         ..Rest::default()
     };
-    let Ok(reference) = Reference::step(0.0, 1.0) else {
+    let (Ok(reference), Ok(still)) = (Reference::step(0.0, 1.0), Reference::step(0.0, 0.0)) else {
         return;
+    };
+    let driven = Driven {
+        reference,
+        load: still.clone(),
+        output: still.clone(),
+        noise: still,
     };
     let mut group = criterion.benchmark_group("fixed steps");
     for (name, solver) in Solver::NAMED {
         let settings = Settings {
             delay: DELAY,
             path: Path::Measurement,
-            limit: Some(1.0),
+            bounds: Some((-1.0, 1.0)),
             sample_steps: None,
             solver,
             step: 1e-3,
@@ -224,8 +230,7 @@ fn fixed_steps(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(settings.steps as u64));
         group.bench_function(name, |bencher| {
             let task = Task::new();
-            bencher
-                .iter(|| fixed_step::run(black_box(&blocks), &settings, &rest, &reference, &task));
+            bencher.iter(|| fixed_step::run(black_box(&blocks), &settings, &rest, &driven, &task));
         });
     }
     group.finish();

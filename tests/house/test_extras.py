@@ -84,6 +84,7 @@ DRAWN = {
     "PlantEstimate.plot": lambda: found_plant().plot(),
     "Latency.plot": lambda: told().plot(),
     "Proposal.plot": lambda: tuned().plot(),
+    "LoadResponse.plot": lambda: LOOP.load_response().plot(),
     "ProvedBoxes.plot": lambda: dtm.proved_boxes(FAMILY, RANGES, tol=0.3).plot(),
     "Response.plot": lambda: LOOP.step_response().plot(),
     "RobustMap.plot": lambda: dtm.robust_map(

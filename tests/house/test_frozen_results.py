@@ -81,7 +81,9 @@ def adapted():
 MADE = {
     "Choice": lambda: dtm.tuning.Choice(1, True),
     "Certificate": lambda: h.certify((-1, 1), (0, 9)),
+    "BackCalculation": lambda: dtm.loops.BackCalculation(2.0),
     "Chain": lambda: h.chains()[0],
+    "ConditionalIntegration": dtm.loops.ConditionalIntegration,
     "ControlLoop": lambda: LOOP,
     "Explorer": lambda: LOOP.explore(),
     "CramerRaoBound": lambda: dtm.estimation.CramerRaoBound(**bound_fields()),
@@ -89,6 +91,7 @@ MADE = {
     "DelayEstimate": lambda: dtm.estimate_delay(
         *record_step(rest=1.0, noise=0.01), free=("delay",)
     ),
+    "LoadResponse": lambda: LOOP.load_response(),
     "DelayTrack": tracked,
     "OnlineEstimate": lambda: tracked().last,
     "DelayResult": solved,

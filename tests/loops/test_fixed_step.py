@@ -170,3 +170,21 @@ def test_an_algebraic_loop_is_refused():
     loop = dtm.ControlLoop(dtm.RationalPlant([1.0, 1.0], [1.0, 2.0]), dtm.P(Kp=0.5), delay=0.0)
     with pytest.raises(ValueError, match="algebraic loop"):
         dtm.simulate_fixed_step(loop, 1.0, step=0.1)
+
+
+@pytest.mark.parametrize("path", ["command", "measurement"])
+def test_loads_disturbances_and_noise_converge_to_the_exact_response(path):
+    loop = dtm.ControlLoop(
+        dtm.FirstOrder(2.0, 1.0), dtm.PI(0.8, 0.5), delay=0.25, limit=(-0.4, 0.9), delay_path=path
+    )
+    given = {
+        "load": ([0.5, 2.0], [0.4, -0.2]),
+        "output_disturbance": ([1.0], [0.3]),
+        "noise": ([3.0], [0.05]),
+    }
+    coarse = dtm.simulate_fixed_step(loop, 6.0, step=1 / 512, solver="ode4", **given)
+    exact = loop.simulate(coarse.time, 1.0, **given)
+    # Jumps between whole steps cost one order.
+    np.testing.assert_allclose(coarse.outputs[:-1], exact.outputs[:-1], atol=4e-3)
+    with pytest.raises(ValueError, match="load is a function"):
+        dtm.simulate_fixed_step(loop, 1.0, step=0.1, load=np.sin)

@@ -180,3 +180,35 @@ def test_wrong_arguments_are_named():
         dtm.sweep(loop, {"Kp": [1.0]}, metrics=["load_size"])
     with pytest.raises(ValueError, match="sensitivities"):
         loop.simulate(TIMES, load=1.0, sensitivities=("delay",))
+
+
+def test_a_plant_with_delays_inside_feels_loads_as_its_parts_do():
+    """G1 + G2 e^(-0.5 s), against the same plant whose second part is under way outside."""
+    s = dtm.s
+    G = 1.0 / (s + 1.0) * (1.0 + 0.0 * dtm.delay(0.5))
+    inside = dtm.ControlLoop(G, dtm.PI(0.8, 0.4), delay=0.3)
+    plain = dtm.ControlLoop(dtm.FirstOrder(1.0, 1.0), dtm.PI(0.8, 0.4), delay=0.3)
+    mixed = dtm.ControlLoop((1.0 + 0.2 * dtm.delay(0.5)) / (s + 1.0), dtm.PI(0.8, 0.4), delay=0.3)
+    given = {"load": pairs(LOAD), "output_disturbance": pairs(OUTPUT), "noise": ([0.5], [0.1])}
+    if not inside.plant.is_rational:
+        found = inside.simulate(TIMES, 0.0, **given)
+        truth = plain.simulate(TIMES, 0.0, **given)
+        np.testing.assert_allclose(found.outputs, truth.outputs, atol=1e-9)
+        np.testing.assert_allclose(found.inputs, truth.inputs, atol=1e-9)
+    # Linear: the response to all is the sum of those to each.
+    whole = mixed.simulate(TIMES, 1.0, **given).outputs
+    parts = [mixed.simulate(TIMES, 1.0).outputs]
+    parts += [mixed.simulate(TIMES, 0.0, **{name: put}).outputs for name, put in given.items()]
+    np.testing.assert_allclose(whole, np.sum(parts, axis=0), atol=1e-12)
+    # Until the second part arrives, a load acts through the first alone.
+    early = mixed.simulate(np.linspace(0.0, 0.5, 6), 0.0, load=1.0)
+    np.testing.assert_allclose(early.outputs[:4], 1.0 - np.exp(-early.time[:4]), atol=2e-2)
+    with pytest.raises(ValueError, match="number or an array"):
+        mixed.simulate(TIMES, np.sin)
+
+
+def test_steady_states_count_loads():
+    loop = dtm.ControlLoop(dtm.FirstOrder(2.0, 1.0), dtm.P(1.5), delay=0.2)
+    found = loop.simulate(np.linspace(0.0, 60.0, 61), 1.0, load=0.5, output_disturbance=0.2)
+    assert found.steady_state == pytest.approx(found.outputs[-1], abs=1e-9)
+    assert loop.simulate(TIMES, 1.0, noise=0.1).steady_state is None

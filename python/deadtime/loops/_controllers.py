@@ -198,6 +198,11 @@ class Controller:
 
     __rmul__ = __mul__
 
+    @property
+    def _is_guarded(self) -> bool:
+        """Whether it has parts that its gains and its filter do not show."""
+        return bool(self._extras) or getattr(self, "anti_windup", None) is not None
+
     def _replace(self, numbers: Mapping[str, float]) -> Controller:
         """Return the same controller with other numbers."""
         changed: dict[str, Any] = {n: numbers.get(n, getattr(self, n)) for n in self._gains()}

@@ -11,7 +11,7 @@ import numpy as np
 from deadtime._base.explorer import Explorer
 from deadtime.loops._factored_plant import FactoredPlant
 from deadtime.loops._plants import FirstOrder, Integrator, Plant
-from deadtime.loops._specification import LoopSpecification, refuse_discretised
+from deadtime.loops._specification import LoopSpecification, is_unequal, refuse_discretised
 
 #: Gains on the axes reach to so many times the loop's own.
 _REACH = 4.0
@@ -45,6 +45,11 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
             "for one delay in series; make a loop around such a plant first"
         )
     refuse_discretised(controller, loop.sample_time, "the explorer")
+    if loop.rate_limit is not None or is_unequal(loop.limit) or controller._is_guarded:
+        raise ValueError(
+            "the explorer shows loops with equal limits and controllers without weights, "
+            "feed-forward and anti-windup: leave them out"
+        )
     known = type(controller).__name__
     if known not in ("P", "PI", "PD", "PV", "PID"):
         raise ValueError(f"{known}: the explorer shows P, PI, PD, PV and PID controllers")

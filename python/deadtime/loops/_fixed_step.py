@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, positive
 from deadtime.loops._control_loop import ControlLoop
+from deadtime.loops._inputs import Input, SampledNoise, held_input
 from deadtime.loops._runs import LoopRun, reference_jumps
-from deadtime.loops._specification import refuse_discretised
+from deadtime.loops._specification import LoopSpecification, refuse_discretised
 from deadtime.systems import Response
 
 #: A time counts as a whole number of steps if it differs by less than this, in steps: rounding of
@@ -33,6 +35,8 @@ class FixedStepSettings:
     step: float
     steps: int
     initial_output: float
+    #: Load, disturbance of the output and noise: times and values.
+    inputs: list[tuple[Array, Array]]
 
 
 def simulate_fixed_step(
@@ -42,6 +46,10 @@ def simulate_fixed_step(
     *,
     step: float,
     solver: str = "ode3",
+    load: Input | None = None,
+    output_disturbance: Input | None = None,
+    noise: Input | SampledNoise | None = None,
+    seed: int | np.random.SeedSequence = 0,
     initial_output: float = 0.0,
     reference_before: float | None = None,
     reference_time: ArrayLike | None = None,
@@ -69,6 +77,9 @@ def simulate_fixed_step(
         Length of a step in s.
     solver : {"ode1", "ode2", "ode3", "ode4", "ode5", "ode8"}
         Euler, Heun, Bogacki and Shampine, Kutta, Dormand and Prince of order 5 and 8.
+    load, output_disturbance, noise, seed
+        As of `ControlLoop.simulate`, but no functions; arrays have values for times 0, step, 2
+        step, .... Every stage reads them at its own time.
     initial_output : float
         Output of the plant, which is at rest at the start.
     reference_before : float, optional
@@ -134,6 +145,12 @@ def simulate_fixed_step(
         step=length,
         steps=_steps(duration, length),
         initial_output=initial,
+        inputs=_inputs(
+            specification,
+            (length, _steps(duration, length)),
+            {"load": load, "output": output_disturbance, "noise": noise},
+            seed,
+        ),
     )
     found = specification.kernel.fixed_step(run, settings)
     times = length * np.arange(settings.steps + 1, dtype=np.float64)
@@ -150,6 +167,24 @@ def simulate_fixed_step(
         steady_state=specification.steady_state(float(jumps.values[-1])),
         _dense=lines,
     )
+
+
+def _inputs(
+    loop: LoopSpecification, steps: tuple[float, int], given: dict[str, Any], seed: Any
+) -> list[tuple[Array, Array]]:
+    found = []
+    for name, put in given.items():
+        if put is None:
+            found.append((np.empty(0), np.empty(0)))
+        elif callable(put) and not isinstance(put, SampledNoise):
+            raise ValueError(
+                f"{name} is a function: give a number, an array or a pair (times, values), since "
+                "steps do not end where it bends"
+            )
+        else:
+            times = steps[0] * np.arange(steps[1] + 1.0)
+            found.append(held_input(loop, name, put, times, seed))
+    return found
 
 
 def _steps(duration: float, step: float) -> int:

@@ -419,13 +419,35 @@ class _Again:
     def steady_state(self) -> float | None:
         """Output at rest under the last reference, None without such a rest."""
         if self.states:
-            return None
+            output, command = self._rest()
+            low, high = self.loop.bounds
+            return output if command is not None and low <= command <= high else None
         return self.loop.steady_state(float(np.ravel(_whole(self.loop, self.run).reference)[-1]))
 
     def stays_settled(self, time: Array, inputs: Array, settled: float) -> bool:
         """Whether the response stays in the band in which it is since `settled`, s."""
-        reference = float(np.ravel(_whole(self.loop, self.run).reference)[-1])
-        return stays_settled(self.loop, time - time[0], inputs, reference, settled)
+        return stays_settled(self.loop, time - time[0], inputs, self._rest()[1], settled)
+
+    def _rest(self) -> tuple[float | None, float | None]:
+        """Output and command at rest under the last reference and inputs, limits left out."""
+        run = _whole(self.loop, self.run)
+        last = float(np.ravel(run.reference)[-1])
+        command = self.loop.command_at_rest(last)
+        if command is None:
+            return None, None
+        output = self.loop.kernel.rest_gains()[0] * last
+        for place, (name, degree) in enumerate(self.states):
+            if degree or name == "noise" or run.kicks is None:
+                return None, None
+            _, inputs, values = run.kicks
+            held = [value for put, value in zip(inputs, values, strict=True) if put == place]
+            gains = [system.dcgain() for system in self.loop.transfers(name)]
+            if held and not np.isfinite(gains).all():
+                return None, None
+            if held:
+                output += gains[0] * held[-1]
+                command += gains[1] * held[-1]
+        return float(output), float(command)
 
     def __call__(self, times: Array) -> Array:
         start = cast(float, self.found.start)

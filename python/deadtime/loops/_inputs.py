@@ -91,8 +91,7 @@ def driven(
     for name, given in inputs.items():
         if given is None:
             continue
-        pieces = _noise(loop, times, phase, given, seed) if name == "noise" else None
-        pieces = pieces or _pieces(_TITLES[name], given, times)
+        pieces = _pieces_of(loop, name, given, times, phase, seed)
         late = name in ("load", "output")
         since = pieces.starts - times[0] + (loop.output_lead if late else 0.0)
         if loop.sample_time is not None:
@@ -110,6 +109,21 @@ def driven(
     order = np.argsort(moments, kind="stable")
     states = np.concatenate(which)[order].tolist()
     return Driven(names, Kicks(moments[order], states, np.concatenate(values)[order]))
+
+
+def held_input(
+    loop: LoopSpecification, name: str, given: Any, times: Array, seed: Any
+) -> tuple[Array, Array]:
+    """An input that is no function as times and the values that hold from them on."""
+    pieces = _pieces_of(loop, name, given, times, 0.0, seed)
+    return pieces.starts, pieces.derivatives[:, 0]
+
+
+def _pieces_of(
+    loop: LoopSpecification, name: str, given: Any, times: Array, phase: float, seed: Any
+) -> _Pieces:
+    drawn = _noise(loop, times, phase, given, seed) if name == "noise" else None
+    return drawn or _pieces(_TITLES[name], given, times)
 
 
 def at_samples(

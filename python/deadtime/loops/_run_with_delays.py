@@ -6,9 +6,13 @@ drives the output by b r e^(-s delay) / h and the command by a r / h, h = a g + 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from deadtime._base.arrays import Array
 from deadtime._base.validation import one_dimensional
+from deadtime.loops._inputs import SampledNoise, held_input
 from deadtime.loops._runs import RunArguments, reference_jumps
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, TransferFunction
@@ -30,6 +34,11 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
                 f"{name}: a loop whose plant has delays inside takes no such argument; it needs a "
                 "plant that is rational but for one delay in series"
             )
+    if callable(given.reference):
+        raise ValueError(
+            "reference: a loop whose plant has delays inside takes a number or an array; give "
+            "values that hold from the times in reference_time on"
+        )
     times = one_dimensional("time", given.time)
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
@@ -54,6 +63,11 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
         for driven in (output, command)
     ]
     steady = output.dcgain() * float(jumps.values[-1])
+    further = [
+        _run_of(loop, name, given, times) for name in given.inputs if given.inputs[name] is not None
+    ]
+    if further:
+        return _together([(runs[0], runs[1]), *further], times, jumps.at(times))
     return Response(
         time=times,
         outputs=runs[0].outputs,
@@ -62,6 +76,36 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
         reference=jumps.at(times),
         steady_state=steady if np.isfinite(steady) else None,
         _dense=runs[0]._dense,
+    )
+
+
+def _run_of(
+    loop: LoopSpecification, name: str, given: RunArguments, times: Array
+) -> tuple[Response, Response]:
+    """Output and command under an input besides the reference, from rest."""
+    driven = loop.transfers(name)
+    put = given.inputs[name]
+    if callable(put) and not isinstance(put, SampledNoise):
+        runs = [system.simulate(times, put) for system in driven]
+    else:
+        when, values = held_input(loop, name, put, times, given.seed)
+        runs = [system.simulate(times, values, input_time=when) for system in driven]
+    return runs[0], runs[1]
+
+
+def _together(
+    runs: Sequence[tuple[Response, Response]], times: Array, reference: Array
+) -> Response:
+    """The sum of responses."""
+    outputs, inputs = zip(*runs, strict=True)
+    dense = [run._dense for run in outputs if run._dense is not None]
+    return Response(
+        time=times,
+        outputs=np.sum([run.outputs for run in outputs], axis=0),
+        inputs=np.sum([run.outputs for run in inputs], axis=0),
+        breaks=np.unique(np.concatenate([run.breaks for run in (*outputs, *inputs)])),
+        reference=reference,
+        _dense=lambda when: np.sum([one(when) for one in dense], axis=0),
     )
 
 

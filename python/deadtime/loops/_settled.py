@@ -63,17 +63,16 @@ def slowest_rates(times: ArrayLike) -> Array:
 
 
 def stays_settled(
-    loop: LoopSpecification, times: Array, inputs: Array, reference: float, settled: float
+    loop: LoopSpecification, times: Array, inputs: Array, command: float | None, settled: float
 ) -> bool:
     """Whether a simulated response stays in the band in which it is since `settled`, s.
 
     It is a matter of the loop only if its command was or is to be at the limit. `times` count from
-    the start.
+    the start, `command` is that at rest without limits, None without a rest.
     """
     if (loop.limit is None and loop.rate_limit is None) or not np.isfinite(settled):
         return True
     low, high = loop.bounds
-    command = loop.command_at_rest(reference)
     rests = command is not None and bool(rests_at_limit(command, loop.bounds))
     limited = np.flatnonzero((inputs >= high) | (inputs <= low))
     if not (limited.size or rests):

@@ -123,8 +123,21 @@ class LoopSpecification(PickledByFields):
     def transfer(self, of: str) -> TransferFunction:
         """The loop gain (`open`), or from the reference to `output` or `command`."""
         _ = self.known_delay
-        num, den = self.kernel.transfer(of)
-        return TransferFunction(QuasiPolynomial._wrap(num), QuasiPolynomial._wrap(den))
+        if of == "open":
+            num, den = self.kernel.gain()
+            return TransferFunction(QuasiPolynomial._wrap(num), QuasiPolynomial._wrap(den))
+        output, command = self.transfers("reference")
+        return output if of == "output" else command
+
+    def transfers(self, given: str) -> tuple[TransferFunction, TransferFunction]:
+        """From the `reference`, a `load`, the `output` or `noise` to output and command."""
+        _ = self.known_delay
+        den = QuasiPolynomial._wrap(self.kernel.characteristic())
+        output, command = self.kernel.transfer(given)
+        return (
+            TransferFunction(QuasiPolynomial._wrap(output), den),
+            TransferFunction(QuasiPolynomial._wrap(command), den),
+        )
 
     def refuse_hold(self, why: str) -> None:
         """Raise where the loop is sampled."""

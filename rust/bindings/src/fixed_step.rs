@@ -1,13 +1,16 @@
 //! Bindings of `deadtime::dde::fixed_step`.
 
-use deadtime::dde::fixed_step::{Path, Settings, Solver};
-use numpy::PyArray1;
+use deadtime::dde::Reference;
+use deadtime::dde::fixed_step::{Driven, Path, Settings, Solver};
+use numpy::{PyArray1, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arrays::{converted, owned};
+
 /// What surrounds the two, and how the run is made.
 #[derive(FromPyObject)]
-pub(crate) struct FixedStepSettings {
+pub(crate) struct FixedStepSettings<'py> {
     delay: f64,
     delay_path: String,
     /// The least and the greatest command.
@@ -17,7 +20,12 @@ pub(crate) struct FixedStepSettings {
     step: f64,
     steps: usize,
     pub(crate) initial_output: f64,
+    /// Load, disturbance of the output and noise: times and the values that hold from them on.
+    inputs: Vec<Jumps<'py>>,
 }
+
+/// Times and values.
+type Jumps<'py> = (PyReadonlyArrayDyn<'py, f64>, PyReadonlyArrayDyn<'py, f64>);
 
 /// Output and command of a loop at every step.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
@@ -26,7 +34,21 @@ pub(crate) struct FixedStepResponse {
     pub(crate) inputs: Py<PyArray1<f64>>,
 }
 
-impl FixedStepSettings {
+impl FixedStepSettings<'_> {
+    /// Everything that drives the loop, with this reference.
+    pub(crate) fn driven(&self, reference: Reference) -> PyResult<Driven> {
+        let input = |place: usize| match self.inputs.get(place) {
+            Some((times, values)) => converted(Reference::new(0.0, owned(times)?, owned(values)?)),
+            None => converted(Reference::new(0.0, Vec::new(), Vec::new())),
+        };
+        Ok(Driven {
+            reference,
+            load: input(0)?,
+            output: input(1)?,
+            noise: input(2)?,
+        })
+    }
+
     pub(crate) fn read(&self) -> PyResult<Settings> {
         let solver = Solver::named(&self.solver).ok_or_else(|| {
             let names: Vec<&str> = Solver::NAMED.iter().map(|(name, _)| *name).collect();

@@ -30,7 +30,7 @@ impl DeviationQuestion {
     }
 }
 
-fn drive(name: &str) -> PyResult<Drive> {
+pub(crate) fn drive(name: &str) -> PyResult<Drive> {
     Drive::named(name)
         .ok_or_else(|| PyValueError::new_err(format!("{name:?}: there is no such input")))
 }

@@ -22,6 +22,7 @@ use pyo3::prelude::*;
 use crate::arrays::{column, converted, in_order, owned};
 use crate::dde::{LoopRun, PyLinearLoop};
 use crate::fixed_step::{FixedStepResponse, FixedStepSettings};
+use crate::inputs::drive;
 use crate::quasipoly::QuasiPolynomial;
 use crate::runtime::{run, run_attached, run_here};
 use crate::stability::{
@@ -345,15 +346,20 @@ impl PyLoop {
         converted(self.inner.characteristic()).map(|core| QuasiPolynomial { core })
     }
 
-    /// Numerator and denominator of a transfer function: of the loop gain (`open`), from the reference to
-    /// the output (`output`) or to the command (`command`).
+    /// Numerator and denominator of the loop gain.
+    fn gain(&self) -> PyResult<(QuasiPolynomial, QuasiPolynomial)> {
+        let (num, den) = converted(self.inner.loop_gain())?;
+        Ok((QuasiPolynomial { core: num }, QuasiPolynomial { core: den }))
+    }
+
+    /// Numerators of the transfer functions from an input (`reference`, `load`, `output` or `noise`) to
+    /// output and command, over the characteristic function.
     fn transfer(&self, of: &str) -> PyResult<(QuasiPolynomial, QuasiPolynomial)> {
-        let found = converted(match of {
-            "open" => self.inner.loop_gain(),
-            "output" => self.inner.to_output(),
-            _ => self.inner.to_command(),
-        });
-        found.map(|(num, den)| (QuasiPolynomial { core: num }, QuasiPolynomial { core: den }))
+        let [output, command] = converted(self.inner.from_input(drive(of)?))?;
+        Ok((
+            QuasiPolynomial { core: output },
+            QuasiPolynomial { core: command },
+        ))
     }
 
     /// The terms of the characteristic function with these numbers free: coefficient, powers of the
@@ -509,7 +515,7 @@ impl PyLoop {
         &self,
         py: Python<'_>,
         run: LoopRun<'_>,
-        settings: FixedStepSettings,
+        settings: FixedStepSettings<'_>,
     ) -> PyResult<FixedStepResponse> {
         let blocks = converted(self.inner.blocks())?;
         let rest = Rest {
@@ -517,10 +523,10 @@ impl PyLoop {
             output: settings.initial_output,
             command: run.command,
         };
-        let reference = run.reference()?;
+        let driven = settings.driven(run.reference()?)?;
         let settings = settings.read()?;
         let (outputs, inputs) = run_here(py, |task| {
-            fixed_step::run(&blocks, &settings, &rest, &reference, task)
+            fixed_step::run(&blocks, &settings, &rest, &driven, task)
         })?;
         Ok(FixedStepResponse {
             outputs: outputs.into_pyarray(py).unbind(),

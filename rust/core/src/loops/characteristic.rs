@@ -9,6 +9,7 @@ use crate::stability::{Affine, Family, Term};
 
 use super::control_loop::{ControlLoop, Place, Values};
 use super::controller::Paths;
+use super::drive::Drive;
 use super::entry::Entry;
 use super::plant::Plant;
 use super::polynomial::product;
@@ -140,26 +141,25 @@ impl ControlLoop {
         open.add(&fed)
     }
 
-    /// From the reference to the output: b r over the characteristic function, delayed where the
-    /// delay is between command and plant.
+    /// From an input besides the reference to output and command, over the characteristic function:
+    /// b g and −b f of a load, a g and −a f of the output, −b f e^(−s T) and −a f of noise; what passes
+    /// the delay is delayed.
     ///
     /// # Errors
     /// As [`loop_gain`](Self::loop_gain).
-    pub fn to_output(&self) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
-        let [b, _] = self.ratio(self.values())?;
-        let r = self.controller().paths(&self.values().controller).r;
-        let late = self.values().delay - self.output_lead();
-        Ok((times(&b, &r, late)?, self.characteristic()?))
-    }
-
-    /// From the reference to the command: a r over the characteristic function.
-    ///
-    /// # Errors
-    /// As [`loop_gain`](Self::loop_gain).
-    pub fn to_command(&self) -> Result<(QuasiPolynomial, QuasiPolynomial), Error> {
-        let [_, a] = self.ratio(self.values())?;
-        let r = self.controller().paths(&self.values().controller).r;
-        Ok((times(&a, &r, 0.0)?, self.characteristic()?))
+    pub fn from_input(&self, of: Drive) -> Result<[QuasiPolynomial; 2], Error> {
+        let [b, a] = self.ratio(self.values())?;
+        let Paths { f, g, r } = self.controller().paths(&self.values().controller);
+        let back: Vec<f64> = f.iter().map(|c| -c).collect();
+        let lead = self.output_lead();
+        let late = self.values().delay - lead;
+        let (to_output, to_command) = match of {
+            Drive::Reference => (times(&b, &r, late)?, times(&a, &r, 0.0)?),
+            Drive::Load => (times(&b, &g, 0.0)?, times(&b, &back, lead)?),
+            Drive::Output => (times(&a, &g, 0.0)?, times(&a, &back, lead)?),
+            Drive::Noise => (times(&b, &back, late)?, times(&a, &back, 0.0)?),
+        };
+        Ok([to_output, to_command])
     }
 }
 

@@ -8,47 +8,10 @@ use crate::dde::{Equations, LinearLoop, Scalar, Update};
 
 use super::control_loop::{ControlLoop, Values};
 use super::controller::ControllerEquations;
+use super::drive::{Column, Columns};
 use super::entry::Number;
 use super::filter::{Sampled, SampledFilter};
-use super::inputs::Drive;
 use super::plant::StateSpace;
-
-/// How an input acts.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Column {
-    /// On x′.
-    pub(super) states: Vec<f64>,
-    /// On u.
-    pub(super) command: f64,
-    /// On y.
-    pub(super) output: f64,
-    /// On what the controller sees of y.
-    pub(super) seen: f64,
-    /// Weight of the impulse in u where it jumps.
-    pub(super) impulse: f64,
-}
-
-/// How the inputs of a loop act.
-#[derive(Debug, Clone)]
-pub(super) struct Columns {
-    reference: Column,
-    load: Column,
-    seen: Column,
-}
-
-impl Columns {
-    pub(super) fn of(&self, drive: Drive) -> Column {
-        match drive {
-            Drive::Reference => self.reference.clone(),
-            Drive::Load => self.load.clone(),
-            Drive::Noise => self.seen.clone(),
-            Drive::Output => Column {
-                output: 1.0,
-                ..self.seen.clone()
-            },
-        }
-    }
-}
 
 /// What moves the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

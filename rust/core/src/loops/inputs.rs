@@ -10,39 +10,9 @@ use crate::Error;
 use crate::dde::{Equations, LinearLoop, Update};
 
 use super::control_loop::{ControlLoop, Values};
-use super::equations::{Columns, Input};
+use super::drive::{Columns, Drive};
+use super::equations::Input;
 use super::filter::Sampled;
-
-/// An input besides the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Drive {
-    /// A further reference, which is not held between samples.
-    Reference,
-    /// Added to the command where it reaches the plant.
-    Load,
-    /// Added to the output.
-    Output,
-    /// Added to the output that the controller sees.
-    Noise,
-}
-
-impl Drive {
-    /// The input of a name: `reference`, `load`, `output` or `noise`.
-    pub fn named(name: &str) -> Option<Self> {
-        match name {
-            "reference" => Some(Self::Reference),
-            "load" => Some(Self::Load),
-            "output" => Some(Self::Output),
-            "noise" => Some(Self::Noise),
-            _ => None,
-        }
-    }
-
-    /// Is it delayed with the output where the delay is in the measurement?
-    pub fn is_at_plant(self) -> bool {
-        matches!(self, Self::Load | Self::Output)
-    }
-}
 
 impl ControlLoop {
     /// The loop for the kernels that take steps in time, with inputs and their degrees.

@@ -10,8 +10,8 @@ use crate::dde::{
 use crate::{Error, Task};
 
 use super::control_loop::ControlLoop;
+use super::drive::Drive;
 use super::equations::Input;
-use super::inputs::Drive;
 use super::polynomial::{product, sum};
 use super::rest::total_at_rest;
 use super::settled::slowest;

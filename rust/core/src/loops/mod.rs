@@ -4,8 +4,8 @@
 //!   polynomials in free numbers, `polynomial` those in s.
 //! * `plant`, `filter` and `controller` are the parts, `control_loop` joins them and names their
 //!   numbers.
-//! * `equations` closes the loop for the steppers of `dde`, `inputs` adds what drives it besides the
-//!   reference, `load` measures the response to that, `rest` is where a run starts,
+//! * `equations` closes the loop for the steppers of `dde`, `drive` has what drives it besides the
+//!   reference, `inputs` adds that, `load` measures the response to it, `rest` is where a run starts,
 //!   `settled` how slow its parts are, `slopes` has derivatives of a response, `sweep` many loops.
 //! * `characteristic` has the characteristic function, families of it and transfer functions, `held`
 //!   the rows of a map of a sampled loop, `plane` that map, and `range` the stable values of a number.
@@ -13,6 +13,7 @@
 mod characteristic;
 mod control_loop;
 mod controller;
+mod drive;
 mod each;
 mod entry;
 mod equations;
@@ -32,12 +33,12 @@ mod symbol;
 
 pub use control_loop::{ControlLoop, Path, Place, Values};
 pub use controller::{Controller, Extra, Extras, Kind};
+pub use drive::Drive;
 pub use each::Each;
 pub use entry::{Entry, Number};
 pub use equations::Input;
 pub use filter::{Rule, SampledFilter};
 pub use held::{HeldRows, Moving, Polynomials};
-pub use inputs::Drive;
 pub use load::{DeviationAsked, Figures};
 pub use plane::HeldPlane;
 pub use plant::{Factors, Fraction, Plant, StateSpace};

@@ -17,5 +17,5 @@ mod simulation;
 mod solver;
 mod tableau;
 
-pub use simulation::{Blocks, Path, Rest, Settings, run};
+pub use simulation::{Blocks, Driven, Path, Rest, Settings, run};
 pub use solver::Solver;

@@ -72,6 +72,19 @@ pub struct Settings {
     pub steps: usize,
 }
 
+/// What drives the loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Driven {
+    /// r.
+    pub reference: Reference,
+    /// Added to what the plant receives.
+    pub load: Reference,
+    /// Added to the output.
+    pub output: Reference,
+    /// Added to what the controller receives.
+    pub noise: Reference,
+}
+
 /// Initial values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rest {
@@ -88,7 +101,7 @@ pub fn run(
     blocks: &Blocks,
     settings: &Settings,
     rest: &Rest,
-    reference: &Reference,
+    driven: &Driven,
     task: &Task,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     check(blocks, settings, rest)?;
@@ -100,7 +113,7 @@ pub fn run(
     let mut simulation = Simulation {
         blocks,
         settings,
-        reference,
+        driven,
         late: Buffer::new(
             match settings.path {
                 Path::Command => rest.command,
@@ -165,7 +178,7 @@ struct Signals {
 struct Simulation<'a> {
     blocks: &'a Blocks,
     settings: &'a Settings,
-    reference: &'a Reference,
+    driven: &'a Driven,
     late: Buffer,
     /// The command of the latest sample.
     held: Option<f64>,
@@ -225,7 +238,10 @@ impl Simulation<'_> {
     fn signals(&self, x: &[f64], time: f64, since: f64) -> Signals {
         let blocks = self.blocks;
         let (plant, controller) = x.split_at(blocks.plant_input.len());
-        let r = self.reference.at((time + SLACK) * self.settings.step);
+        let now = (time + SLACK) * self.settings.step;
+        let at = |input: &Reference| input.at(now);
+        let (r, load) = (at(&self.driven.reference), at(&self.driven.load));
+        let (output, noise) = (at(&self.driven.output), at(&self.driven.noise));
         let inner = dot(&blocks.plant_output, plant);
         let late = if self.settings.delay > 0.0 {
             self.late
@@ -233,32 +249,24 @@ impl Simulation<'_> {
         } else {
             // There is no delay in between, and no feedthrough either (checked).
             match self.settings.path {
-                Path::Command => self.command(controller, inner, r, since),
-                Path::Measurement => inner,
+                Path::Command => self.command(controller, inner + output + noise, r, since),
+                Path::Measurement => inner + output,
             }
         };
         match self.settings.path {
             Path::Command => {
-                let y = inner + blocks.plant_direct * late;
-                let u = self.command(controller, y, r, since);
-                Signals {
-                    w: late,
-                    y,
-                    v: y,
-                    u,
-                    r,
-                }
+                let w = late + load;
+                let y = inner + blocks.plant_direct * w + output;
+                let v = y + noise;
+                let u = self.command(controller, v, r, since);
+                Signals { w, y, v, u, r }
             }
             Path::Measurement => {
-                let u = self.command(controller, late, r, since);
-                let y = inner + blocks.plant_direct * u;
-                Signals {
-                    w: u,
-                    y,
-                    v: late,
-                    u,
-                    r,
-                }
+                let v = late + noise;
+                let u = self.command(controller, v, r, since);
+                let w = u + load;
+                let y = inner + blocks.plant_direct * w + output;
+                Signals { w, y, v, u, r }
             }
         }
     }

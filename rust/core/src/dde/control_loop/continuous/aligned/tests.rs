@@ -57,7 +57,7 @@ proptest! {
             l: if is_direct { 0.4 * numbers[21] } else { 0.0 },
             m: numbers[22],
             d: if is_direct { numbers[23] } else { 0.0 },
-            impulse: 0.0,
+            ..Equations::default()
         };
         let plant = LinearLoop::new(equations, DELAY, None, None).unwrap();
         let start = Start { state: at(24, n), command: numbers[27], ..Start::default() };
