@@ -12,8 +12,8 @@ from deadtime._base.plain import plain_fields
 from deadtime.loops import PD, PI, PID, PV, Controller, DerivativeFilter, P
 
 #: How much faster than the first pole of a derivative's filter its second one is, at least, for
-#: the filter to count as one of one pole with the delay of both. Larger: filters that a firmware can
-#: run are refused; smaller: more of the phase at high frequencies is neglected.
+#: the filter to count as one of one pole with the delay of both. Larger: filters that a firmware
+#: can run are refused; smaller: more of the phase at high frequencies is neglected.
 FASTER = 10.0
 
 #: The same of a filter that is made for one pole. Larger: a pole that makes simulations stiff;
