@@ -18,6 +18,9 @@ const DOWN: f64 = 0.85;
 const STEPS_DOWN: usize = 60;
 const HALVINGS: usize = 30;
 
+/// Steps down that come no nearer to the demands after which a ray is given up.
+const IDLE: usize = 4;
+
 /// Relative accuracy of gains that meet other demands, and of these.
 const KNOWN: f64 = 1e-8;
 
@@ -138,8 +141,15 @@ impl<'a> Search<'a> {
     /// Jarratt 1971, BIT 11).
     pub(super) fn down(&self, ray: &Ray, (from, end): Gap) -> Result<Option<f64>, Error> {
         let (mut good, mut bad) = (end, None);
+        let (mut least, mut idle) = (f64::INFINITY, 0);
         for _ in 0..STEPS_DOWN {
+            self.task.check()?;
             let short = self.missed(&ray.at(good))?;
+            idle = if short < least { 0 } else { idle + 1 };
+            least = least.min(short);
+            if idle == IDLE {
+                return Ok(None);
+            }
             if short > 0.0 {
                 bad = Some((good, short));
                 good *= DOWN;
