@@ -50,11 +50,11 @@ def test_the_default_is_the_best_load_response():
     assert best.objective == "load"
     assert best.value == pytest.approx(best.loop.load_response().iae, rel=1e-5)
     assert best.loop.margin().max_sensitivity == pytest.approx(1.6, rel=CLOSE)
-    # No gains along the boundary are better by more than 5 %.
+    # No gains along the boundary are better by more than a tenth.
     for Kp in np.linspace(0.6, 1.3, 15):
         Ki = brentq(lambda Ki, Kp=Kp: least_distance({"Kp": Kp, "Ki": Ki}) - 1.0 / 1.6, 1e-4, 1.0)
         other = PROCESS.replace(Kp=Kp, Ki=Ki).load_response().iae
-        assert other >= best.value / 1.05 * (1.0 - 1e-4)
+        assert other >= best.value / 1.1 * (1.0 - 1e-4)
 
 
 @pytest.mark.parametrize("controller", [dtm.P, dtm.PV, SMOOTH])

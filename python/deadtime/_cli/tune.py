@@ -211,7 +211,7 @@ def _next(found: Proposal, path: Path) -> str:
     if found.settings is None:
         return ""
     if found.settings.loop:
-        words = ["deadtime", "tune", "NEXT.bin", "--loop", found.settings.loop]
+        words = ["deadtime", "tune", f"next{path.suffix}", "--loop", found.settings.loop]
     else:
         words = ["deadtime", "tune", f"next{path.suffix}", "--form", found.settings.form]
         for name, gain in found.controller.gains.items():

@@ -86,7 +86,7 @@ def design(
         points if not given.
     load_slack : float, optional
         Part of the best response to a load that may be lost where a step of the reference settles
-        earlier for it, with PI and PID control and ``"load"``; 0.05 if not given, and 0 with any
+        earlier for it, with PI and PID control and ``"load"``; 0.1 if not given, and 0 with any
         demand. The weight of the reference is chosen for that too, unless `controller` gives one.
     plants : sequence of ControlLoop or plants, optional
         Further ones that the same gains must hold for, with their own delays.

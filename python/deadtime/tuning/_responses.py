@@ -43,7 +43,7 @@ _WEIGHTS = np.linspace(0.0, 1.0, 21)
 #: Part of the best response to a load that is given for a step that settles earlier, where no
 #: demand is made: the response is flat along the ratios of the gains, where the settling time is
 #: not.
-SLACK = 0.05
+SLACK = 0.1
 
 #: Relative loss that counts as none.
 _NOTHING = 1e-3

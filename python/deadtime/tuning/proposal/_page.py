@@ -9,12 +9,16 @@ from deadtime._base.explorer import Explorer
 from deadtime._base.page import page
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import ControlLoop, explorer_of
+from deadtime.tuning._rules import RuleFigures, RuleTable
 from deadtime.tuning.forms import Settings
 
 CAPTION = (
     "Predicted under the gains above. The band holds all plants that the recording leaves "
     "possible, and twice the noise that the plant leaves unexplained on either side."
 )
+
+#: Heads of the table of rules.
+HEADS = ("rule", "gains", "Ms", "load IAE", "settling, s", "overshoot, %")
 
 
 def render(
@@ -24,6 +28,7 @@ def render(
     expected: Sequence[str],
     figure: Figure,
     loop: ControlLoop,
+    rules: RuleTable,
 ) -> str:
     """The page as text."""
     rounding = 100.0 * settings.rounding
@@ -38,8 +43,16 @@ def render(
         expected=expected,
         figure=figure,
         caption=CAPTION,
+        heads=HEADS,
+        rules=[_row(row) for row in rules if row.gains],
         explorer=_explored(fit, loop),
     )
+
+
+def _row(row: RuleFigures) -> tuple[str, ...]:
+    """One rule, its gains and figures."""
+    gains = ", ".join(f"{name} = {gain:.4g}" for name, gain in row.gains.items())
+    return (row.rule, gains, *(f"{one:.4g}" for one in row[2:]))
 
 
 def _explored(fit: PlantEstimate, loop: ControlLoop) -> Explorer | None:

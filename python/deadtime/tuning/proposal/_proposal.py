@@ -22,7 +22,7 @@ from deadtime._base.verdicts import Verdict
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 from deadtime.tuning._result import Design, LeastMargins
-from deadtime.tuning._rules import RuleTable
+from deadtime.tuning._rules import RuleTable, compared
 from deadtime.tuning.forms import Settings
 from deadtime.tuning.proposal._page import render
 from deadtime.tuning.proposal._prediction import Prediction, banded
@@ -316,7 +316,8 @@ class Proposal(ReadOnlyArrays, Pictured):
         """
         settings, expected = self._made(), [*self.expected(), *self.remarks]
         figure = self.figure()
-        text = render(self.headline(), self.fit, settings, expected, figure, self.loop)
+        rules = compared(self.loop, "proposal") if self.rules is None else self.rules
+        text = render(self.headline(), self.fit, settings, expected, figure, self.loop, rules)
         return write_page(text, Path(path))
 
     def _picture(self) -> Figure | None:

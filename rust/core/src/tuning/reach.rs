@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::demands::is_stable_loop;
+use super::demands::{is_stable_loop, sensitivity_of};
 use super::open::{Gap, Open, Scale, gaps};
 use super::posed::{Posed, Ray, lasting};
 use super::responses::figures;
@@ -18,12 +18,21 @@ const DOWN: f64 = 0.85;
 const STEPS_DOWN: usize = 60;
 const HALVINGS: usize = 30;
 
+/// Steps down that come no nearer to the demands after which a ray is given up.
+const IDLE: usize = 4;
+
 /// Relative accuracy of gains that meet other demands, and of these.
 const KNOWN: f64 = 1e-8;
 
 /// Difference of two growths of an argument, rad, below which both loops are stable or neither is:
 /// between the quarter turn and the half turn that there are.
 const SAME_GROWTH: f64 = 0.75 * std::f64::consts::PI;
+
+/// Begin of a gap as a part of its end from which on it is narrow, and the relative excess of Ms at its
+/// end that is put down to the frequencies between those that are seen: they lie so close that it is a
+/// tenth of that.
+const NARROW: f64 = 0.9;
+const NEARLY: f64 = 1e-2;
 
 /// By how much the search aims below the demand on Ms, relatively.
 const AIMED: f64 = 1e-7;
@@ -111,7 +120,7 @@ impl<'a> Search<'a> {
             } else {
                 end
             };
-            if !self.is_stable(&ray.at(end))? {
+            if !self.is_stable(&ray.at(end))? || !self.is_real(&ray.at(end), from / end)? {
                 continue;
             }
             refuse_if!(
@@ -122,6 +131,20 @@ impl<'a> Search<'a> {
             return Ok(Some((ray, (from, end))));
         }
         Ok(None)
+    }
+
+    /// Is a gap that begins at this part of its end more than what lies between two frequencies that are
+    /// seen? Of a narrow one the exact Ms decides.
+    fn is_real(&self, gains: &[f64], begin: f64) -> Result<bool, Error> {
+        let (Some((place, _)), true) = (self.seen.first(), begin > NARROW) else {
+            return Ok(true);
+        };
+        let found = match sensitivity_of(&self.posed.at(*place, gains), self.task) {
+            Err(error) if error.ends_all() => return Err(error),
+            found => found.ok().flatten(),
+        };
+        let most = self.posed.demands.max_sensitivity;
+        Ok(found.is_some_and(|peak| peak.value <= most * (1.0 + NEARLY)))
     }
 
     /// By how much gains miss the other demands in the worst of the loops that are seen.
@@ -138,8 +161,15 @@ impl<'a> Search<'a> {
     /// Jarratt 1971, BIT 11).
     pub(super) fn down(&self, ray: &Ray, (from, end): Gap) -> Result<Option<f64>, Error> {
         let (mut good, mut bad) = (end, None);
+        let (mut least, mut idle) = (f64::INFINITY, 0);
         for _ in 0..STEPS_DOWN {
+            self.task.check()?;
             let short = self.missed(&ray.at(good))?;
+            idle = if short < least { 0 } else { idle + 1 };
+            least = least.min(short);
+            if idle == IDLE {
+                return Ok(None);
+            }
             if short > 0.0 {
                 bad = Some((good, short));
                 good *= DOWN;
