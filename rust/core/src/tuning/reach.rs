@@ -115,10 +115,10 @@ impl<'a> Search<'a> {
             }
             // Beyond the frequencies that are seen nothing is excluded.
             let is_open = end == f64::INFINITY;
-            let end = if is_open {
-                2.0 * from.max(f64::MIN_POSITIVE)
-            } else {
-                end
+            let end = match is_open {
+                true if from > 0.0 => 2.0 * from,
+                true => 1.0,
+                false => end,
             };
             if !self.is_stable(&ray.at(end))? || !self.is_real(&ray.at(end), from / end)? {
                 continue;
