@@ -147,10 +147,13 @@ def test_a_loop_drawn_by_lot_agrees_with_another_simulator(place):
 
 
 @pytest.mark.survey
-def test_every_combination_agrees_with_another_simulator():
-    assert len(CASES) > 1000
-    for case in CASES:
+@pytest.mark.parametrize("kind", CONTROLLERS)
+@pytest.mark.parametrize("plant", PLANTS)
+def test_every_combination_agrees_with_another_simulator(plant, kind):
+    cases = [case for case in CASES if case[:2] == (plant, kind)]
+    for case in cases:
         compare(case)
+    assert cases or (plant, kind) == ("lead", "PV ideal")
 
 
 def wound(guard, sample_time=None, limit=(-0.2, 0.2)):
@@ -287,3 +290,16 @@ def test_what_has_no_meaning_is_refused_with_the_reason():
         wound(ConditionalIntegration()).simulate(TIMES, sensitivities=("Kp",))
     with pytest.raises(ValueError, match="computation_time"):
         dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), computation_time=0.1)
+
+
+def test_a_sweep_over_guarded_loops_is_that_of_each():
+    loop = wound(2.0, sample_time=0.05, limit=(-0.1, 0.3)).replace(rate_limit=0.5)
+    values = {"Kp": np.array([0.6, 1.0]), "rate_limit": np.array([0.2, 0.5])}
+    outputs = dtm.sweep(loop, values, TIMES, responses=True).outputs
+    measured = dtm.sweep(loop, values)
+    for i in range(2):
+        one = loop.replace(**{name: float(array[i]) for name, array in values.items()})
+        np.testing.assert_allclose(outputs[i], one.simulate(TIMES).outputs, atol=1e-13)
+        info = one.step_response(np.linspace(0.0, 60.0, 6001)).info()
+        assert measured["overshoot"][i] == pytest.approx(info["overshoot"], abs=1e-3)
+        assert measured["settling_time"][i] == pytest.approx(info["settling_time"], abs=1e-3)

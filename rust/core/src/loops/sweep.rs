@@ -223,19 +223,23 @@ impl<'a> SweptLoops<'a> {
         let mut outputs = memory::filled(SWEEP, f64::NAN, self.count.saturating_mul(width))?;
         let mut outcomes = memory::filled(SWEEP, Outcome::Refused, self.count)?;
         if self.is_guarded() {
-            for set in 0..self.count {
-                task.check()?;
-                if let Some(one) = self.alone(set) {
-                    let (found, outcome) = one.response(times, task)?;
-                    if let Some(row) = outputs.get_mut(set * width..(set + 1) * width)
-                        && found.len() == width
-                    {
-                        row.copy_from_slice(&found);
+            let rows = outputs.chunks_mut(width.max(1)).zip(&mut outcomes);
+            parallel::each(
+                SWEEP,
+                rows,
+                |set, (row, place): (&mut [f64], &mut Outcome)| {
+                    task.check()?;
+                    if let Some(one) = self.alone(set) {
+                        let (found, outcome) = one.response(times, task)?;
+                        if found.len() == width {
+                            row.copy_from_slice(&found);
+                        }
+                        *place = outcome;
                     }
-                    outcomes[set] = outcome;
-                }
-                task.advance(1);
-            }
+                    task.advance(1);
+                    Ok(())
+                },
+            )?;
             return Ok((outputs, outcomes));
         }
         self.blocks(|places, sets| {
