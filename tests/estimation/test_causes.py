@@ -205,12 +205,13 @@ def test_flights_that_differ_widen_the_interval_of_the_vehicle() -> None:
     known = {"controller": [dtm.P(1.3)] * 2, "limit": 1.0, "causes": False}
     alike = dtm.estimate_delay(flights(1.0, 1.0), **known)
     differ = dtm.estimate_delay(flights(1.03, 0.97), **known)
-    widths = []
-    for fit in (alike, differ):
-        low, high = fit.at(2.0).gain_ci[:, 0]
-        assert low < GAIN / 2.0 / math.hypot(1.0, 2.0 * LAG) < high
-        widths.append(high - low)
-    assert widths[1] > 3.0 * widths[0]
+    gain = GAIN / 2.0 / math.hypot(1.0, 2.0 * LAG)
+    low, high = alike.at(2.0).gain_ci[:, 0]
+    assert low < gain < high
+    assert high - low < 0.08 * gain
+    low, high = differ.at(2.0).gain_ci[:, 0]
+    assert low < 0.97 * gain
+    assert high > 1.03 * gain
 
 
 def test_equal_readings_of_a_coarse_sensor_are_readings() -> None:

@@ -444,6 +444,12 @@ fn answer(
             candidates.push(one.clone());
         }
     }
+    // What the error of a class explains counts for it.
+    for one in &mut candidates {
+        let own = minima.iter().find(|own| own.class == one.class);
+        one.bic = own.map_or(one.bic, |own| own.bic.min(one.bic));
+    }
+    candidates.sort_by(|a, b| a.bic.total_cmp(&b.bic));
     let likely = chosen(&all, as_likely(found));
     let evidence = Findings {
         response: silent - found.first().map_or(f64::INFINITY, |best| best.bic),

@@ -225,10 +225,7 @@ pub(crate) fn with_causes(
     let mut tried: Vec<(Suspect, Rows, f64)> = Vec::new();
     for mut suspect in suspects(plan.rows, found, task)? {
         let (rows, size) = with_suspect(&mut suspect, plan.rows, task)?;
-        let model = beside(&suspect, &rows);
-        let start = model.at(suspect.x.clone());
-        let fitted = Minimum::new(model, minimum(&model, start, f64::INFINITY, task)?);
-        if fitted.bic < linear + CAUSES.hopeful {
+        if is_hopeful(&suspect, &rows, best, linear, task)? {
             tried.push((suspect, rows, size));
         }
     }
@@ -302,6 +299,30 @@ pub(crate) fn with_causes(
     out.causes.extend(shaken.map(|(cause, _)| cause));
     out.rehull(task)?;
     Ok(out)
+}
+
+/// May a plant with this suspect be as likely as those without it, under its own noise or that of the best one?
+fn is_hopeful(
+    suspect: &Suspect,
+    rows: &Rows,
+    best: &Minimum<'_>,
+    linear: f64,
+    task: &Task,
+) -> Result<bool, Error> {
+    let own = beside(suspect, rows);
+    let mut coloured = suspect.x[..own.plant_numbers()].to_vec();
+    coloured.extend_from_slice(&best.point.x[best.model.plant_numbers()..]);
+    let other = Model {
+        noise: best.model.noise,
+        ..own
+    };
+    for (model, x) in [(own, suspect.x.clone()), (other, coloured)] {
+        let point = minimum(&model, model.at(x), f64::INFINITY, task)?;
+        if Minimum::new(model, point).bic < linear + CAUSES.hopeful {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Does the last cause move gain or phase at crossover by a part of their intervals? One that does not is in the

@@ -56,7 +56,8 @@ pub(crate) fn with_smoothing(
         all.fold(f64::INFINITY, |least, one| least.min(one.bic))
     };
     let (without, with) = (least(&own), least(&family));
-    let is_smoothed = with < without - CAUSES.adopted;
+    let best = found.first().map_or(without, |best| best.bic);
+    let is_smoothed = with < without - CAUSES.adopted.max(CAUSES.beyond * (best - without));
     let (mut out, other) = if is_smoothed {
         let out = with_causes(family, &behind, &fit, answer, task)?;
         (out, own)
