@@ -31,8 +31,8 @@ const SAME_GROWTH: f64 = 0.75 * std::f64::consts::PI;
 /// Begin of a gap as a part of its end from which on it is narrow, and the relative excess of Ms at its
 /// end that is put down to the frequencies between those that are seen: they lie so close that it is a
 /// tenth of that.
-const NARROW: f64 = 0.9;
-const NEARLY: f64 = 1e-2;
+const NARROW: f64 = 0.7;
+const NEARLY: f64 = 1e-3;
 
 /// By how much the search aims below the demand on Ms, relatively.
 const AIMED: f64 = 1e-7;
