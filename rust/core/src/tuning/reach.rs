@@ -33,6 +33,9 @@ const SAME_GROWTH: f64 = 0.75 * std::f64::consts::PI;
 const NARROW: f64 = 0.8;
 const PARTS: u32 = 6;
 
+/// Factor on Ms that is put down to the frequencies between those that are seen.
+const NEARLY: f64 = 1.01;
+
 /// By how much the search aims below the demand on Ms, relatively.
 const AIMED: f64 = 1e-7;
 
@@ -119,12 +122,12 @@ impl<'a> Search<'a> {
                 true => 1.0,
                 false => end,
             };
-            if !self.is_stable(&ray.at(end))? {
-                continue;
-            }
             let Some(end) = self.exactly(&ray, (from, end))? else {
                 continue;
             };
+            if !self.is_stable(&ray.at(end))? {
+                continue;
+            }
             refuse_if!(
                 is_open,
                 "nothing limits the gains of this loop: Ms stays below {most} for all of them; give \
@@ -138,10 +141,20 @@ impl<'a> Search<'a> {
     /// The largest k of a gap, by the exact Ms where it is so narrow that it may be no more than what lies
     /// between two frequencies that are seen.
     fn exactly(&self, ray: &Ray, (from, end): Gap) -> Result<Option<f64>, Error> {
+        let most = self.posed.demands.max_sensitivity;
+        if from <= 0.0 {
+            // Small gains of two integrators have their peak below all frequencies that are seen.
+            let of = self.posed.at(0, &ray.at(end));
+            let found = match sensitivity_of(&of, self.task) {
+                Err(error) if error.ends_all() => return Err(error),
+                found => found.ok().flatten(),
+            };
+            let is_near = found.is_some_and(|peak| peak.value <= most * NEARLY);
+            return Ok(is_near.then_some(end));
+        }
         if from <= NARROW * end {
             return Ok(Some(end));
         }
-        let most = self.posed.demands.max_sensitivity;
         let holds = |k: f64| -> Result<bool, Error> {
             for (place, _) in &self.seen {
                 let of = self.posed.at(*place, &ray.at(k));
