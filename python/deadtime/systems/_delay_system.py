@@ -255,7 +255,7 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         --------
         >>> import deadtime as dtm
         >>> round(dtm.DelaySystem({0.36: -2.0}, {0.36: 2.0}).hinf_norm(), 4)
-        1.3306
+        1.3002
         """
         return self.transfer_function(output, input).hinf_norm()
 

@@ -73,7 +73,7 @@ class Margins(ReadOnlyArrays):
     >>> bool(abs(found.delay_margin - (3.141592653589793 / 4 - 0.36)) < 1e-15)
     True
     >>> round(found.max_sensitivity, 3), round(found.max_sensitivity_omega, 3)
-    (2.041, 3.279)
+    (2.048, 3.508)
     """
 
     stable: bool

@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from deadtime._base.arrays import Array
+from deadtime._base.frozen import PickledByFields
 from deadtime._base.validation import Range, finite, interval, non_negative
 from deadtime.estimation import DelayEstimate
 from deadtime.loops import PD, PID, PV, Controller, ControlLoop, DerivativeFilter
@@ -36,7 +37,7 @@ _MOST_FREE = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(PickledByFields):
     """A loop whose controller is a template: its free gains are replaced throughout.
 
     Attributes

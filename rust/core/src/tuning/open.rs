@@ -16,12 +16,12 @@ use crate::{Error, Task};
 
 /// Frequencies for each decade, and the decades below and above the phase crossover of the plant: more
 /// need fewer corrections by exact margins, and take time in proportion.
-const PER_DECADE: f64 = 36.0;
+const PER_DECADE: f64 = 120.0;
 const BELOW: f64 = 1e-3;
 const ABOVE: f64 = 30.0;
 
 /// Distance of two frequencies at most in turns of the delay, in rad, and up to how many.
-const TURN: f64 = 0.5;
+const TURN: f64 = 0.2;
 const TURNS: f64 = 60.0;
 
 /// Where the phase crossover of a plant is sought: from this part of one over its slowest time on, in

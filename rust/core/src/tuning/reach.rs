@@ -28,11 +28,13 @@ const KNOWN: f64 = 1e-8;
 /// between the quarter turn and the half turn that there are.
 const SAME_GROWTH: f64 = 0.75 * std::f64::consts::PI;
 
-/// Begin of a gap as a part of its end from which on it is narrow, and the relative excess of Ms at its
-/// end that is put down to the frequencies between those that are seen: they lie so close that it is a
-/// tenth of that.
-const NARROW: f64 = 0.9;
-const NEARLY: f64 = 1e-2;
+/// Begin of a gap as a part of its end from which on it is narrow, and the parts of a narrow one in which
+/// gains are tried: more of both find narrower stretches and take longer.
+const NARROW: f64 = 0.8;
+const PARTS: u32 = 6;
+
+/// Factor on Ms that is put down to the frequencies between those that are seen.
+const NEARLY: f64 = 1.01;
 
 /// By how much the search aims below the demand on Ms, relatively.
 const AIMED: f64 = 1e-7;
@@ -120,7 +122,10 @@ impl<'a> Search<'a> {
                 true => 1.0,
                 false => end,
             };
-            if !self.is_stable(&ray.at(end))? || !self.is_real(&ray.at(end), from / end)? {
+            let Some(end) = self.exactly(&ray, (from, end))? else {
+                continue;
+            };
+            if !self.is_stable(&ray.at(end))? {
                 continue;
             }
             refuse_if!(
@@ -133,18 +138,56 @@ impl<'a> Search<'a> {
         Ok(None)
     }
 
-    /// Is a gap that begins at this part of its end more than what lies between two frequencies that are
-    /// seen? Of a narrow one the exact Ms decides.
-    fn is_real(&self, gains: &[f64], begin: f64) -> Result<bool, Error> {
-        let (Some((place, _)), true) = (self.seen.first(), begin > NARROW) else {
-            return Ok(true);
-        };
-        let found = match sensitivity_of(&self.posed.at(*place, gains), self.task) {
-            Err(error) if error.ends_all() => return Err(error),
-            found => found.ok().flatten(),
-        };
+    /// The largest k of a gap, by the exact Ms where it is so narrow that it may be no more than what lies
+    /// between two frequencies that are seen.
+    fn exactly(&self, ray: &Ray, (from, end): Gap) -> Result<Option<f64>, Error> {
         let most = self.posed.demands.max_sensitivity;
-        Ok(found.is_some_and(|peak| peak.value <= most * (1.0 + NEARLY)))
+        if from <= 0.0 {
+            // Small gains of two integrators have their peak below all frequencies that are seen.
+            let of = self.posed.at(0, &ray.at(end));
+            let found = match sensitivity_of(&of, self.task) {
+                Err(error) if error.ends_all() => return Err(error),
+                found => found.ok().flatten(),
+            };
+            let is_near = found.is_some_and(|peak| peak.value <= most * NEARLY);
+            return Ok(is_near.then_some(end));
+        }
+        if from <= NARROW * end {
+            return Ok(Some(end));
+        }
+        let holds = |k: f64| -> Result<bool, Error> {
+            for (place, _) in &self.seen {
+                let of = self.posed.at(*place, &ray.at(k));
+                let found = match sensitivity_of(&of, self.task) {
+                    Err(error) if error.ends_all() => return Err(error),
+                    found => found.ok().flatten(),
+                };
+                if !found.is_some_and(|peak| peak.value <= most) {
+                    return Ok(false);
+                }
+            }
+            Ok(true)
+        };
+        if holds(end)? {
+            return Ok(Some(end));
+        }
+        for part in 1..PARTS {
+            let mut good = end - (end - from) * f64::from(part) / f64::from(PARTS);
+            if !holds(good)? {
+                continue;
+            }
+            let mut bad = end;
+            while bad - good > KNOWN * good {
+                let middle = 0.5 * (good + bad);
+                if holds(middle)? {
+                    good = middle;
+                } else {
+                    bad = middle;
+                }
+            }
+            return Ok(Some(good));
+        }
+        Ok(None)
     }
 
     /// By how much gains miss the other demands in the worst of the loops that are seen.
