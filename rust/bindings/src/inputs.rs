@@ -1,6 +1,6 @@
 //! Bindings of `deadtime::loops`: inputs besides the reference, and figures of the responses to them.
 
-use deadtime::loops::{ControlLoop, DeviationAsked, Drive, Figures};
+use deadtime::loops::{ControlLoop, DeviationAsked, Drive, Figures, MOST_DELAYS};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -26,6 +26,7 @@ impl DeviationQuestion {
             size: self.size,
             band: self.band,
             span: self.span,
+            most_delays: MOST_DELAYS,
         })
     }
 }

@@ -37,7 +37,7 @@ const FIRST_KNOWN: (f64, f64) = (4.0, 2.0);
 const LONGEST: f64 = 2048.0;
 
 /// No run of a continuous loop is longer than so many delays: the steppers refuse twice as many.
-const MOST_DELAYS: f64 = 1e7;
+pub const MOST_DELAYS: f64 = 1e7;
 
 /// Growth of the peak over a doubling of the time that no loop with a rest shows so many times: less
 /// gives up slow loops, more takes unstable loops longer.
@@ -55,6 +55,8 @@ pub struct DeviationAsked {
     pub band: f64,
     /// End of the run, s; none where it goes on until the output rests.
     pub span: Option<f64>,
+    /// Delays after which a run without a given end is given up, at most [`MOST_DELAYS`].
+    pub most_delays: f64,
 }
 
 /// What was found.
@@ -154,7 +156,7 @@ impl ControlLoop {
         };
         let mut most = LONGEST * least;
         if self.values().sample_time.is_none() && wait > 0.0 {
-            most = most.min(MOST_DELAYS * wait);
+            most = most.min(asked.most_delays.min(MOST_DELAYS) * wait);
         }
         let (mut found, span, is_settled) = run.over(most, Some(ending))?;
         if !is_settled {

@@ -39,7 +39,7 @@ pub use entry::{Entry, Number};
 pub use equations::Input;
 pub use filter::{Rule, SampledFilter};
 pub use held::{HeldRows, Moving, Polynomials};
-pub use load::{DeviationAsked, Figures};
+pub use load::{DeviationAsked, Figures, MOST_DELAYS};
 pub use plane::HeldPlane;
 pub use plant::{Factors, Fraction, Plant, StateSpace};
 pub use range::GivenPlant;

@@ -12,6 +12,10 @@ const POINTS: usize = 1500;
 /// Length of the step response of a plant in units of a bound on its slowest time.
 const FIRST: f64 = 8.0;
 
+/// Delays within which a response has to come to rest: more judge slower gains and take time in
+/// proportion.
+const SLOWEST: f64 = 2e4;
+
 /// Half width of the settling band, as a share of the largest deviation.
 const BAND: f64 = 0.02;
 
@@ -25,6 +29,7 @@ pub fn figures(of: &ControlLoop, drive: Drive, task: &Task) -> Result<Option<Fig
         size: 1.0,
         band: BAND,
         span: None,
+        most_delays: SLOWEST,
     };
     match without_limit(of).deviation(&asked, task) {
         Err(error) if error.ends_all() => Err(error),
