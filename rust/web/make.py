@@ -24,8 +24,8 @@ SOURCES = ("rust/core/src", "rust/web/src")
 FILES = ("Cargo.toml", "Cargo.lock", "rust/core/Cargo.toml", "rust/web/Cargo.toml")
 
 #: Largest size of the compressed module, in bytes. The page fits and judges a recording as the
-#: package does, which takes a sixth of it.
-MOST = 480_000
+#: package does, which takes a fifth of it. More: a page takes longer to load.
+MOST = 520_000
 
 
 def sources_hash() -> str:
