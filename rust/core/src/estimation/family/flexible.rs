@@ -126,10 +126,10 @@ impl Around {
         let scores: Vec<f64> = own.iter().map(|one| dot(one, &target) / variance).collect();
         let tried = sizes(&products, &scores, (SERIES.least, SERIES.most));
         let most = tried.iter().fold(0.0_f64, |most, one| most.max(one.fall));
-        let likely = tried
+        let mut likely = tried
             .into_iter()
             .filter(|one| most > 0.0 && one.fall >= most - SERIES.slack);
-        likely.last()
+        likely.next_back()
     }
 }
 

@@ -73,7 +73,9 @@ impl Series {
 
     /// L_j of a column of the rows of all records.
     pub(super) fn terms(&self, rows: &Rows, column: &[f64]) -> Vec<Vec<f64>> {
-        let mut out: Vec<Vec<f64>> = vec![Vec::with_capacity(column.len()); TERMS];
+        let mut out: Vec<Vec<f64>> = (0..TERMS)
+            .map(|_| Vec::with_capacity(column.len()))
+            .collect();
         for (part, place) in rows.parts.iter().zip(rows.places()) {
             let own = self.columns(&column[place], &part.gaps);
             for (out, own) in out.iter_mut().zip(own) {
