@@ -18,16 +18,18 @@ NO_BAGS: dict[str, Any] = {
     "condition": find_spec("mcap_ros2") is None,
     "reason": "mcap-ros2-support reads MCAP files",
 }
-PAGE = Path(__file__).resolve().parents[2] / "docs/reference/json.md"
+REFERENCE = Path(__file__).resolve().parents[2] / "docs/reference"
+PAGES = (REFERENCE / "json.md", REFERENCE / "json-vehicles.md")
 
 
 def documented() -> dict[str, set[str]]:
-    """The keys of each schema in the tables of the page."""
-    sections = re.split(r"^## `(.+)`$", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    """The keys of each schema in the tables of the pages."""
     keys = {}
-    for schema, text in zip(sections[::2], sections[1::2], strict=True):
-        cells = re.findall(r"^\| (`[^|]+) \|", text, flags=re.MULTILINE)
-        keys[schema] = {key for cell in cells for key in re.findall(r"`(\w+)`", cell)}
+    for page in PAGES:
+        sections = re.split(r"^## `(.+)`$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        for schema, text in zip(sections[1::2], sections[2::2], strict=True):
+            cells = re.findall(r"^\| (`[^|]+) \|", text, flags=re.MULTILINE)
+            keys[schema] = {key for cell in cells for key in re.findall(r"`(\w+)`", cell)}
     return keys
 
 
@@ -103,4 +105,5 @@ def check_keys(printed: dict[str, Any], schema: str) -> None:
     assert set(printed) <= documented()[name]
     optional = {"noise", "link", "no_interval_because"}
     assert documented()[name] - set(printed) <= optional
-    assert f"`{name}`" in PAGE.read_text(encoding="utf-8").split("\n## ")[0]
+    heads = [page.read_text(encoding="utf-8").split("\n## ")[0] for page in PAGES]
+    assert any(f"`{name}`" in head for head in heads)

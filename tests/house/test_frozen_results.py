@@ -138,7 +138,7 @@ MADE = {
     "PlannedBound": lambda: planned().bound,
     "Advice": lambda: found_plant().advice(),
     "Cause": lambda: dtm.estimation.Cause("play", 0.05, (0.04, 0.06), None, 20.0),
-    "SensorFault": lambda: dtm.estimation.SensorFault("frozen", 0, 12, 3.0, 4.0),
+    "SensorFault": lambda: dtm.estimation.SensorFault("smoothed", 0, 12, 3.0, 4.0, 5.0),
     "LoopView": lambda: found_plant().at([0.01, 0.1]),
     "PlantCandidate": lambda: found_plant().best,
     "PlantEstimate": found_plant,

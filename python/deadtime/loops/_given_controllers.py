@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from deadtime.loops._controllers import PD, PI, PID, Controller, P
 from deadtime.loops._given_plants import transfer_function_of
+from deadtime.loops._plants import Plant
 
 
 def controller_of(given: object) -> Controller:
     """The controller with this transfer function."""
     if isinstance(given, Controller):
         return given
-    G = transfer_function_of(given)
+    G = None if isinstance(given, Plant) else transfer_function_of(given)
     if G is None:
         raise TypeError(
             f"controller={given!r}: give a controller, such as P(Kp=1), or a transfer function"

@@ -118,7 +118,8 @@ fn with_verdict(
     let shown = |pair: (f64, f64)| if stable { pair } else { (f64::NAN, f64::NAN) };
     let [up, down, turned] = [up, down, turned].map(shown);
     let peaks = if stable {
-        held_peaks(numbers, &[&places[..], &phase_crossovers].concat(), task)?
+        let all = [&places[..], &phase_crossovers].concat();
+        Peaks::if_known(held_peaks(numbers, &all, task))?
     } else {
         Peaks::UNKNOWN
     };

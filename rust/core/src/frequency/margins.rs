@@ -191,7 +191,8 @@ fn with_verdict(
     let shown = |pair: (f64, f64)| if stable { pair } else { (f64::NAN, f64::NAN) };
     let [up, down, turned, late] = [up, down, turned, late].map(shown);
     let largest = if stable {
-        peaks(n, d, &[&crossovers[..], &phase.places].concat(), task)?
+        let places = [&crossovers[..], &phase.places].concat();
+        Peaks::if_known(peaks(n, d, &places, task))?
     } else {
         Peaks::UNKNOWN
     };

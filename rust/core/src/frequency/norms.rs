@@ -24,7 +24,7 @@ use crate::{Error, Task};
 /// start from.
 const OCTAVES: i32 = 24;
 
-/// Largest moduli of the sensitivities of a loop; all NaN where it is not stable.
+/// Largest moduli of the sensitivities of a loop; all NaN where it is not stable or they are not known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peaks {
     /// Of 1/(1 + L).
@@ -36,6 +36,17 @@ pub struct Peaks {
 }
 
 impl Peaks {
+    /// What was found, or nothing where it cannot be known: margins are there without it.
+    ///
+    /// # Errors
+    /// Those that end all work.
+    pub(super) fn if_known(found: Result<Self, Error>) -> Result<Self, Error> {
+        match found {
+            Err(error) if error.ends_all() => Err(error),
+            found => Ok(found.unwrap_or(Self::UNKNOWN)),
+        }
+    }
+
     /// Those of a loop that is not stable.
     pub(super) const UNKNOWN: Self = {
         let unknown = Peak {
