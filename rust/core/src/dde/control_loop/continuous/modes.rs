@@ -243,6 +243,9 @@ impl<S: Scalar> Run<'_, '_, S> {
         if let Some(change) = change {
             self.leave(change);
             self.requested.input_break(next)?;
+            if self.pieces.is_none() {
+                self.requested.output_break(next)?;
+            }
         }
         Ok(())
     }
