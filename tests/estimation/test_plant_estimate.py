@@ -275,3 +275,15 @@ def test_a_command_that_moves_at_the_beginning_alone_takes_the_plant_at_rest():
     assert unknown.verdict == "none"
     assert "before the rows that count" in unknown.reason
     assert "at_rest=True" in unknown.advice().statement
+
+
+def test_a_number_of_a_loop_around_the_plant_has_an_interval(fit):
+    def overshoot(loop):
+        return loop.step_response().info()["overshoot"]
+
+    controller = dtm.PI(1.2, 0.04)
+    value, (low, high) = fit.in_loop(controller, overshoot)
+    assert low < value < high
+    truth = dtm.ControlLoop(dtm.FirstOrder(GAIN, SLOW), controller, delay=DEAD)
+    # Twice as far as 95 %: one in ten thousand is beyond.
+    assert low - (value - low) < overshoot(truth) < high + (high - value)
