@@ -9,7 +9,8 @@
 //!
 //! An integral that stops makes the right-hand side jump at a bound. Where it would drive the command out
 //! while it runs and lets it back in while it stops, the command stays at the bound: the integral then
-//! follows from that (Filippov 1960).
+//! follows from that (Filippov 1960). Which mode follows depends on all that moves in the element before
+//! it: elements, modes and their changes are one state machine, and one file.
 
 use crate::dde::control_loop::linear_loop::{LinearLoop, Start};
 use crate::dde::control_loop::reference::{Cursor, Reference};
