@@ -6,14 +6,16 @@ loads, a disturbance of the output and noise, and is compared with another simul
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
+import math
 
 import deadtime as dtm
 import numpy as np
 import pytest
 from deadtime.loops import BackCalculation, ConditionalIntegration, SweepStatus
 
-from tests.support.simulated_loops import Diagram, simulated
+from tests.support.simulated_loops import Diagram, simulated, transition, zeros_in
 
 TIMES = np.linspace(0.0, 5.0, 51)
 FILTER = (15.0, 0.8)
@@ -155,6 +157,26 @@ def test_every_combination_agrees_with_another_simulator(plant, kind):
     for case in cases:
         compare(case)
     assert cases or (plant, kind) == ("lead", "PV ideal")
+
+
+LINEAR = [case for case in CASES if case[3:] == (None, None, None, WEIGHTS[0])]
+
+
+@pytest.mark.parametrize("case", LINEAR, ids=lambda case: f"{case[0]}, {case[1]}, {case[2]}")
+def test_poles_where_the_delay_is_a_fifth_longer(case):
+    """Against eigenvalues of one sample, or the zeros to the right of two lines."""
+    loop, diagram = both(case)
+    loop = loop.replace(delay=1.2 * loop.delay)
+    diagram = dataclasses.replace(diagram, delay=loop.delay)
+    abscissa = loop.spectral_abscissa()
+    assert loop.is_stable() == (abscissa < 0.0)
+    if loop.sample_time:
+        largest = np.abs(np.linalg.eigvals(transition(diagram))).max()
+        assert abscissa == pytest.approx(math.log(largest) / loop.sample_time, abs=1e-7)
+        return
+    close = 1e-6 * (1.0 + abs(abscissa))
+    assert zeros_in(diagram, abscissa + close, abscissa + 60.0, 300.0) == 0
+    assert zeros_in(diagram, abscissa - close, abscissa + 60.0, 300.0) >= 1
 
 
 def wound(guard, sample_time=None, limit=(-0.2, 0.2)):

@@ -397,3 +397,79 @@ def sampled(loop, times):
             out[:, at] = output(), v
             at += 1
     return out
+
+
+def transition(loop):
+    """One sample of the linear loop as a matrix, of its states and the commands on their way."""
+    Ts, size, n = loop.sample_time, loop.size, len(loop.space[1])
+    whole, part = divmod(loop.delay / Ts, 1.0)
+    # A command arrives `part` of a sample after a sample, `whole` samples late.
+    waiting = int(whole) + 1
+    A, B, C, D = loop.space
+
+    def rates(z, w):
+        x, (_, smooth, slope, _) = z[:n], z[n:]
+        look = C @ x + D * w
+        bent = 0.0
+        if loop.smooth:
+            omega, damping = loop.smooth
+            bent = omega**2 * (-look - smooth) - 2 * damping * omega * slope
+        return np.concatenate([A @ x + B * w, [-look, slope, bent, 0.0]])
+
+    def moved(z, w, h):
+        M = np.zeros((size + 1, size + 1))
+        for i in range(size):
+            M[:size, i] = rates(np.eye(size)[i], 0.0)
+        M[:size, size] = rates(np.zeros(size), w)
+        return (expm(M * h) @ np.append(z, 1.0))[:size]
+
+    columns = []
+    for unit in np.eye(size + waiting):
+        z, late = unit[:size], list(unit[size:])  # the newest last; the oldest has arrived
+        w = late[0]
+        u = -loop.Kp * (C @ z[:n] + D * w) + loop.Ki * z[n]
+        u += loop.Kd * (z[n + 2] if loop.smooth else -(C @ (A @ z[:n] + B * w)))
+        late.append(u)
+        z = moved(moved(z, w, part * Ts), late[1], (1.0 - part) * Ts)
+        columns.append(np.concatenate([z, late[1:]]))
+    matrix = np.array(columns).T
+    # States of what the loop lacks rest: integral, filter, limited rate.
+    resting = [n + 3, *([] if loop.Ki else [n]), *([] if loop.smooth else [n + 1, n + 2])]
+    moving = np.delete(np.arange(len(matrix)), resting)
+    return matrix[np.ix_(moving, moving)]
+
+
+def characteristic(loop, s):
+    """den + num C e^(-delay s) at points s, times the denominator of the controller."""
+    above, below = loop.Kp, 1.0
+    if loop.Kd:
+        above = loop.Kp + loop.Kd * s
+        if loop.smooth:
+            omega, damping = loop.smooth
+            below = s**2 + 2 * damping * omega * s + omega**2
+            above = loop.Kp * below + loop.Kd * omega**2 * s
+    if loop.Ki:
+        above, below = above * s + loop.Ki * below, below * s
+    G = np.polyval(loop.num, s) * np.exp(-loop.delay * s)
+    return np.polyval(loop.den, s) * below + G * above
+
+
+def zeros_in(loop, left, right, up):
+    """Zeros of the characteristic function between these real parts, and up to an imaginary part.
+
+    Half of a rectangle is walked, whose other half is its mirror: by steps that turn little.
+    """
+    corners = [complex(right, 0.0), complex(right, up), complex(left, up), complex(left, 0.0)]
+    turned = 0.0
+    for begin, end in itertools.pairwise(corners):
+        at = np.linspace(0.0, 1.0, 2001)
+        for _ in range(40):
+            values = characteristic(loop, begin + (end - begin) * at)
+            steps = np.angle(values[1:] / values[:-1])
+            wide = np.flatnonzero(np.abs(steps) > 0.5)
+            if not wide.size:
+                break
+            at = np.insert(at, wide + 1, 0.5 * (at[wide] + at[wide + 1]))
+        assert not wide.size
+        turned += float(steps.sum())
+    return round(turned / math.pi)
