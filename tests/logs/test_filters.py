@@ -1,5 +1,6 @@
 """Filters that logs name, and the sum of their delays on the gyro path."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,6 +51,18 @@ def test_px4():
     lines = filter_lines(log)
     assert len(lines) == 3
     assert lines[-1] == "gyro path together: 5.627 ms (1 filter)"
+
+
+@pytest.mark.parametrize(("newer", "poles"), [(False, math.sqrt(2.0)), (True, 1.0)])
+def test_the_derivative_of_px4_has_one_pole_where_there_are_two_notches(newer, poles):
+    notch = {"IMU_GYRO_NF0_FRQ" if newer else "IMU_GYRO_NF_FREQ": 80.0}
+    width = {"IMU_GYRO_NF0_BW" if newer else "IMU_GYRO_NF_BW": 20.0}
+    found = {
+        one.name: one.delay
+        for one in filters_of(told("PX4", IMU_DGYRO_CUTOFF=30.0, **notch, **width))
+    }
+    assert found["low-pass of the derivative"] == pytest.approx(poles / (60.0 * math.pi))
+    assert found["notch 1" if newer else "notch"] == pytest.approx(20.0 / (2 * math.pi * 80.0**2))
 
 
 BETAFLIGHT = {

@@ -147,10 +147,13 @@ def filter_lines(log: Configured) -> list[str]:
 
 
 def _px4(told: Mapping[str, float]) -> list[FilterDelay]:
-    """IMU_GYRO_CUTOFF and IMU_DGYRO_CUTOFF are Butterworth filters of two poles."""
+    """IMU_GYRO_CUTOFF has two poles; IMU_DGYRO_CUTOFF has one where there are two notches."""
+    # `VehicleAngularVelocity.hpp`: LowPassFilter2p before the second notch, AlphaFilter since.
+    of_derivative = one_pole if "IMU_GYRO_NF0_FRQ" in told else two_poles
     found = _low_pass(told, "gyro low-pass", "response", "IMU_GYRO_CUTOFF", two_poles)
-    found += _low_pass(told, "low-pass of the derivative", "D", "IMU_DGYRO_CUTOFF", two_poles)
+    found += _low_pass(told, "low-pass of the derivative", "D", "IMU_DGYRO_CUTOFF", of_derivative)
     found += _low_pass(told, "low-pass of the derivative", "D", "MC_DTERM_CUTOFF", two_poles)
+    found += _notch(told, "notch", "IMU_GYRO_NF_FREQ", "IMU_GYRO_NF_BW")
     for k in (0, 1):
         found += _notch(told, f"notch {k + 1}", f"IMU_GYRO_NF{k}_FRQ", f"IMU_GYRO_NF{k}_BW")
     return found
