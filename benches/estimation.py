@@ -46,6 +46,10 @@ Run ``python benches/estimation.py --strangers [--runs N] [--rows TEXT,TEXT] [--
 are in two sizes, which move an answer by 1 and 5 standard errors, and the truth is a range
 (`strangers`). The lot that chose the faults has the seed 20261203.
 
+Run ``python benches/estimation.py --gains [--runs N] [--seed S] [--quick]`` to propose gains from
+500 bump tests, PI loops and height steps in wind with small faults, and to print stability and
+largest sensitivity of the true loops (`strangers.gains`).
+
 The other tables are in folders of their own; the first ones are one file, because cases, methods
 and what each method is given are read together, and the command line that chooses between all.
 """
@@ -76,6 +80,7 @@ from reality.detection import print_powers
 from reality.oracle_table import print_oracle
 from reality.table import chosen, free_of, print_table
 from strangers import rows as strangers
+from strangers.gains import print_gains
 from strangers.table import print_strangers
 
 SAMPLE = 0.065
@@ -508,6 +513,7 @@ def main() -> None:
     rates.add_argument("--rates", action="store_true", help="print their table alone")
     strange = parser.add_argument_group("plants and faults that the estimator does not know")
     strange.add_argument("--strangers", action="store_true", help="print their table alone")
+    strange.add_argument("--gains", action="store_true", help="print gains proposed from some")
     flown = parser.add_argument_group("flights against ArduPilot's Copter")
     flown.add_argument("--firmware", action="store_true", help="fly, and print their table alone")
     flown.add_argument(
@@ -539,6 +545,9 @@ def main() -> None:
         return
     if given.rates:
         print_rates(given.runs or (2 if given.quick else 1000), given.processes, given.method)
+        return
+    if given.gains:
+        print_gains(given.runs or (2 if given.quick else 500), given.seed or 0, given.processes)
         return
     if given.strangers:
         try:
