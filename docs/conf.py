@@ -63,6 +63,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "filename_pattern": r"\.py$",
     "abort_on_example_error": True,
+    "copyfile_regex": r".*\.csv",
     "capture_repr": (),
     "download_all_examples": False,
     "image_srcset": ["2x"],

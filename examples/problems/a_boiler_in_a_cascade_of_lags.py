@@ -1,10 +1,21 @@
 """
-A boiler: many lags, and the rules of thumb
-===========================================
+A boiler: are gains for a dead time safe for many lags?
+=======================================================
 
-The steam of a boiler answers its burner through four equal lags. No plant with a dead time is that
-boiler, and an estimate has to say how far off it may be. Here a bump test is made, the plant is
-estimated from it, and the gains are tried on the true boiler.
+**Question.** The steam of a boiler follows its burner through four equal lags, without a dead time.
+An estimate describes it by a dead time and two lags. Are PI gains for that estimate safe?
+
+**Data.** A bump test, made by the first lines of the script: time (s), burner (%) and pressure
+(bar). The boiler has a gain of 1.5 and four lags of 15 s; the noise is 0.1 bar.
+
+**Answer.** Yes. The verdict is *reliable*, and what a controller needs is right: the largest stable
+gain is 2.57 (95 %: 2.47 to 2.68), that of the true boiler 2.667. The dead time of 13.2 s (95 %: 6.9
+to 14.0 s) belongs to the estimated plant; the boiler has lags instead. With Kp = 0.371 and
+Ki = 0.01119 the true loop has a gain margin of 3.87.
+
+**Next.** Enter the gains, record a step of the set point, and check them with that record::
+
+    deadtime tune step.csv --kp 0.371 --ki 0.01119
 """
 
 import deadtime as dtm
@@ -22,11 +33,14 @@ fit = dtm.estimate_delay(dtm.Recording(time, None, pressure, burner))
 print(fit.summary())
 best = dtm.design(fit.loop(dtm.PI(1.0, 0.01)), controller=dtm.PI, delay=fit.ci())
 print(best.summary())
-
 true = dtm.ControlLoop(boiler, best.loop.controller, delay=0.0)
+print(f"true boiler: gain margin {true.margin().gain_margin:.3g}")
+limit = dtm.ControlLoop(boiler, dtm.P(1.0), delay=0.0).stable_range("Kp")[1]
+print(f"true boiler: largest stable gain {limit:.4g}")
+
 fig, ax = plt.subplots(layout="constrained")
 for label, loop in (("estimated plant", best.loop), ("true boiler", true)):
     response = loop.simulate(np.linspace(0.0, 500.0, 501))
     ax.plot(response.time, response.outputs, label=label)
-ax.set(xlabel="time (s)", ylabel="pressure", title="A step of the set point")
+ax.set(xlabel="time (s)", ylabel="pressure (bar)", title="A step of the set point by 1 bar")
 ax.legend()

@@ -273,7 +273,7 @@ def test_a_command_that_moves_at_the_beginning_alone_takes_the_plant_at_rest():
     assert said.delay == fit.delay
     unknown = dtm.estimate_delay(record, at_rest=False)
     assert unknown.verdict == "none"
-    assert "before the rows that count" in unknown.reason
+    assert "before the rows that the fit uses" in unknown.reason
     assert "at_rest=True" in unknown.advice().statement
 
 

@@ -23,8 +23,8 @@ FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
     "estimate": "Find the plant of a recording, or the delay of a known loop, with a verdict.",
-    "inspect": "Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
-    "latency": "Tell how long each loop of a vehicle takes to respond, by stage, and what that "
+    "inspect": "List what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
+    "latency": "Show how long each loop of a vehicle takes to respond, by stage, and what that "
     "costs.",
     "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
     "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
@@ -39,8 +39,8 @@ COMMANDS = {
     "internet-loop": "Control an integrator over UDP, estimate the loop's delay, and measure it.",
     "simulate": "Simulate the step response of a loop, exactly.",
     "report": "Write one page about a recording: delay, map of gains, a controller to try.",
-    "demo": "Fly a simulated loop with known truth and find its delay and its gains; no hardware.",
-    "emulate": "Stand in for a vehicle, on its own ports and in its own protocol.",
+    "demo": "Simulate a loop whose delay is known, find the delay, and design gains for it.",
+    "emulate": "Emulate a vehicle, on its own ports and in its own protocol.",
 }
 
 

@@ -29,7 +29,7 @@ def command(
     methods: Annotated[bool, typer.Option("--all")] = False,
     as_json: opt.As_json = False,
 ) -> None:
-    """Fly a simulated loop with known truth and find its delay and its gains; no hardware.
+    """Simulate a loop whose delay is known, find the delay, and design gains for it.
 
     Parameters
     ----------
@@ -74,8 +74,9 @@ def command(
         print_points(found.comparison.explanation())
         print_text("")
     print_text(
-        f"Simulated: a vehicle that lags behind {flight.truth.delay:g} s of radio delay, and noise "
-        f"on its height. Its true delay and lag are {flight.numbers['delay+lag']:.3f} s together."
+        f"Simulated: a vehicle with a lag, behind {flight.truth.delay:g} s of radio delay, with "
+        "noise on its height. Its true delay and lag are "
+        f"{flight.numbers['delay+lag']:.3f} s together."
     )
     print_text(f"\n{found.headline()}\n", "bold")
     if methods:

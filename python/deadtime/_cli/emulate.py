@@ -26,7 +26,7 @@ from deadtime.links.ardrone2.emulator.options import PORT_BASE, ports_from
 from deadtime.links.parent_watch import parent_ended
 
 command = typer.Typer(
-    help="Stand in for a vehicle, on its own ports and in its own protocol.",
+    help="Emulate a vehicle, on its own ports and in its own protocol.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -41,7 +41,7 @@ PORTS = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port
 
 @command.callback()
 def _group() -> None:
-    """Stand in for a vehicle, on its own ports and in its own protocol."""
+    """Emulate a vehicle, on its own ports and in its own protocol."""
 
 
 @command.command()

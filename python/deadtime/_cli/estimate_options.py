@@ -65,7 +65,9 @@ Free = Annotated[
 Map = Annotated[OvershootMap | None, typer.Option(help="From overshoot to delay, for overshoot.")]
 Noise_path = Annotated[
     NoisePath | None,
-    typer.Option(help="Where sensor noise goes, for waveform: round the loop or not."),
+    typer.Option(
+        help="For waveform: is the sensor noise in the recording alone, or in the loop too?"
+    ),
 ]
 Initial_output = Annotated[
     float | None,

@@ -44,7 +44,7 @@ def command(
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Tell what the log of an autopilot holds: vehicle, modes, loops, rates, gains.
+    """List what the log of an autopilot holds: vehicle, modes, loops, rates, gains.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def _print_log(log: Log) -> None:
         print_table(results_table(HEADS, rows, left=("loop", "setpoint", "response")))
         print_points(_reasons(log))
     else:
-        print_text("no loop: setpoint and response of none are in the log", "yellow")
+        print_text("no loop has both its setpoint and its response in the log", "yellow")
     if log.key_parameters:
         _print_some("parameters", [f"{name} {one:g}" for name, one in log.key_parameters.items()])
     for line in filter_lines(log):

@@ -89,7 +89,7 @@ def command(
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Tell how long each loop of a vehicle takes to respond, by stage, and what that costs.
+    """Show how long each loop of a vehicle takes to respond, by stage, and what that costs.
 
     Exit codes: 0 a time, reliable or an indication; 3 none; 1 an error.
     """

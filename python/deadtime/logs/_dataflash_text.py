@@ -19,7 +19,7 @@ def read_dataflash_text(data: bytes, source: str) -> LogContents:
     Raises
     ------
     RecordingError
-        When no message is in it whose format it tells.
+        When it has no message of a known format.
     """
     lines = data.decode("utf-8", "replace").splitlines()
     messages = _TextMessages(lines)

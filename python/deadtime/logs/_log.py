@@ -254,7 +254,7 @@ class Log(ReadOnlyArrays):
             lines.append(f"modes: {spans}")
         lines.extend(loop.headline() for loop in self.loops.values())
         if not self.loops:
-            lines.append("no loop: setpoint and response of none are in the log")
+            lines.append("no loop has both its setpoint and its response in the log")
         if self.key_parameters:
             shown = ", ".join(f"{name} = {value:g}" for name, value in self.key_parameters.items())
             lines.append(f"parameters: {shown}")

@@ -26,7 +26,7 @@ _LAWS: dict[Law, str] = {
     "early": "the command is the controller's, one row early",
     "approximate": "the command is nearly the controller's",
     "differs": "the command is not the controller's",
-    "unknown": "whether the command is the controller's cannot be told",
+    "unknown": "it is unknown whether the command is the controller's",
 }
 
 

@@ -200,9 +200,9 @@ def _stamp_findings(columns: Columns, rows: Rows) -> Iterator[Finding]:
         yield Finding(
             "stamps_nominal",
             "note",
-            f"the time stamps are {seconds(rows.row_time)} apart to rounding, as those of a plan "
-            "are, and few clocks",
-            "if the samples were taken at other times, this recording cannot show it",
+            f"the time stamps are exactly {seconds(rows.row_time)} apart, as measured ones rarely "
+            "are",
+            "if they are planned times and not measured ones, jitter is invisible here",
         )
     elif rows.stamps == "jittered":
         rate = float(np.quantile(np.abs(np.diff(columns.output)) / np.diff(columns.time), 0.95))

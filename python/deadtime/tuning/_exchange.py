@@ -183,8 +183,8 @@ def _unmet(search: Search, required: RequiredMargins, gains: Array) -> ValueErro
     )
     at = ", ".join(f"{n} = {v:.4g}" for n, v in problem.named(best).items())
     return ValueError(
-        f"no gains in the ranges have {wanted}: taken alone, the most to be had is {most}; "
-        f"together the nearest is {together} at {at}. Ask for less, or widen the ranges"
+        f"no gains in the ranges have {wanted}: taken alone, the most that can be reached is "
+        f"{most}; together the nearest is {together} at {at}. Ask for less, or widen the ranges"
     )
 
 

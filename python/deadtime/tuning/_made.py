@@ -105,12 +105,12 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
         lost = objective.lost(value, without)
         *others, last = (name for name, (low, high) in problem.intervals.items() if low < high)
         names = f"{', '.join(others)} and {last}" if others else last
-        sure = "were it in the middle of its interval for certain"
+        known = "in the middle of its interval"
         if problem.region is not None:
-            sure = "were the estimate exact"
+            known = "exactly as estimated"
         words = (
-            f"not knowing the {names}: {sure}, "
-            f"{figure_in_words(objective.name, without)} could be had ({_part(lost)})"
+            f"uncertainty of the {names}: if known to be {known}, "
+            f"{figure_in_words(objective.name, without)} ({_part(lost)})"
         )
         made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
     return tuple(made)

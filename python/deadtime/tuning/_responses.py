@@ -224,8 +224,8 @@ class Wanted:
             without = self.gains(every[:1], 1).value
             lost = (found.value - without) / abs(without)
             words = (
-                "not knowing the numbers of the plant: were they in the middle of their "
-                f"intervals, {figure_in_words(self.objective, without)} could be had"
+                "uncertainty of the plant: if known to be in the middle of its intervals, "
+                f"{figure_in_words(self.objective, without)}"
             )
             made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
         return tuple(made)

@@ -95,7 +95,7 @@ def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
         weights = np.abs(directions[-1])
         mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
         raise NotIdentifiableError(
-            f"{' and '.join(mixed)} cannot be told apart by this recording: fix one of them, or "
+            f"this recording does not distinguish {' and '.join(mixed)}: fix one of them, or "
             "record a step that is not at the limit throughout"
         )
 

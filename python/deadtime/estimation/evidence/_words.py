@@ -89,8 +89,8 @@ def _python(value: Any) -> str:
 
 
 #: Why an estimate is none, or no more than an indication, where the command moves at the beginning.
-TOO_EARLY = "the command moves only before the rows that count"
-TAKEN_AT_REST = "the plant is taken to be at rest at the first row, which nothing shows"
+TOO_EARLY = "the command moves only before the rows that the fit uses"
+TAKEN_AT_REST = "the plant is assumed at rest at the first row, which the recording does not show"
 
 #: The kernel's reason where residuals are no noise of a sensor.
 NOT_WHITE = "residuals not white"
@@ -128,10 +128,10 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float
         else "the command is one sine, which determines gain and phase at its frequency alone",
         "classes contradict": "plants of different kinds explain the recording alike and differ "
         "where a loop crosses over",
-        NOT_WHITE: "what the plant leaves unexplained is no noise of a sensor: there "
+        NOT_WHITE: "what the plant leaves unexplained is more than sensor noise: there "
         "is a disturbance, or the plant is of another kind",
-        "command shifted": f"the command fits better a row later or earlier (by {size:.3g} in "
-        "2 ln L), and was moved",
+        "command shifted": f"the command fits better one row later or earlier (by {size:.3g} in "
+        "2 ln L), so it was moved",
         "delay at its limit": f"the dead time, {size:.4g} s, is at the limit of what is tried",
         "lag at its limit": f"a time constant, {size:.4g} s, is at the limit of what is tried, far "
         "longer than the recording",

@@ -24,24 +24,24 @@ WORDS = {
         "plant lacks them"
     ),
     "below zero": (
-        "the delay is at zero, and below zero the recording would be likelier: the plant lags more "
-        "than the vehicle, or lacks something"
+        "the delay is at zero, and the likelihood still rises towards zero: the plant has too much "
+        "lag, or lacks a zero"
     ),
     "change": (
         "the delay is not constant over the window{where}: it changes by {time} (standard "
         "deviation)"
     ),
     "speed": (
-        "the noise grows with the speed of the output{where}, as where time stamps are not the "
+        "the noise grows with the speed of the output{where}: the time stamps are probably not the "
         "times of the samples"
     ),
     "restless air": (
-        "the air found{where} changes within a row and moves the output {0:.2g} times the noise of "
-        "the sensor, as no air does: it stands for something else"
+        "the fitted disturbance{where} is too large to be wind: it changes within a row and moves "
+        "the output {0:.2g} times as much as sensor noise; the plant probably lacks a lag or a zero"
     ),
     "moving air": (
-        "what is taken for air{where} moves the output more while the vehicle moves than while it "
-        "rests: the plant lacks something"
+        "the fitted disturbance{where} is larger while the vehicle moves than while it rests: the "
+        "plant probably lacks a lag or a zero"
     ),
     "gains": "the recordings contradict one another: {name} {values}",
     "totals": "the recordings contradict one another: {name} {times}",

@@ -52,7 +52,7 @@ def profile_for(
         return fit.profile(first, covariance, numbers)
     except NotIdentifiableError:
         raise NotIdentifiableError(
-            f"{', '.join(names)} cannot be told apart by this recording: give the plant "
+            f"this recording does not distinguish {', '.join(names)}: give the plant "
             "fewer lags, or let deadtime.estimation.choose_plant choose"
         ) from None
 

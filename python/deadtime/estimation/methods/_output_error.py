@@ -305,8 +305,8 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         fit, numbers = fit.with_numbers(given, list(begun.numbers.items()))
         if numbers is None:
             raise NotIdentifiableError(
-                f"the {' and '.join(begun.numbers)} cannot be told from what else is fitted by "
-                "this recording: fix one of them, or record larger steps"
+                f"this recording does not distinguish the {' and '.join(begun.numbers)} from the "
+                "other fitted numbers: fix one of them, or record larger steps"
             )
         values = dict(numbers.values)
         fitted = [run._replace(loop=run.loop.replace(**values)) for run in fitted]
@@ -315,8 +315,8 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         fit, unclear, covariance = fit.between_rows(commands, not begun.numbers)
     profile = profile_for(fit, begun.assumed.intervals, covariance, numbers)
     doubts = (
-        "the reference changes between rows that are further apart than samples, and the "
-        "recording does not tell when",
+        "the reference changes between rows that are further apart than samples, at times that "
+        "the recording does not show",
     )
     return _Likeliest(profile, doubts * unclear, fitted)
 

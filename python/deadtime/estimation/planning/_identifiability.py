@@ -414,6 +414,6 @@ def _check_excitation(loop: ControlLoop, recording: Recording, names: tuple[str,
     slow = [name for name in SLOW if name in names]
     if slow and "delay" in names and loop.parameters[slow[0]] == 0.0:
         raise NotIdentifiableError(
-            f"at {slow[0]}=0 the {slow[0]} has the effect of a delay, so the two cannot be told "
-            f"apart there: assume a {slow[0]}, such as loop.replace({slow[0]}=0.05)"
+            f"at {slow[0]}=0 the {slow[0]} has the effect of a delay, so the data cannot "
+            f"distinguish the two: assume a {slow[0]}, such as loop.replace({slow[0]}=0.05)"
         )

@@ -101,7 +101,8 @@ def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, floa
     found = []
     if abs(numbers.colour) > COLOURED:
         found.append(
-            "the innovations are not white: the noise is another one, or the plant lacks something"
+            "the innovations are not white: the noise is not the given one, or the plant lacks "
+            "something"
         )
     if numbers.unexplained > UNEXPLAINED:
         found.append("the innovations follow the command: the plant lacks something")

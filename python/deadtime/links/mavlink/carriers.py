@@ -85,7 +85,9 @@ class Carriers:
                 one.named = False
             elif one is not self.current and one.silent > NAMED and not one.named:
                 one.named = True
-                self._tell(f"{one.address}: nothing received for {one.silent:.1f} s; it stood by")
+                self._tell(
+                    f"{one.address}: nothing received for {one.silent:.1f} s; it was the spare link"
+                )
 
     @contextmanager
     def over(self, carrier: Carrier) -> Iterator[None]:

@@ -36,7 +36,7 @@ def dialect() -> Any:
         )
     except ImportError as error:
         raise MissingExtraError(
-            "MAVLink is spoken with pymavlink, which is not installed; this line installs it: "
+            "MAVLink needs pymavlink, which is not installed; this line installs it: "
             "pip install 'deadtime[mavlink]'"
         ) from error
     return ardupilotmega

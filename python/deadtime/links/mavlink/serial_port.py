@@ -39,7 +39,7 @@ class SerialPort:
             import serial  # type: ignore[import-untyped, unused-ignore]
         except ImportError as error:
             raise MissingExtraError(
-                "serial ports are opened with pyserial, which is not installed; this line installs "
+                "a serial port needs pyserial, which is not installed; this line installs "
                 "it: pip install 'deadtime[mavlink]'"
             ) from error
         self._receive, self._loop = receive, asyncio.get_running_loop()

@@ -29,7 +29,7 @@ ROOM = 0.3
 def plot_latency(source: str, told: Sequence[LoopLatency]) -> Figure:
     """The time of each loop as a bar, with its 95 % interval."""
     if not told:
-        raise ValueError(f"{source}: no loop tells how long it takes, so nothing is drawn")
+        raise ValueError(f"{source}: no loop has a time, so nothing is drawn")
     figure, ax = new_figure(7.5, AROUND + ROW * len(told))
     unit, factor = time_unit(float(np.median([one.time for one in told])))
     for place, one in enumerate(told):

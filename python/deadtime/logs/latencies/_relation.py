@@ -417,5 +417,5 @@ def _no_answer(found: LoopLatency) -> str:
         return fit.reason
     if not _says_something(found.time, found.stderr, fit.recording):
         value = stated(found.time, found.stderr, "s")
-        return f"the time comes out as {value}: that says nothing"
+        return f"the time comes out as {value}, which cannot be used"
     return ""
