@@ -137,7 +137,7 @@ def test_another_vehicle_does_not_take_over():
                 await link.close()
 
     with pytest.warns(
-        RuntimeWarning, match=r"14551: nothing received for .* it was the spare link"
+        RuntimeWarning, match=r"14551: nothing received for .* it was in reserve"
     ):
         run(flight())
 
@@ -152,7 +152,7 @@ def test_a_silent_link_that_stands_by_is_named_once():
             with pytest.warns(RuntimeWarning) as said:
                 await asyncio.sleep(6.0)
             (one,) = said
-            assert "14551: nothing received for 2.0 s; it was the spare link" in str(one.message)
+            assert "14551: nothing received for 2.0 s; it was in reserve" in str(one.message)
 
     run(connected())
 

@@ -86,7 +86,7 @@ class Carriers:
             elif one is not self.current and one.silent > NAMED and not one.named:
                 one.named = True
                 self._tell(
-                    f"{one.address}: nothing received for {one.silent:.1f} s; it was the spare link"
+                    f"{one.address}: nothing received for {one.silent:.1f} s; it was in reserve"
                 )
 
     @contextmanager
