@@ -265,7 +265,7 @@ def test_a_command_that_moves_at_the_beginning_alone_takes_the_plant_at_rest():
     record = step_at_the_second_row()
     fit = dtm.estimate_delay(record)
     assert fit.verdict == "indication"
-    assert "taken to be at rest at the first row" in fit.reason
+    assert "assumed at rest at the first row" in fit.reason
     assert fit.delay + fit.value("lag") == pytest.approx(72.0, rel=0.05)
     assert "at_rest=True" in fit.advice().statement
     said = dtm.estimate_delay(record, at_rest=True)

@@ -136,9 +136,7 @@ def test_another_vehicle_does_not_take_over():
             with pytest.raises(LinkError, match="lands by its own failsafe"):
                 await link.close()
 
-    with pytest.warns(
-        RuntimeWarning, match=r"14551: nothing received for .* it was in reserve"
-    ):
+    with pytest.warns(RuntimeWarning, match=r"14551: nothing received for .* it was in reserve"):
         run(flight())
 
 

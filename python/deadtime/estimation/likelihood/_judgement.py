@@ -36,8 +36,8 @@ WORDS = {
         "times of the samples"
     ),
     "restless air": (
-        "the fitted disturbance{where} is too large to be wind: it changes within a row and moves "
-        "the output {0:.2g} times as much as sensor noise; the plant probably lacks a lag or a zero"
+        "the fitted disturbance{where} is too large to be wind: it changes within a row, {0:.2g} "
+        "times the sensor noise, so the plant probably lacks a lag or a zero"
     ),
     "moving air": (
         "the fitted disturbance{where} is larger while the vehicle moves than while it rests: the "
