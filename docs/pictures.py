@@ -401,7 +401,7 @@ def explorer() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as run:
         page = loop.explore({"Kp": (0, 6), "Kv": (-0.9, 0.9)}).save(Path(folder) / "loop.html")
         browser = run.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        tab = browser.new_page(viewport={"width": 1280, "height": 1040})
+        tab = browser.new_page(viewport={"width": 1440, "height": 900})
         tab.goto(page.as_uri())
         tab.wait_for_selector("body[data-ready=yes]")
         tab.screenshot(path=IMAGES / "explorer.png")

@@ -100,6 +100,27 @@ def test_a_rational_plant_keeps_its_gain_apart() -> None:
     assert (state["gain"], state["num"], state["den"]) == (0.5, [2.0], [1.0, 3.0, 0.0])
 
 
+def test_limits_weight_and_anti_windup_are_described() -> None:
+    guarded = dtm.PI(1.0, 0.5, weight=0.4, anti_windup=2.0)
+    loop = dtm.ControlLoop(dtm.Integrator(), guarded, delay=0.1, limit=(-0.5, 2.0))
+    state = described(loop.specification)
+    assert (state["low"], state["limit"], state["weight"]) == (-0.5, 2.0, 0.4)
+    assert (state["guard"], state["tracking_time"]) == ("tracking", 2.0)
+    stops = dtm.PI(1.0, 0.5, anti_windup=dtm.loops.ConditionalIntegration())
+    state = described(loop.replace(controller=stops, limit=1.0).specification)
+    assert (state["guard"], state["limit"]) == ("stops", 1.0)
+    assert "low" not in state
+    for other in (
+        loop.replace(rate_limit=1.0),
+        loop.replace(controller=dtm.PID(1.0, 0.5, 0.1, derivative_weight=0.5)),
+        loop.replace(controller=dtm.PI(1.0, 0.5, feed_forward=0.5)),
+    ):
+        with pytest.raises(ValueError, match="the explorer shows no rate limit"):
+            other.explore()
+    with pytest.raises(ValueError, match="two finite limits"):
+        loop.replace(limit=(-1.0, np.inf)).explore()
+
+
 def test_a_plant_of_factors_with_one_lag_has_its_slider() -> None:
     factors = dtm.FactoredPlant([0.2], gain=0.9, integrator=True)
     state = described(dtm.ControlLoop(factors, dtm.P(1.0), delay=0.1).specification)

@@ -79,7 +79,7 @@ def test_a_loop_has_the_same_abscissa_margins_and_responses(
     )
 
     time = np.linspace(0.0, 6.0, 61)
-    answer = web.call("step", [*numbers(loop), 0, 1.0, 0, len(time), *time])
+    answer = web.call("step", [*numbers(loop), 1.0, 0.0, 0.0, 0, len(time), *time])
     response = loop.step_response(time)
     np.testing.assert_allclose(answer[:61], response.outputs, rtol=1e-9, atol=1e-12)
 
@@ -109,7 +109,7 @@ def test_a_loop_without_rounding_has_the_same_bits(web: WebKernels) -> None:
     assert chains == loop.characteristic().chain_abscissa()
     limited = loop.replace(sample_time=0.065, limit=1.0, Kp=1.0, Kv=0.1)
     time = np.linspace(0.0, 10.0, 201)
-    answer = web.call("step", [*numbers(limited), 0, 1.0, 0, len(time), *time])
+    answer = web.call("step", [*numbers(limited), 1.0, 0.0, 0.0, 0, len(time), *time])
     assert answer[:201].tobytes() == limited.step_response(time).outputs.tobytes()
 
 
@@ -129,16 +129,14 @@ def test_maps_have_the_same_counts(
     loop = loop.replace(sample_time=sample_time)
     # A neutral loop has infinitely many unstable roots beyond Kv = 1.
     axes = {name: np.linspace(0.02, 0.95 if name == "Kv" else 3.0, 41) for name in ranges}
-    chart = dtm.stability_map(loop, axes)
+    chart = dtm.stability_map(loop, axes, abscissa=False)
     plane = [number for name, points in axes.items() for number in axis(name, points)]
-    answer = web.call("map", [*numbers(loop), *plane, 0.0, 1])
-    counts, abscissa = answer[: 41 * 41].reshape(41, 41), answer[41 * 41 :].reshape(41, 41)
+    counts = web.call("map", [*numbers(loop), *plane]).reshape(41, 41)
     proved = chart.status == 0
     assert proved.mean() > 0.95
     assert np.array_equal(counts[proved], chart.unstable[proved])
-    np.testing.assert_allclose(abscissa[proved], chart.abscissa[proved], rtol=1e-8, atol=1e-9)
 
-    curves = web.call("boundaries", [*numbers(loop), *plane, 0.0])
+    curves = web.call("boundaries", [*numbers(loop), *plane])
     place, found = 0, []
     while place < len(curves):
         count = int(curves[place])
@@ -155,19 +153,11 @@ def test_maps_have_the_same_counts(
             assert abs(member.characteristic()(1j * omega)) < 1e-8 * (1.0 + omega**3)
 
 
-def test_roots_of_a_region_are_those_of_python(web: WebKernels) -> None:
-    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(2.0), delay=0.36)
-    found = web.call("roots", [*numbers(loop), -20.0, 1.0, -60.0, 60.0]).reshape(-1, 4)
-    known = loop.characteristic().roots(re=(-20.0, 1.0), im=(-60.0, 60.0))
-    assert np.array_equal(found[:, 0] + 1j * found[:, 1], known.roots)
-    assert np.array_equal(found[:, 3], known.radii)
-
-
 def test_a_load_acts_like_a_command(web: WebKernels) -> None:
     """Behind the delay the load is a command: L(s) y for one that steps is P/(1 + P F e^-sT)."""
     loop = dtm.ControlLoop(dtm.Integrator(0.8, 0.1), dtm.PV(1.2, 0.1), delay=0.2)
     time = np.linspace(0.0, 40.0, 81)
-    answer = web.call("step", [*numbers(loop), 1, 0.5, 0, len(time), *time])
+    answer = web.call("step", [*numbers(loop), 0.0, 0.5, 0.0, 0, len(time), *time])
     # At rest the command makes up for the load, for which P needs an error of load/Kp.
     assert answer[80] == pytest.approx(0.5 / 1.2, rel=1e-6)
     # Until the first reaction arrives the plant follows the load alone.
@@ -179,15 +169,74 @@ def test_a_load_acts_like_a_command(web: WebKernels) -> None:
     assert before > 0.2
 
 
+@pytest.mark.parametrize("sample_time", [None, 0.05])
+@pytest.mark.parametrize(
+    "controller",
+    [
+        dtm.PI(1.2, 0.6, weight=0.4),
+        dtm.PI(1.2, 0.6, anti_windup=dtm.loops.ConditionalIntegration()),
+        dtm.PID(1.2, 0.6, 0.1, dtm.DerivativeFilter(20.0), anti_windup=1.5, weight=0.7),
+    ],
+)
+def test_limits_guards_weights_and_loads_have_the_same_bits(
+    web: WebKernels, controller: dtm.loops.Controller, sample_time: float | None
+) -> None:
+    loop = dtm.ControlLoop(
+        *(dtm.Integrator(), controller),
+        delay=0.2,
+        sample_time=sample_time,
+        limit=(-0.2, 0.5),
+    )
+    time = np.linspace(0.0, 20.0, 401)
+    answer = web.call("step", [*numbers(loop), 1.0, 0.1, 10.0, 0, len(time), *time])
+    load = np.where(time >= 10.0, 0.1, 0.0)
+    known = loop.simulate(time, np.ones(401), load=load)
+    assert np.array_equal(answer[:401], known.outputs)
+    assert answer[401:].max() == 0.5
+    plain = loop.replace(controller=dtm.PI(1.2, 0.6), limit=None)
+    assert np.abs(plain.simulate(time, np.ones(401), load=load).outputs - answer[:401]).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("plant", "controller"),
+    [
+        (dtm.FirstOrder(2.0, 10.0), dtm.PI),
+        (dtm.Integrator(0.9, 0.2), dtm.PV),
+        pytest.param(dtm.Integrator(0.9, 0.2), dtm.PI, marks=pytest.mark.survey),
+    ],
+)
+def test_a_design_is_that_of_python(
+    web: WebKernels, plant: dtm.loops.Plant, controller: type[dtm.loops.Controller]
+) -> None:
+    known = dtm.design(dtm.ControlLoop(plant, dtm.P(1.0), delay=0.4), controller=controller)
+    slack = 0.1 if controller is dtm.PI else 0.0
+    request = numbers(known.loop.replace(weight=1.0) if slack else known.loop)
+    sensitivity, load, weight, *gains = web.call("design", [*request, 1.6, slack])
+    assert gains == pytest.approx(list(known.gains.values()), rel=1e-6)
+    assert sensitivity == pytest.approx(1.6, rel=1e-6)
+    assert load == pytest.approx(known.value, rel=1e-6)
+    assert weight == pytest.approx(known.loop.controller.weight) if slack else np.isnan(weight)
+
+
+#: A request for the roots of a loop, as `Request::control_loop` reads it.
+REQUEST = [0, 0, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, np.inf, -np.inf, 0, 1, 1, 2, 1, 0, 4]
+
+
+def changed(place: int, *numbers: float) -> list[float]:
+    """The request with other numbers from one place on."""
+    return [*REQUEST[:place], *numbers, *REQUEST[place + len(numbers) :]]
+
+
 @pytest.mark.parametrize(
     ("broken", "said"),
     [
         ([1.0], "ends too early"),
         ([0.5, 0.0, 0.0], "whole number"),
-        ([0, 0, 0, 0, 1, 1, 0, 0, 1, 0, -1, 0, np.inf, 1, 1, 2, 1, 0, 4], "-1 s in a loop"),
-        ([0, 0, 0, 0, 1, np.nan, 0, 0, 1, 0, 1, 0, np.inf, 1, 1, 2, 1, 0, 4], "finite"),
-        ([0, 0, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, np.inf, 2, 1, 1, 1, 1, 4], "degree"),
-        ([0, 0, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, np.inf, 1, 1, 9, 1, 0, 4], "inside a list"),
+        (changed(10, -1.0), "-1 s in a loop"),
+        (changed(5, np.nan), "finite"),
+        (changed(16, 2, 1, 1, 1, 1), "degree"),
+        (changed(18, 9), "inside a list"),
+        (changed(13, 1.0, 2.0), "two bounds"),
     ],
 )
 def test_a_broken_request_is_refused_with_the_reason(
@@ -225,7 +274,7 @@ def test_a_module_built_again_gives_the_same_bits(web: WebKernels, made: dict[st
         for name, further in [
             ("rightmost", [4]),
             ("margins", []),
-            ("step", [0, 1.0, 0, len(time), *time]),
+            ("step", [1.0, 0.0, 0.0, 0, len(time), *time]),
         ]:
             question = [*numbers(loop), *further]
             np.testing.assert_array_equal(built.call(name, question), web.call(name, question))

@@ -97,7 +97,8 @@ def test_a_slider_moves_everything(page: Page) -> None:
         page.tab.keyboard.press("Shift+ArrowRight")
     drawn = page.drawn
     delay = drawn["state"]["delay"]
-    assert delay == pytest.approx(0.86)
+    # The slider goes to three times the delay.
+    assert delay == pytest.approx(0.36 + 5 * 0.1 * 1.08)
     loop = LOOP.replace(delay=delay)
     assert drawn["numbers"]["abscissa"] == pytest.approx(loop.spectral_abscissa(), rel=1e-9)
     assert drawn["stable"] < before["stable"]
@@ -233,13 +234,18 @@ def test_a_page_in_a_frame_works(browser: Any, tmp_path: Path) -> None:
     frame.locator("#number-delay").press("Enter")
     tab.wait_for_timeout(400)
     assert frame.locator("#verdict").inner_text() == "Stable"
+    inner = "() => [document.documentElement.scrollHeight, document.documentElement.clientHeight]"
+    whole, seen = tab.frames[1].evaluate(inner)
+    assert whole <= seen
+    frame.locator("#suggest").click()
+    frame.get_by_text("gain margin").wait_for()
     assert said == []
     tab.close()
 
 
 CSV = {
     "comma": ("time,reference,output\n", ",", "."),
-    "semicolons and decimal commas": ("Zeit time;ref;height\n", ";", ","),
+    "semicolons and decimal commas": ("Time (s);SP;PV\n", ";", ","),
 }
 
 
@@ -279,11 +285,19 @@ def test_a_dropped_recording_is_fitted_in_the_page(page: Page, tmp_path: Path, f
     page.tab.select_option("#axis-y", "delay")
     assert page.drawn["state"]["y"] == "delay"
     assert page.tab.locator("#map .end").count() == 2
+    # Ranges, sample time and the time of the step are those of the file.
+    largest = loop.continuous().replace(delay=known.delay, gain=known.gain).margin().gain_margin
+    assert state["ranges"]["delay"] == pytest.approx([0.0, 3.0 * state["delay"]], rel=0.01)
+    most = 1.2 * largest * loop.parameters["Kp"]
+    assert state["ranges"]["Kp"] == pytest.approx([0.0, most], rel=0.01)
+    assert state["sample_time"] == pytest.approx(0.065)
+    assert page.tab.get_attribute("#range-delay", "max") == str(state["ranges"]["delay"][1])
+    assert state["Kp"] == pytest.approx(loop.parameters["Kp"])
 
 
 @pytest.mark.survey
 def test_a_fit_that_is_not_reliable_is_not_taken_over(page: Page, tmp_path: Path) -> None:
-    recording, _, _ = recorded_step(0, 0.15, 0.0)
+    recording, loop, _ = recorded_step(0, 0.15, 0.0)
     columns = (recording.time, recording.reference, recording.output, recording.command)
     log = tmp_path / "lagging.csv"
     head = "time,reference,output,command"
@@ -295,7 +309,94 @@ def test_a_fit_that_is_not_reliable_is_not_taken_over(page: Page, tmp_path: Path
     assert page.drawn["state"] == before
     page.tab.check("#fit-lag")
     page.tab.click("#fit")
-    assert page.drawn["state"]["interval"] is not None
+    page.tab.wait_for_function("() => window.drawn.state.interval")
+    # The commands are those of a P controller.
+    state = page.drawn["state"]
+    assert state["controller"] == "P"
+    assert state["Kp"] == pytest.approx(loop.parameters["Kp"], rel=1e-4)
+    assert state["limit"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "heads",
+    [
+        ["t", "SP", "PV", "OP"],
+        pytest.param(["T", "t", "r", "y", "u"], marks=pytest.mark.survey),
+        pytest.param(["Elapsed [min]", "sec", "desired", "pv (degC)"], marks=pytest.mark.survey),
+        pytest.param(["DateTime", "ref_m", "height_m", "cmd"], marks=pytest.mark.survey),
+    ],
+)
+def test_columns_are_guessed_as_by_the_reader(page: Page, tmp_path: Path, heads: list[str]) -> None:
+    from deadtime.recordings.readers._usual import chosen_columns
+
+    signals = ("time", "reference", "output", "command")
+    known = chosen_columns("", heads, dict.fromkeys(signals), {"command"})
+    log = tmp_path / "named.csv"
+    # Too few rows for a fit.
+    stamps = [f"2024-05-01T10:00:0{k}.250Z" for k in range(5)]
+    cell = {known["time"]: stamps if heads[0] == "DateTime" else range(5)}
+    rows = [[str(cell.get(head, [0] * 5)[k]) for head in heads] for k in range(5)]
+    log.write_text("\n".join(map(",".join, [heads, *rows])) + "\n", encoding="utf-8")
+    page.tab.set_input_files("#file", log)
+    page.tab.wait_for_function("() => document.getElementById('estimate').textContent")
+    chosen = {signal: page.tab.input_value(f"#column-{signal}") for signal in signals}
+    assert {signal: name for signal, name in chosen.items() if name} == known
+    assert "5 rows" in page.tab.inner_text("#estimate")
+
+
+def test_a_fit_leaves_the_page_alive_and_can_be_cancelled(page: Page, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    time = 0.02 * np.arange(2500)
+    command = np.repeat(rng.choice([-1.0, 1.0], 100), 25)
+    loop = dtm.ControlLoop(dtm.Integrator(0.9, 0.2), dtm.P(1e-9), delay=0.3, sample_time=0.02)
+    output = loop.simulate(time, 0.0 * time, load=command).outputs + rng.normal(0.0, 0.02, 2500)
+    log = tmp_path / "long.csv"
+    table = np.column_stack([time, 0.0 * time, output, command])
+    head = "t,r,y,u"
+    np.savetxt(log, table, delimiter=",", header=head, comments="")
+    before = page.drawn["state"]
+    page.tab.set_input_files("#file", log)
+    page.tab.wait_for_selector("#working:not([hidden])")
+    page.tab.fill("#number-Kp", "1.1")
+    page.tab.keyboard.press("Enter")
+    assert page.drawn["state"]["Kp"] == 1.1
+    assert page.tab.locator("#working").is_visible()
+    page.tab.click("#cancel")
+    page.tab.wait_for_selector("#working", state="hidden")
+    assert "Cancelled" in page.tab.inner_text("#estimate")
+    assert page.drawn["state"] == before | {"Kp": 1.1}
+
+
+def test_suggested_gains_are_those_of_the_package(page: Page) -> None:
+    page.tab.click("#suggest")
+    page.tab.wait_for_function("() => document.getElementById('suggestion').textContent")
+    state = page.drawn["state"]
+    known = dtm.design(LOOP)
+    for name, value in known.gains.items():
+        assert state[name] == pytest.approx(value, rel=1e-6)
+    assert "Ms 1.6" in page.tab.inner_text("#suggestion")
+    margin = f"gain margin {known.margins.gain_margin:.3g}"
+    assert margin in page.tab.inner_text("#suggestion")
+
+
+def test_the_roots_fill_their_picture(page: Page) -> None:
+    """The rightmost two are not drawn on one line by a chain far away."""
+    places = page.tab.evaluate(
+        "() => [...document.querySelectorAll('#roots .roots path')].map((one) =>"
+        " one.getAttribute('d').match(/^M([-\\d.]+) ([-\\d.]+)/).slice(1).map(Number))"
+    )
+    box = page.tab.evaluate("() => document.getElementById('roots').viewBox.baseVal.height")
+    first, second = places[0][1], places[1][1]
+    assert abs(first - second) > 0.1 * box
+
+
+def test_map_margins_step_and_roots_stand_above_the_fold(browser: Any, address: str) -> None:
+    opened = Page(browser, address, viewport={"width": 1440, "height": 900})
+    for name in ("map", "margins", "steps", "roots"):
+        box = opened.tab.locator(f"#{name}").bounding_box()
+        assert box["y"] + box["height"] <= 900.0, name
+        assert box["x"] + box["width"] <= 1440.0, name
+    opened.close()
 
 
 @pytest.mark.survey

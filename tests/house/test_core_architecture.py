@@ -108,6 +108,7 @@ ORDER = {
         "posed",
         "reach",
         "robust",
+        "settling",
         "rules",
     ],
     "dde": ["scalar", "limits", "rate_limits", "propagator", "control_loop", "system", "spectral"],

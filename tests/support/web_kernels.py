@@ -28,7 +28,10 @@ def request(state: dict[str, Any]) -> list[float]:
         *smooth,
         *(state["Kp"], state.get("Ki", 0.0), slope),
         *(state[name] for name in ("gain", "lag", "delay", "sample_time")),
+        state.get("weight", 1.0),
         state["limit"] or np.inf,
+        state.get("low", -(state["limit"] or np.inf)),
+        {"stops": np.inf, "tracking": state.get("tracking_time")}.get(state.get("guard", ""), 0.0),
         *(len(num), *num),
         *(len(den), *den),
     ]

@@ -45,22 +45,34 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
             "for one delay in series; make a loop around such a plant first"
         )
     refuse_discretised(controller, loop.sample_time, "the explorer")
-    if loop.rate_limit is not None or is_unequal(loop.limit) or controller._is_guarded:
-        raise ValueError(
-            "the explorer shows loops with equal limits and controllers without weights, "
-            "feed-forward and anti-windup: leave them out"
-        )
     known = type(controller).__name__
+    shown = {"weight", "tracking_time"} if known in ("PI", "PID") else set()
+    if loop.rate_limit is not None or not shown.issuperset(controller._extras):
+        raise ValueError(
+            "the explorer shows no rate limit, no feed-forward and no weight of a derivative: leave "
+            "them out"
+        )
     if known not in ("P", "PI", "PD", "PV", "PID"):
         raise ValueError(f"{known}: the explorer shows P, PI, PD, PV and PID controllers")
+    low, high = loop.bounds
+    if is_unequal(loop.limit) and not 0.0 < high < math.inf > -low:
+        raise ValueError(
+            f"limit={loop.limit!r}: the explorer shows two finite limits, the greater one positive"
+        )
     state: dict[str, Any] = {
         "controller": known,
         "delay": loop.known_delay,
         "sample_time": loop.sample_time or 0.0,
-        "limit": loop.limit or 0.0,
+        "limit": high if loop.limit else 0.0,
         "delay_path": loop.delay_path,
         **controller.gains,
+        **controller._extras,
     }
+    if is_unequal(loop.limit):
+        state["low"] = low
+    form = controller._form
+    if form.stops or "tracking_time" in state:
+        state["guard"] = "stops" if form.stops else "tracking"
     smooth = controller._filter
     if smooth is not None:
         state |= {"filter": True, "omega": smooth.omega, "damping": smooth.damping}

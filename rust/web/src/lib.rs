@@ -7,6 +7,7 @@
 
 #![expect(unsafe_code, reason = "names of exports are not mangled")]
 
+mod design;
 mod estimate;
 mod exchange;
 mod maps;
@@ -59,18 +60,18 @@ macro_rules! answering {
 }
 
 answering! {
-    /// Counts, and where they are asked for abscissas, of a map: see [`maps::cells`].
+    /// Counts of unstable roots of a map: see [`maps::cells`].
     map = maps::cells;
     /// The curves on which roots lie on the edge of stability: see [`maps::boundaries`].
     boundaries = maps::boundaries;
     /// The rightmost roots: see [`roots::rightmost`].
     rightmost = roots::rightmost;
-    /// The roots in a region: see [`roots::in_region`].
-    roots = roots::in_region;
     /// Gain, phase and delay margins: see [`margins::margins`].
     margins = margins::margins;
-    /// Responses to a step of the reference or of the load: see [`responses::step`].
+    /// The response to steps of the reference and of the load: see [`responses::step`].
     step = responses::step;
+    /// Gains for loads: see [`design::design`].
+    design = design::design;
     /// Delay, gain and lag of a recording: see [`estimate::estimate`].
     estimate = estimate::estimate;
 }

@@ -7,11 +7,10 @@ use deadtime::{Error, Task};
 use crate::request::Request;
 
 /// A map that is asked for: after the loop, the index of a number and the list of its values, for each
-/// axis; then the least decay rate, in 1/s.
+/// axis.
 struct Plane<'a> {
     control_loop: ControlLoop,
     axes: [(Place, &'a [f64]); 2],
-    question: Question,
 }
 
 impl<'a> Plane<'a> {
@@ -19,13 +18,7 @@ impl<'a> Plane<'a> {
         let control_loop = request.control_loop()?;
         let mut axis = || Ok::<_, Error>((request.place(&control_loop)?, request.list()?));
         let axes = [axis()?, axis()?];
-        let mut question = Question::default();
-        question.specification.decay = request.number()?;
-        Ok(Self {
-            control_loop,
-            axes,
-            question,
-        })
+        Ok(Self { control_loop, axes })
     }
 
     /// The rows of a sampled loop; none of a continuous one.
@@ -54,18 +47,16 @@ impl<'a> Plane<'a> {
     }
 }
 
-/// After the map, whether abscissas are asked for (0 or 1). The answer has a count for each cell,
-/// negative where it is not proved (−1 − status), and then the abscissas, both row by row of the
+/// The answer has a count for each cell, negative where it is not proved (−1 − status), row by row of the
 /// first axis.
 pub(crate) fn cells(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
-    let mut plane = Plane::read(request)?;
-    plane.question.abscissa = request.flag()?;
-    let task = Task::new();
+    let plane = Plane::read(request)?;
+    let (question, task) = (Question::default(), Task::new());
     let chart = match plane.held()? {
-        Some(held) => held.cells(plane.question, &task)?,
+        Some(held) => held.cells(question, &task)?,
         None => {
             let family = plane.family()?;
-            map(&family, &[0.0; 2], plane.axes(), plane.question, &task)?
+            map(&family, &[0.0; 2], plane.axes(), question, &task)?
         }
     };
     Ok(listed(&chart))
@@ -77,7 +68,7 @@ fn listed(chart: &Chart) -> Vec<f64> {
         0 => f64::from(*count),
         status => -1.0 - f64::from(status),
     });
-    counts.chain(chart.abscissa.iter().copied()).collect()
+    counts.collect()
 }
 
 /// The answer has for each curve the number of its points, and for each of those the values on both
@@ -85,7 +76,7 @@ fn listed(chart: &Chart) -> Vec<f64> {
 pub(crate) fn boundaries(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let plane = Plane::read(request)?;
     let task = Task::new();
-    let specification = plane.question.specification;
+    let specification = Question::default().specification;
     let found = match plane.held()? {
         Some(held) => Some(held.boundaries(specification, &task)?),
         None => {

@@ -1,7 +1,9 @@
 //! A request: numbers one after the other, lists with their length before them.
 
 use deadtime::Error;
-use deadtime::loops::{ControlLoop, Controller, Extras, Factors, Kind, Path, Place, Plant, Values};
+use deadtime::loops::{
+    ControlLoop, Controller, Extra, Extras, Factors, Kind, Path, Place, Plant, Values,
+};
 
 /// What is left to read.
 pub(crate) struct Request<'a> {
@@ -66,21 +68,23 @@ impl<'a> Request<'a> {
     }
 
     /// A loop: does it integrate, differentiate, is the derivative that of the error (0 or 1); ω (0 for
-    /// no filter) and ζ; Kp, Ki, Kd, gain, lag, delay, sample time (0 for none); limit (infinite for
-    /// none); the lists num and den, descending. The plant is gain num/(den (lag s + 1)).
+    /// no filter) and ζ; Kp, Ki, Kd, gain, lag, delay, sample time (0 for none), weight of the reference;
+    /// greatest and least command (infinite for none); tracking time (0 for none, infinite for an
+    /// integral that stops); the lists num and den, descending. The plant is gain num/(den (lag s + 1)).
     ///
     /// # Errors
     /// [`Error::Argument`] for a request that ends too early or numbers without sense.
     pub(crate) fn control_loop(&mut self) -> Result<ControlLoop, Error> {
         let terms = (self.flag()?, self.flag()?, self.flag()?);
         let (omega, damping) = (self.number()?, self.number()?);
-        let mut numbers = [0.0; 8];
+        let mut numbers = [0.0; 11];
         for number in &mut numbers {
             *number = self.number()?;
         }
-        let [kp, ki, kd, gain, lag, delay, sample_time, limit] = numbers;
+        let [kp, ki, kd, gain, lag, delay, sample_time, weight, ..] = numbers;
+        let [.., limit, low, tracking] = numbers;
         let (num, den) = (self.list()?.to_vec(), self.list()?.to_vec());
-        let finite = numbers[..7].iter().chain(&num).chain(&den);
+        let finite = numbers[..8].iter().chain(&num).chain(&den);
         if let Some(number) = finite.clone().find(|number| !number.is_finite()) {
             return Err(Error::argument(format!(
                 "{number} in a loop: its numbers must be finite"
@@ -101,6 +105,11 @@ impl<'a> Request<'a> {
                 "{time} s in a loop: lags, delays and sample times are zero or more"
             )));
         }
+        if low.is_nan() || limit <= low || limit.is_finite() != low.is_finite() {
+            return Err(Error::argument(format!(
+                "commands between {low} and {limit}: give two bounds, the smaller one first"
+            )));
+        }
         let (kind, mut own) = match terms {
             (false, false, _) => (Kind::P, vec![kp]),
             (false, true, false) => (Kind::PV, vec![kp, kd]),
@@ -117,12 +126,17 @@ impl<'a> Request<'a> {
         if is_filtered {
             own.extend([omega, damping]);
         }
+        let mut extras = Extras::default();
+        if kind.integrates() && tracking > 0.0 && tracking.is_finite() {
+            extras = extras.with(Extra::TrackingTime);
+            own.push(tracking);
+        }
         let controller = Controller {
             kind,
             is_filtered,
             rule: None,
-            extras: Extras::default(),
-            stops: false,
+            extras,
+            stops: kind.integrates() && tracking == f64::INFINITY,
         };
         let plant = Plant::Factors(Factors {
             num,
@@ -137,12 +151,16 @@ impl<'a> Request<'a> {
             delay,
             sample_time: (sample_time > 0.0).then_some(sample_time),
             limit: limit.is_finite().then_some(limit),
-            low: None,
+            low: (low != -limit).then_some(low),
             rate: None,
             given: None,
         };
         let names = ["gain", "lag"].map(String::from).to_vec();
-        ControlLoop::new(plant, names, controller, values, Path::Command)
+        let made = ControlLoop::new(plant, names, controller, values, Path::Command)?;
+        Ok(match weight {
+            1.0 => made,
+            weight => made.with_weight(weight),
+        })
     }
 
     /// A number of a loop, by its index among Kp, Ki, Kd, gain, lag, delay and sample time.

@@ -2,9 +2,7 @@
 
 use deadtime::dde::sampled;
 use deadtime::loops::Input;
-use deadtime::roots::{
-    Region, RootSet, chain_abscissa, rightmost as search, roots, spectral_abscissa,
-};
+use deadtime::roots::{chain_abscissa, rightmost as search, spectral_abscissa};
 use deadtime::stability::HeldLoop;
 use deadtime::{Error, Task};
 
@@ -29,27 +27,10 @@ pub(crate) fn rightmost(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     }
     let h = control_loop.characteristic()?;
     let mut answer = vec![spectral_abscissa(&h, true, &task)?, chain_abscissa(&h)];
-    put(&mut answer, &search(&h, many, &task)?);
-    Ok(answer)
-}
-
-/// After the loop, the ends of a region: least and largest real part, least and largest imaginary part.
-/// The answer has the roots in it, as [`rightmost`] lists them.
-pub(crate) fn in_region(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
-    let h = request.control_loop()?.characteristic()?;
-    let mut range = || Ok::<_, Error>((request.number()?, request.number()?));
-    let region = Region {
-        re: range()?,
-        im: range()?,
-    };
-    let mut answer = Vec::new();
-    put(&mut answer, &roots(&h, &region, &Task::new())?);
-    Ok(answer)
-}
-
-fn put(answer: &mut Vec<f64>, found: &RootSet) {
+    let found = search(&h, many, &task)?;
     let places = found.roots.iter().zip(&found.multiplicities);
     for ((root, many), radius) in places.zip(&found.radii) {
         answer.extend([root.re, root.im, f64::from(*many), *radius]);
     }
+    Ok(answer)
 }

@@ -17,16 +17,17 @@ from pathlib import Path
 from typing import Any
 
 from deadtime._base.page import write_page
+from deadtime._base.usual_columns import SECONDS, UNITS, USUAL
 
-#: The scripts of the page; a later one uses what the earlier ones define.
+#: The scripts of the page after the one that its worker shares; a later one uses the earlier ones.
 SCRIPTS = (
-    *("kernels", "state", "drawing", "map_view", "panels", "recording", "controls", "downloads"),
-    "main",
+    *("jobs", "state", "drawing", "map_view", "panels", "fitted", "recording", "controls"),
+    *("downloads", "main"),
 )
 
 _PLACE = Path(__file__).parent
 
-#: Height of the explorer inside of another page, in pixels.
+#: Height of the explorer inside of another page, in pixels, until it sets its own.
 _HEIGHT = 1000
 
 
@@ -60,7 +61,7 @@ class Explorer:
 
     @property
     def html(self) -> str:
-        """The page, about half a megabyte."""
+        """The page, some 0.8 MB."""
         from importlib.metadata import version
 
         given = json.dumps(dict(self.state), allow_nan=False).replace("<", "\\u003c")
@@ -70,7 +71,9 @@ class Explorer:
             "style": _theme() + _part("page.css"),
             "version": html.escape(version("deadtime")),
             "given": given,
+            "usual": json.dumps({"names": USUAL, "units": UNITS, "seconds": SECONDS}),
             "kernels": _kernels(),
+            "shared": _part("kernels.js"),
             "script": "\n".join(_part(f"{name}.js") for name in SCRIPTS),
         }
         return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _part("page.html"))

@@ -2,7 +2,7 @@
 
 use crate::Error;
 
-use super::controller::Controller;
+use super::controller::{Controller, Extra};
 use super::entry::Entry;
 use super::plant::{Fraction, Plant};
 
@@ -237,6 +237,20 @@ impl ControlLoop {
     pub fn with_number(&self, place: Place, value: f64) -> Self {
         let mut other = self.clone();
         other.values.set(place, value);
+        other
+    }
+
+    /// The same loop with this weight of the reference in the proportional term.
+    #[must_use]
+    pub fn with_weight(&self, weight: f64) -> Self {
+        let (mut other, controller) = (self.clone(), self.controller);
+        let numbers = &mut other.values.controller;
+        let place = controller.kind.gains().len() + 2 * usize::from(controller.is_filtered);
+        match numbers.get_mut(place) {
+            Some(own) if controller.names().any(|name| name == "weight") => *own = weight,
+            _ => numbers.insert(place.min(numbers.len()), weight),
+        }
+        other.controller.extras = controller.extras.with(Extra::Weight);
         other
     }
 }

@@ -6,7 +6,8 @@
 //!
 //! By the responses to a load and a set point: `posed` are the loops and rays of gains, `open` what Ms
 //! leaves of a ray, `demands` what else must hold, `responses` what gains give. `reach` joins these for
-//! the ratios of gains, `robust` looks for the best of them, and `rules` has rules of thumb.
+//! the ratios of gains, `robust` looks for the best of them, `settling` weighs the reference, and `rules`
+//! has rules of thumb.
 
 mod candidates;
 mod demands;
@@ -18,6 +19,7 @@ mod responses;
 mod robust;
 mod rules;
 mod search;
+mod settling;
 mod simplices;
 
 pub use candidates::{Candidates, Dominant, Loops, Scenario};
@@ -28,6 +30,7 @@ pub use responses::figures;
 pub use robust::best;
 pub use rules::{Reduced, Row, reduced, rules};
 pub use search::{Within, best_within, least, worst_delay};
+pub use settling::settled_first;
 
 #[cfg(test)]
 mod tests;

@@ -83,6 +83,32 @@ pub(super) struct Ray {
 }
 
 impl Posed {
+    /// All gains of one loop for the response to a load, under a largest Ms.
+    pub fn for_loads(of: ControlLoop, max_sensitivity: f64, slack: f64) -> Self {
+        Self {
+            first: 1,
+            free: (0..of.controller().kind.gains().len()).collect(),
+            loops: vec![of],
+            wish: Wish {
+                load: 1.0,
+                by_integral: false,
+                by_settling: false,
+            },
+            demands: Demands {
+                max_sensitivity,
+                gain_margin: 0.0,
+                phase_margin: 0.0,
+                delay_margin: 0.0,
+                noise_gain: f64::INFINITY,
+                bandwidth: 1.0,
+                settling_time: f64::INFINITY,
+            },
+            bounds: None,
+            shape: None,
+            slack,
+        }
+    }
+
     /// A loop with these free gains.
     pub(super) fn with(&self, of: &ControlLoop, gains: &[f64]) -> ControlLoop {
         let pairs = self.free.iter().zip(gains);

@@ -13,7 +13,8 @@ class Controls {
     if (names.join() !== [...this.fields.keys()].join()) this.build(names);
     for (const [name, field] of this.fields) {
       const value = state[name];
-      const { low, high, zero } = SLIDERS[name];
+      const { zero } = SLIDERS[name];
+      const [low, high] = endsOf(name, state);
       field.range.min = Math.min(low, value);
       field.range.max = Math.max(high, value);
       if (document.activeElement !== field.range) field.range.value = value;
@@ -27,7 +28,7 @@ class Controls {
     this.fields.clear();
     this.place.replaceChildren();
     for (const name of names) {
-      const { label, unit, low, high } = SLIDERS[name];
+      const { label, unit } = SLIDERS[name];
       const row = document.createElement("div");
       row.className = "slider";
       const title = document.createElement("label");
@@ -37,7 +38,7 @@ class Controls {
       note.className = "note";
       title.append(" ", note);
       const range = document.createElement("input");
-      Object.assign(range, { type: "range", id: `range-${name}`, min: low, max: high, step: "any" });
+      Object.assign(range, { type: "range", id: `range-${name}`, step: "any" });
       const number = document.createElement("input");
       Object.assign(number, { type: "number", id: `number-${name}`, step: "any" });
       number.setAttribute("aria-label", `${label} as a number`);
@@ -72,6 +73,6 @@ class Controls {
 function allowed(name, value) {
   if (name === "gain") return value === 0 ? 0.01 : value;
   if (["delay", "sample_time", "lag", "limit", "damping"].includes(name)) return Math.max(0, value);
-  if (name === "omega") return Math.max(0.1, value);
+  if (["omega", "tracking_time", "height"].includes(name)) return Math.max(1e-3, value);
   return value;
 }

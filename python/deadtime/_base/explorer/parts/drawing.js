@@ -31,7 +31,7 @@ class Frame {
   constructor(root, { width, height, x, y, label }) {
     Object.assign(this, { root, width, height, x, y });
     this.left = 52;
-    this.right = 12;
+    this.right = 18;
     this.top = 10;
     this.bottom = 40;
     root.replaceChildren();

@@ -1,6 +1,11 @@
-// The kernels: one loop in, its map, roots, margins and responses out. See rust/web.
+// The kernels: one loop in, its map, roots, margins and responses out. See rust/web. The page runs this
+// file, and so does the worker that fits and designs.
 
 const NUMBERS = ["Kp", "Ki", "Kd", "gain", "lag", "delay", "sample_time"];
+
+// Largest Ms of a design, and the part of the best response to a load that an earlier end of a step may
+// cost: those of deadtime.design.
+const [MOST_SENSITIVITY, SLACK] = [1.6, 0.1];
 
 const CONTROLLERS = {
   P: { integrates: 0, differentiates: 0, of_error: 0, gains: ["Kp"] },
@@ -18,9 +23,12 @@ async function unpacked(base64) {
   return new Response(stream).arrayBuffer();
 }
 
-async function loadKernels(base64) {
-  const { instance } = await WebAssembly.instantiate(await unpacked(base64), {});
-  const native = instance.exports;
+async function compiled(base64) {
+  return WebAssembly.compile(await unpacked(base64));
+}
+
+async function kernelsOf(module) {
+  const native = (await WebAssembly.instantiate(module, {})).exports;
 
   // Send a request; throws an Error with the reason of the kernel.
   function call(name, request) {
@@ -36,16 +44,13 @@ async function loadKernels(base64) {
   const axis = ({ name, points }) => [NUMBERS.indexOf(kernelName(name)), points.length, ...points];
 
   return {
-    // Counts of unstable roots, negative where not proved, and abscissas where asked for.
-    map(loop, axes, { decay = 0, abscissa = false } = {}) {
-      const request = [...encoded(loop), ...axes.flatMap(axis), decay, abscissa ? 1 : 0];
-      const answer = call("map", request);
-      const cells = axes[0].points.length * axes[1].points.length;
-      return { counts: answer.subarray(0, cells), abscissa: answer.subarray(cells) };
+    // Counts of unstable roots, negative where not proved.
+    map(loop, axes) {
+      return call("map", [...encoded(linear(loop)), ...axes.flatMap(axis)]);
     },
     // Curves of [x, y, rad/s].
-    boundaries(loop, axes, decay = 0) {
-      const answer = call("boundaries", [...encoded(loop), ...axes.flatMap(axis), decay]);
+    boundaries(loop, axes) {
+      const answer = call("boundaries", [...encoded(linear(loop)), ...axes.flatMap(axis)]);
       const curves = [];
       for (let i = 0; i < answer.length; ) {
         const count = answer[i++];
@@ -55,7 +60,7 @@ async function loadKernels(base64) {
       return curves;
     },
     rightmost(loop, many) {
-      const answer = call("rightmost", [...encoded(loop), many]);
+      const answer = call("rightmost", [...encoded(linear(loop)), many]);
       const roots = [];
       for (let i = 2; i < answer.length; i += 4) {
         roots.push({ re: answer[i], im: answer[i + 1], multiplicity: answer[i + 2] });
@@ -63,8 +68,17 @@ async function loadKernels(base64) {
       return { abscissa: answer[0], chains: answer[1], roots };
     },
     margins(loop) {
-      const [stable, gain, reduction, phase, delay] = call("margins", encoded(loop));
-      return { stable: stable === 1, gain, reduction, phase, delay };
+      const [stable, gain, reduction, phase, delay, omega] = call("margins", encoded(linear(loop)));
+      return { stable: stable === 1, gain, reduction, phase, delay, omega };
+    },
+    // The gains with the best response to a load, and the weight of the reference where it is chosen.
+    design(loop) {
+      const { gains: names, integrates } = CONTROLLERS[loop.controller];
+      const request = [...encoded(linear(loop)), MOST_SENSITIVITY, integrates ? SLACK : 0];
+      const [sensitivity, load, weight, ...gains] = call("design", request);
+      const found = Object.fromEntries(names.map((name, i) => [name, gains[i]]));
+      if (Number.isFinite(weight)) found.weight = weight;
+      return { gains: found, sensitivity, load };
     },
     // Delay, lag, their sum and gain of a recording under these commands, each with its interval.
     estimate(loop, rows, commands, hasLag) {
@@ -89,10 +103,11 @@ async function loadKernels(base64) {
         fitted: answer.subarray(18),
       };
     },
-    step(loop, time, { height = 1, load = false } = {}) {
+    // The response to a step of the reference at zero, and to one of the load at a later time.
+    step(loop, time, late) {
       const measured = loop.delay_path === "measurement" ? 1 : 0;
-      const request = [...encoded(loop), load ? 1 : 0, height, measured, time.length, ...time];
-      const answer = call("step", request);
+      const steps = [loop.height, loop.load, late];
+      const answer = call("step", [...encoded(loop), ...steps, measured, time.length, ...time]);
       return { outputs: answer.subarray(0, time.length), commands: answer.subarray(time.length) };
     },
   };
@@ -120,7 +135,10 @@ function encoded(loop) {
     loop.lag,
     loop.delay,
     loop.sample_time,
+    kind.integrates ? loop.weight : 1,
     loop.limit > 0 ? loop.limit : Infinity,
+    loop.limit > 0 ? (loop.low ?? -loop.limit) : -Infinity,
+    { none: 0, stops: Infinity, tracking: loop.tracking_time }[loop.guard],
     loop.num.length,
     ...loop.num,
     loop.den.length,
@@ -128,12 +146,30 @@ function encoded(loop) {
   ];
 }
 
-// The same loop without hold and limit.
+// The same loop without limits and what belongs to them, and without weight.
+function linear(loop) {
+  return { ...loop, limit: 0, guard: "none", weight: 1 };
+}
+
+// The same loop without hold and limits.
 function continuous(loop) {
-  return { ...loop, sample_time: 0, limit: 0 };
+  return { ...loop, sample_time: 0, limit: 0, guard: "none" };
 }
 
 function linspace(low, high, count) {
   const step = (high - low) / (count - 1);
   return Array.from({ length: count }, (_, i) => (i === count - 1 ? high : low + step * i));
+}
+
+// In a worker: the first message brings the module, each one what is to be called.
+if (typeof document === "undefined") {
+  let kernels = null;
+  onmessage = async ({ data: { module, name, given } }) => {
+    try {
+      kernels ??= await kernelsOf(module);
+      postMessage({ found: kernels[name](...given) });
+    } catch (error) {
+      postMessage({ reason: error.message });
+    }
+  };
 }

@@ -3,8 +3,12 @@
 const $ = (id) => document.getElementById(id);
 
 async function main() {
-  const first = completed(JSON.parse($("given").textContent));
-  const kernels = await loadKernels($("kernels").textContent.trim());
+  const given = JSON.parse($("given").textContent);
+  const module = await compiled($("kernels").textContent.trim());
+  const kernels = await kernelsOf(module);
+  const first = completed({ ranges: usualRanges(completed(given), kernels), ...given });
+  const working = { place: $("working"), text: $("working-text"), cancel: $("cancel") };
+  const jobs = new Jobs(working, module, $("shared").textContent);
   let state = completed({ ...first, ...fromFragment(location.hash) });
   let isDue = false;
   let written = 0;
@@ -25,15 +29,13 @@ async function main() {
     {
       file: $("file"),
       columns: $("columns"),
-      lists: Object.fromEntries(Object.keys(COLUMNS).map(list)),
+      lists: Object.fromEntries(SIGNALS.map(list)),
       lag: $("fit-lag"),
       fit: $("fit"),
       plot: $("recorded"),
       result: $("estimate"),
     },
-    kernels,
-    () => state,
-    change,
+    { kernels, jobs, usual: JSON.parse($("usual").textContent), state: () => state, take: change },
   );
   const controls = new Controls($("sliders"), change);
 
@@ -52,6 +54,29 @@ async function main() {
       return allowed(state[one], Math.min(high, Math.max(low, at)));
     };
     change({ [state.x]: moved("x", x), [state.y]: moved("y", y) });
+  }
+
+  // The gains with the best response to a load; the map goes on to show them.
+  async function suggest() {
+    const said = $("suggestion");
+    try {
+      const found = await jobs.run("Looking for gains", "design", state);
+      const ranges = { ...state.ranges };
+      for (const [name, value] of Object.entries(found.gains)) {
+        const [low, high] = endsOf(name, state);
+        if (value < low || value > high) ranges[name] = [Math.min(low, 1.5 * value), Math.max(high, 1.5 * value)];
+      }
+      const axes = ["x", "y"].filter((one) => ranges[state[one]] !== state.ranges[state[one]]);
+      const moved = Object.fromEntries(axes.map((one) => [`${one}_range`, null]));
+      change({ ...found.gains, ranges, ...moved });
+      const { gain, phase, delay } = kernels.margins(state);
+      const left = CONTROLLERS[state.controller].integrates ? "the IAE of a unit load is" : "a unit load leaves";
+      said.textContent =
+        `Ms ${shown(found.sensitivity, 3)}, gain margin ${shown(gain, 3)}, phase margin ${shown(phase, 3)}°, ` +
+        `delay margin ${shown(delay, 3)} s; ${left} ${shown(found.load, 3)}`;
+    } catch (error) {
+      said.textContent = error.message;
+    }
   }
 
   function draw() {
@@ -89,7 +114,10 @@ async function main() {
     $("controller").value = state.controller;
     $("filter").checked = state.filter;
     $("filter").disabled = !CONTROLLERS[state.controller].differentiates;
-    $("load").checked = state.load;
+    $("unequal").checked = state.low !== null;
+    $("unequal").disabled = !(state.limit > 0);
+    $("guard").value = state.guard;
+    $("guards").hidden = !isGuarded(state);
     $("polynomials").hidden = state.plant !== "rational";
     for (const one of ["num", "den"]) {
       if (document.activeElement !== $(one)) $(one).value = state[one].join(" ");
@@ -123,13 +151,16 @@ async function main() {
   });
   $("controller").addEventListener("change", (event) => change({ controller: event.target.value }));
   $("filter").addEventListener("change", (event) => change({ filter: event.target.checked }));
-  $("load").addEventListener("change", (event) => change({ load: event.target.checked }));
+  fill($("guard"), Object.entries(GUARDS), state.guard);
+  $("guard").addEventListener("change", (event) => change({ guard: event.target.value }));
+  $("unequal").addEventListener("change", (event) => change({ low: event.target.checked ? -state.limit : null }));
+  $("suggest").addEventListener("click", suggest);
   for (const one of ["x", "y"]) {
     $(`axis-${one}`).addEventListener("change", (event) => {
       const name = event.target.value;
       const other = one === "x" ? "y" : "x";
       const swapped = state[other] === name ? { [other]: state[one], [`${other}_range`]: state[`${one}_range`] } : {};
-      change({ ...swapped, [one]: name, [`${one}_range`]: rangeOf(name) });
+      change({ ...swapped, [one]: name, [`${one}_range`]: rangeOf(name, state) });
     });
     for (const end of ["low", "high"]) {
       $(`${one}-${end}`).addEventListener("change", () => {
@@ -154,6 +185,11 @@ async function main() {
   });
   window.addEventListener("hashchange", () => change({ ...first, ...fromFragment(location.hash) }));
   window.addEventListener("resize", () => change({}));
+  // A frame inside of another page is as high as the explorer; of another origin there is none.
+  new ResizeObserver(() => {
+    const frame = window.frameElement;
+    if (frame) frame.style.height = `${document.documentElement.offsetHeight}px`;
+  }).observe(document.body);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => change({}));
   draw();
   document.body.dataset.ready = "yes";

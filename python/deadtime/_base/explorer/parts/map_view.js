@@ -59,7 +59,7 @@ class MapView {
       for (let j = 0; j < cells; j++) {
         let worst = 0;
         let unknown = false;
-        for (const { counts } of maps) {
+        for (const counts of maps) {
           const count = counts[i * cells + j];
           if (count === -4) worst = Infinity;
           else if (count < 0) unknown = true;

@@ -1,7 +1,18 @@
 // What is known of the chosen loop: roots, step responses, margins.
 
 const ROOTS = 16;
-const TIMES = 400;
+
+// A plot by its width: both plots and the margins stand beside the map.
+const heightOf = (width) => Math.max(200, Math.round(0.42 * width));
+const TIMES = 500;
+
+// Roots by which the picture is scaled: the rightmost two pairs, if they turn by less than this angle
+// in a delay, as the roots of a chain do not.
+const NEAR = 4;
+const CHAIN = 1.5 * Math.PI;
+
+// Responses are shown for so many of the loop's own times at most.
+const LONGEST = 60;
 
 class Panels {
   constructor(elements, kernels) {
@@ -21,19 +32,21 @@ class Panels {
 
   drawRoots({ roots, chains }, smooth, state) {
     const sampled = state.sample_time > 0;
-    const all = sampled ? [...roots, ...smooth.roots] : roots;
-    const reals = all.map((root) => root.re).filter((re) => isFinite(re) && re > -60);
-    const imaginary = all.map((root) => Math.abs(root.im)).filter(isFinite);
-    const low = Math.min(-1, ...reals);
-    const high = Math.max(0.5, ...reals);
-    const top = Math.max(1, ...imaginary);
-    const margin = 0.06 * (high - low);
+    // The rightmost ones decide; the chains of a delay lie outside.
+    const isNear = ({ im }) => !(Math.abs(im) * state.delay > CHAIN);
+    const first = (list) => list.slice(0, 1).concat(list.slice(1, NEAR).filter(isNear));
+    const near = [...first(roots), ...(sampled ? first(smooth.roots) : [])];
+    const reals = near.map((root) => root.re).filter(isFinite);
+    const low = Math.min(0, ...reals);
+    const high = Math.max(0, ...reals);
+    const margin = 0.12 * (high - low || 1);
+    const top = Math.max(0.5 * (high - low), ...near.map((root) => Math.abs(root.im)).filter(isFinite)) || 1;
     const width = Math.max(260, this.roots.clientWidth || 320);
     const frame = new Frame(this.roots, {
       width,
-      height: Math.round(0.72 * width),
+      height: heightOf(width),
       x: [low - margin, high + margin],
-      y: [-1.06 * top, 1.06 * top],
+      y: [-1.15 * top, 1.15 * top],
       label: ["Re s, 1/s", "Im s, 1/s"],
     });
     frame.axes();
@@ -57,48 +70,52 @@ class Panels {
     roots.forEach((root) => put(root, root.re < 0 ? "stable" : "unstable"));
   }
 
-  // How long responses are shown, s.
+  // How long a response is shown, s: in the loop's own times, rounded.
   span(state, abscissa) {
-    const slow = abscissa < 0 ? -5 / abscissa : 0;
-    const least = 8 * (state.delay + state.lag + state.sample_time);
-    const span = Math.max(least, slow, 1);
+    const own = state.delay + state.lag + state.sample_time || 1;
+    // At its limit an integrator takes a time of its own for the step.
+    const atLimit = state.limit > 0 && state.den.at(-1) === 0 ? state.height / (state.limit * Math.abs(state.gain)) : 0;
+    const slow = (abscissa < 0 ? -5 / abscissa : 0) + atLimit;
+    const span = Math.min(Math.max(4 * own, slow), LONGEST * own);
     const round = 10 ** Math.floor(Math.log10(span));
-    return Math.min(round * ([1, 2, 5, 10].find((one) => one * round >= span) ?? 10), 200);
+    return round * ([1, 2, 5, 10].find((one) => one * round >= span) ?? 10);
   }
 
-  drawSteps(state, ideal, span) {
+  // A step of the reference, and after it one of the load.
+  drawSteps(state, ideal, late) {
+    const span = state.load === 0 ? late : 2 * late;
     const time = linspace(0, span, TIMES);
-    const options = { height: state.height, load: state.load };
-    const real = this.kernels.step(state, time, options);
+    const real = this.kernels.step(state, time, late);
     const differs = state.sample_time > 0 || state.limit > 0;
-    const other = differs ? this.kernels.step(ideal, time, options) : null;
-    const bound = 4 * Math.max(Math.abs(state.height), 1e-9);
-    const values = [...real.outputs, ...(other?.outputs ?? [])].filter(
-      (value) => Math.abs(value) < bound,
-    );
+    const other = differs ? this.kernels.step(ideal, time, late) : null;
+    const { height } = state;
+    const values = [...real.outputs, ...(other?.outputs ?? [])].filter((value) => Math.abs(value) < 4 * height);
     const low = Math.min(0, ...values);
-    const high = Math.max(state.load ? 0 : 1.1 * state.height, ...values, 1e-9);
+    const high = Math.max(1.1 * height, ...values);
     const width = Math.max(260, this.steps.clientWidth || 320);
     const frame = new Frame(this.steps, {
       width,
-      height: Math.round(0.72 * width),
+      height: heightOf(width),
       x: [0, span],
       y: [low - 0.04 * (high - low), high + 0.04 * (high - low)],
-      label: ["Time, s", state.load ? "Output after a load" : "Output"],
+      label: ["Time, s", "Output"],
     });
     frame.axes();
     const group = frame.clipped("steps");
-    const aim = state.load ? 0 : state.height;
-    group.append(svg("path", { d: frame.path([0, span], [aim, aim]), class: "aim" }));
+    group.append(svg("path", { d: frame.path([0, span], [height, height]), class: "aim" }));
     if (other) group.append(svg("path", { d: frame.path(time, other.outputs), class: "ideal" }));
     group.append(svg("path", { d: frame.path(time, real.outputs), class: "real" }));
     this.response = { time, outputs: [...real.outputs], commands: [...real.commands] };
-    const peak = Math.max(...real.outputs.filter(isFinite));
-    const over = state.load ? null : Math.max(0, peak / state.height - 1);
-    const text = state.load
-      ? `Largest deviation after a load of ${shown(state.height)}: ${shown(peak)}`
-      : `Overshoot ${(100 * over).toFixed(1)} %`;
-    this.caption.textContent = text + (other ? "; dashed: without hold and limit" : "");
+    const before = time.findIndex((t) => t >= late);
+    const peak = Math.max(...real.outputs.slice(0, before).filter(isFinite));
+    const said = [`Overshoot ${(100 * Math.max(0, peak / height - 1)).toFixed(1)} %`];
+    if (state.load !== 0) {
+      const off = real.outputs.slice(before).map((value) => Math.abs(value - real.outputs[before]));
+      const most = Math.max(...off.filter(isFinite));
+      said.push(`a load of ${shown(state.load)} at ${shown(late)} s moves the output by up to ${shown(most, 3)}`);
+    }
+    if (other) said.push("dashed: without hold and limits");
+    this.caption.textContent = said.join("; ");
   }
 
   tabulate(state, ideal, rightmost, smooth) {

@@ -2,13 +2,7 @@
 
 const MOST_ROWS = 3000;
 
-// What a column may be called, in the order in which it is looked for.
-const COLUMNS = {
-  time: /^(t|time)\b|time|seconds/i,
-  reference: /ref|setpoint|target|desired/i,
-  output: /out|height|alt|meas|pos|actual|^y$/i,
-  command: /command|cmd|actuator|^u$/i,
-};
+const SIGNALS = ["time", "reference", "output", "command"];
 
 // Names and columns of a table in text: separators and decimal commas as found.
 function tableOf(text) {
@@ -23,20 +17,44 @@ function tableOf(text) {
     if (cells.length !== names.length) {
       throw new Error(`row ${row + 1} has ${cells.length} cells and the header ${names.length}`);
     }
-    cells.forEach((cell, i) => {
-      const number = separator === "," ? cell : cell.replace(",", ".");
-      columns[i].push(number.trim() === "" ? NaN : Number(number));
-    });
+    cells.forEach((cell, i) => columns[i].push(numberIn(cell.trim().replace(/^"|"$/g, ""))));
   });
   return { names, columns };
 }
 
-// Which column is probably what; none for a command that is not there.
-function guessed(names) {
+// A number with a point or a comma, or an ISO time stamp in seconds; NaN for others.
+function numberIn(cell) {
+  const stamp = /^(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d)?)([.,]\d+)?(Z|[+-]\d\d:?\d\d)?$/.exec(cell);
+  if (!stamp) return cell === "" ? NaN : Number(cell.replace(",", "."));
+  const [, date, time, fraction, zone] = stamp;
+  const whole = Date.parse(`${date}T${time}${(zone ?? "Z").replace(/(\d\d)(\d\d)$/, "$1:$2")}`) / 1000;
+  return whole + (fraction ? Number(`0.${fraction.slice(1)}`) : 0);
+}
+
+// A name in small letters without its unit, and the unit.
+function plainName(name, units) {
+  const brackets = /\s*[([]\s*([^)\]]*?)\s*[)\]]\s*$/.exec(name);
+  const short = (brackets ? name.slice(0, brackets.index) : name).trim().toLowerCase().replace(/[\s.-]+/g, "_");
+  const parts = /^(.+)_([^_]*)$/.exec(short);
+  if (!brackets && parts && units.includes(parts[2])) return [parts[1], parts[2]];
+  return [short, brackets ? brackets[1].toLowerCase() : ""];
+}
+
+// Which column is what by its usual names, those of deadtime.read_recording; "" where none is.
+function guessed(names, { names: usual, units, seconds }) {
   const found = {};
-  for (const [what, pattern] of Object.entries(COLUMNS)) {
-    const taken = Object.values(found);
-    found[what] = names.find((name) => pattern.test(name) && !taken.includes(name)) ?? "";
+  const choose = (what, free) => {
+    const plain = free.map((name) => [name, ...plainName(name, units)]);
+    const fits = what === "time" ? plain.filter(([, , unit]) => seconds.includes(unit)) : plain;
+    for (const one of usual[what]) {
+      // As it is written, before other capitals: t is a time beside a temperature T.
+      const [same] = fits.find(([name]) => name === one) ?? fits.find(([, short]) => short === one) ?? [];
+      if (same !== undefined) return same;
+    }
+    return "";
+  };
+  for (const what of SIGNALS) {
+    found[what] = choose(what, names.filter((name) => !Object.values(found).includes(name)));
   }
   return found;
 }
@@ -44,16 +62,22 @@ function guessed(names) {
 // Rows of finite numbers at increasing times.
 function rowsOf({ names, columns }, chosen) {
   const pick = (name) => columns[names.indexOf(name)];
-  const parts = ["time", "reference", "output", "command"].map((what) => pick(chosen[what]));
+  const parts = SIGNALS.map((what) => pick(chosen[what]));
   if (!parts[0] || !parts[1] || !parts[2]) throw new Error("choose the columns of time, reference and output");
   const rows = { time: [], reference: [], output: [], command: parts[3] ? [] : null };
-  parts[0].forEach((time, i) => {
+  // Dates count from the first one, so that seconds keep their digits.
+  const begin = parts[0].find(Number.isFinite);
+  const first = begin > 1e8 ? begin : 0;
+  parts[0].forEach((stamp, i) => {
+    const time = stamp - first;
     const values = parts.map((part) => (part ? part[i] : 0));
     if (!values.every(Number.isFinite)) return;
     if (rows.time.length && time <= rows.time.at(-1)) {
       throw new Error(`time ${time} follows ${rows.time.at(-1)}: times must increase`);
     }
-    ["time", "reference", "output"].forEach((what, j) => rows[what].push(values[j]));
+    rows.time.push(time);
+    rows.reference.push(values[1]);
+    rows.output.push(values[2]);
     rows.command?.push(values[3]);
   });
   if (rows.time.length > MOST_ROWS) {
@@ -90,11 +114,8 @@ function whyNot(found) {
 }
 
 class RecordingView {
-  constructor(elements, kernels, state, take) {
-    Object.assign(this, elements);
-    this.kernels = kernels;
-    this.state = state;
-    this.take = take;
+  constructor(elements, { kernels, jobs, usual, state, take }) {
+    Object.assign(this, elements, { kernels, jobs, usual, state, take });
     this.file.addEventListener("change", () => this.file.files[0] && this.read(this.file.files[0]));
     this.fit.addEventListener("click", () => this.estimate());
     document.addEventListener("dragover", (event) => event.preventDefault());
@@ -109,11 +130,11 @@ class RecordingView {
     this.name = file.name;
     try {
       this.table = tableOf(await file.text());
-      const found = guessed(this.table.names);
+      const found = guessed(this.table.names, this.usual);
       for (const [what, list] of Object.entries(this.lists)) {
-        const names = what === "command" ? ["", ...this.table.names] : this.table.names;
-        list.replaceChildren(...names.map((name) => new Option(name || "none", name)));
-        list.value = found[what] || names[0];
+        const none = new Option(what === "command" ? "none" : "choose", "");
+        list.replaceChildren(none, ...this.table.names.map((name) => new Option(name, name)));
+        list.value = found[what];
       }
       this.columns.hidden = false;
       this.estimate();
@@ -127,28 +148,28 @@ class RecordingView {
     this.plot.toggleAttribute("hidden", true);
   }
 
-  estimate() {
+  async estimate() {
     const chosen = Object.fromEntries(Object.entries(this.lists).map(([what, list]) => [what, list.value]));
     try {
       const rows = rowsOf(this.table, chosen);
       const loop = this.state();
-      const found = this.kernels.estimate(loop, rows, commandsOf(rows, loop), this.lag.checked);
+      const commands = commandsOf(rows, loop);
+      const found = await this.jobs.run(`Fitting ${this.name}`, "estimate", loop, rows, commands, this.lag.checked);
       this.show(rows, found);
-      this.found = found;
       // A fit that does not explain the recording leaves the loop of the page as it was.
-      if (!found.reliable || !(found.gain.value > 0)) return;
-      const { delay, gain, lag } = found;
-      const interval = [delay.low, delay.high];
-      this.take({ delay: delay.value, gain: gain.value, lag: lag.value, interval });
+      if (found.reliable) this.take(loopOf(this.state(), found, rows, commands, this.kernels));
     } catch (error) {
       this.say(error.message);
     }
   }
 
   show(rows, found) {
+    // As many digits as tell the ends apart.
+    const digits = (low, high) => Math.min(9, Math.max(3, 2 + Math.ceil(Math.log10(Math.abs(high) / (high - low)))));
     const said = ({ value, low, high }, unit) =>
       found.reliable
-        ? `${shown(value, 3)}${unit}, between ${shown(low, 3)} and ${shown(high, 3)}${unit}`
+        ? `${shown(value, digits(low, high))}${unit}, between ${shown(low, digits(low, high))} and ` +
+          `${shown(high, digits(low, high))}${unit}`
         : `about ${shown(value, 2)}${unit}, not claimed to hold`;
     const lines = [found.reliable ? "Reliable, with 95 % confidence:" : "Indication:"];
     lines.push(`${this.name}, ${rows.time.length} rows`, `delay ${said(found.delay, " s")}`);
