@@ -11,7 +11,7 @@ from deadtime.estimation import PlantEstimate
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._demands import Demands
 from deadtime.tuning._filter_choice import filter_choice
-from deadtime.tuning._found_plants import loops_around, refusal
+from deadtime.tuning._found_plants import possible_loops, refusal
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
 from deadtime.tuning._objectives import objective_named
@@ -54,9 +54,10 @@ def design(
     ----------
     loop : ControlLoop, DelayEstimate, PlantEstimate or a plant
         Plant, delay, hold and limit; its controller is replaced. With a `PlantEstimate`, for loads
-        and set points, the gains hold for all ends of the intervals of delay, gain and largest time
-        constant. With an estimate the gains are the
-        best for the worst loop of its joint confidence region of delay, gain and lag. A plant of
+        and set points, the gains hold for all plants that it leaves possible: the ends of delay, of
+        its sum with the lags and of the gain, and other kinds that are not ruled out. With an
+        estimate the gains are the best for the worst loop of its joint confidence region of delay,
+        gain and lag. A plant of
         any kind that `ControlLoop` takes stands for the continuous loop around it without a limit.
     controller : Controller or class of one
         `P`, `PV`, `PD`, `PI`, `PID`, or an instance whose other numbers, such as the filter of
@@ -191,7 +192,7 @@ def design(
                 f"the estimate is an indication, so that the margins of a design on it are not "
                 f"known ({doubt}): take allow_indication=True for gains without known margins"
             )
-        loop, *around = loops_around(loop, template, level)
+        loop, *around = possible_loops(loop, template, level)
         plants = (*plants, *around)
     problem = pose(
         loop, template, delay, gain, fixed, ranges, amplitude, threads, level, allow_indication

@@ -1,47 +1,70 @@
-"""Loops around a plant that was found from a recording, over the intervals of its numbers."""
+"""The plants that an estimate leaves possible, as points around the likeliest one.
+
+The dead time is known worse than its sum with the lags, so that a plant with a longer dead time has
+a shorter lag. At each end of the interval of the dead time the largest lag keeps the sum, and at
+each end of the sum the dead time is the likeliest. A zero moves with the lag. Each of these is
+taken with both ends of the gain. Other kinds of plant that are not ruled out stand beside them,
+with their own likeliest numbers.
+"""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 
-#: Numbers of a plant with the name of their interval in an estimate; the largest time constant is
-#: the lag of an integrator or that of a first-order plant.
-_INTERVALS = {"delay": "delay", "gain": "gain", "time_constant": "lag", "lag": "lag"}
+#: Lead in BIC from which another kind of plant is ruled out, as the estimate has it.
+CLEAR = 10.0
 
-#: Least time, as a part of the estimate: a time constant of zero is no plant of first order.
-_LEAST = 1e-3
+#: Most other kinds of plant. More: longer designs; fewer: a kind that is not ruled out is left out.
+KINDS = 4
+
+#: Least lag, as a share of the likeliest.
+LEAST = 0.02
+
+#: Names of the largest lag, as plants have it.
+LAGS = ("lag", "time_constant", "lag_1")
 
 
-def loops_around(
-    found: PlantEstimate,
+def possible_loops(
+    fit: PlantEstimate,
     controller: Controller,
     level: float,
     sample_time: float | None = None,
     limit: float | None = None,
 ) -> list[ControlLoop]:
-    """The loop around the likeliest plant, then those with its numbers at the ends of intervals.
-
-    All combinations of the ends of delay, gain and largest time constant: more than the region that
-    they lie in together, since their errors belong together.
-    """
-    nominal = found.loop(controller, sample_time=sample_time, limit=limit)
-    ends = {}
-    for name, value in nominal.parameters.items():
-        interval = _INTERVALS.get(name)
-        if interval is None or interval not in found.intervals or value == 0.0:
-            continue
-        low, high = found.ci(level, interval)
-        if name != "gain":
-            low = max(low, 0.0 if name == "delay" else _LEAST * value)
-        if low < high:
-            ends[name] = (low, high)
-    corners = itertools.product(*ends.values())
-    return [nominal, *(nominal.replace(**dict(zip(ends, one, strict=True))) for one in corners)]
+    """The loops around all plants that are possible, that of the likeliest first."""
+    loop = fit.loop(controller, sample_time=sample_time, limit=limit)
+    shapes = [{"delay": fit.delay}, *_shapes(fit, loop, level)]
+    gains = fit.ci(level, "gain") if "gain" in fit.intervals else (loop.parameters["gain"],)
+    around = [
+        loop.replace(**numbers, gain=gain) for numbers, gain in itertools.product(shapes, gains)
+    ]
+    rivals = [one for one in fit.candidates[1:] if one.behind < CLEAR][:KINDS]
+    return [loop, *around, *(loop.replace(plant=one.plant, delay=one.delay) for one in rivals)]
 
 
-def refusal(found: PlantEstimate) -> str | None:
+def refusal(fit: PlantEstimate) -> str | None:
     """Why an estimate is not to be relied on; None where it is."""
-    return None if found.verdict == "reliable" else found.reason or found.verdict
+    return None if fit.verdict == "reliable" else fit.reason or fit.verdict
+
+
+def _shapes(fit: PlantEstimate, loop: ControlLoop, level: float) -> Iterator[dict[str, float]]:
+    """Dead time and lag at the ends of the dead time, of its sum with the lags, and of the lag."""
+    numbers = loop.plant.parameters
+    name = next((one for one in LAGS if numbers.get(one)), None)
+    if name is None:
+        yield from ({"delay": late} for late in fit.ci(level, "delay"))
+        return
+    own, least = numbers[name], LEAST * numbers[name]
+    for late in fit.ci(level, "delay"):
+        yield {"delay": late, name: max(own + fit.delay - late, least)}
+    if "delay+lag" in fit.intervals:
+        for total in fit.ci(level, "delay+lag"):
+            yield {"delay": fit.delay, name: max(own + total - fit.delay_plus_lag, least)}
+    if numbers.get("zero") and "lag" in fit.intervals:
+        for lag in fit.ci(level, "lag"):
+            more = max(lag, least) - own
+            yield {"delay": fit.delay, name: own + more, "zero": numbers["zero"] + more}

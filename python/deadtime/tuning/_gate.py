@@ -13,7 +13,7 @@ from deadtime._base.validation import finite, positive
 from deadtime.estimation import DelayEstimate, PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 from deadtime.tuning._demands import largest_command, white_to
-from deadtime.tuning._found_plants import loops_around, refusal
+from deadtime.tuning._found_plants import possible_loops, refusal
 from deadtime.tuning._native import noise_gain
 from deadtime.tuning._region import NUMBERS, region_of
 
@@ -232,7 +232,7 @@ class _Judge:
             if not isinstance(gains, Controller):
                 raise TypeError(f"gains={gains!r}: give a controller, since a plant has none")
             self.doubt(refusal(of), override)
-            return self._signed(of, loops_around(of, gains, level), level)
+            return self._signed(of, possible_loops(of, gains, level), level)
         if not isinstance(of, DelayEstimate):
             raise TypeError(f"of={of!r}: give a DelayEstimate, a PlantEstimate or a ControlLoop")
         self.doubt(None if of.verdict == "reliable" else of.reason or of.verdict, override)

@@ -47,7 +47,36 @@ OFF, FILTER = "off", "Tf"
 
 
 @dataclass(frozen=True)
-class IdealForm:
+class _Times:
+    """A gain, an integral time in s, infinite for none, and a derivative time in s."""
+
+    Kc: float
+    Ti: float = math.inf
+    Td: float = 0.0
+
+    def __post_init__(self) -> None:
+        finite("Kc", self.Kc)
+        finite("Td", self.Td)
+        if math.isnan(self.Ti) or self.Ti == 0.0:
+            raise ValueError(f"Ti={self.Ti}: give an integral time other than zero, inf for none")
+
+    def controller(self) -> Controller:
+        """The controller with these numbers.
+
+        Returns
+        -------
+        Controller
+        """
+        factor = self._factor()
+        return controller_from(self.Kc * factor, self.Kc / self.Ti, self.Kc * self.Td)
+
+    def _factor(self) -> float:
+        """The proportional gain by Kc."""
+        return 1.0
+
+
+@dataclass(frozen=True)
+class IdealForm(_Times):
     """The ideal form, also called standard or non-interacting: u = Kc (1 + 1/(Ti s) + Td s) e.
 
     Parameters
@@ -65,22 +94,6 @@ class IdealForm:
     >>> IdealForm(Kc=2.0, Ti=8.0, Td=1.0).controller()
     PID(Kp=2.0, Ki=0.25, Kd=2.0, filter=None)
     """
-
-    Kc: float
-    Ti: float = math.inf
-    Td: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check(self.Kc, self.Ti, self.Td)
-
-    def controller(self) -> Controller:
-        """The controller with these numbers.
-
-        Returns
-        -------
-        Controller
-        """
-        return controller_from(self.Kc, self.Kc / self.Ti, self.Kc * self.Td)
 
     @classmethod
     def of(cls, controller: Controller) -> IdealForm:
@@ -109,7 +122,7 @@ class IdealForm:
 
 
 @dataclass(frozen=True)
-class SeriesForm:
+class SeriesForm(_Times):
     """The series form, also called interacting: u = Kc (1 + 1/(Ti s)) (1 + Td s) e.
 
     Parameters
@@ -129,22 +142,8 @@ class SeriesForm:
     IdealForm(Kc=2.0, Ti=8.0, Td=2.0)
     """
 
-    Kc: float
-    Ti: float = math.inf
-    Td: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check(self.Kc, self.Ti, self.Td)
-
-    def controller(self) -> Controller:
-        """The controller with these numbers.
-
-        Returns
-        -------
-        Controller
-        """
-        factor = 1.0 + self.Td / self.Ti
-        return controller_from(self.Kc * factor, self.Kc / self.Ti, self.Kc * self.Td)
+    def _factor(self) -> float:
+        return 1.0 + self.Td / self.Ti
 
     @classmethod
     def of(cls, controller: Controller) -> SeriesForm:
@@ -336,10 +335,3 @@ def _shown(name: str, value: float) -> str:
     if math.isinf(value):
         return OFF
     return f"{value:.{DIGITS}g}{' s' if name.startswith('T') else ''}"
-
-
-def _check(gain: float, integral: float, derivative: float) -> None:
-    finite("Kc", gain)
-    finite("Td", derivative)
-    if math.isnan(integral) or integral == 0.0:
-        raise ValueError(f"Ti={integral}: give an integral time other than zero, inf for none")

@@ -10,9 +10,9 @@ from typing import Any
 from deadtime.estimation import PlantEstimate
 from deadtime.loops import Controller, ControlLoop
 from deadtime.tuning._design import design
+from deadtime.tuning._found_plants import possible_loops
 from deadtime.tuning._gate import LARGEST_CHANGE, LARGEST_SENSITIVITY, check_gains
 from deadtime.tuning._result import Design
-from deadtime.tuning.proposal._possible import possible_loops
 
 #: Least gain of an integrating plant that is tried, as a share of the largest. Larger: slow
 #: integrals are left out; smaller: their responses take long to come to rest.
@@ -72,10 +72,9 @@ def wanted_gains(
     demands: Mapping[str, Any],
 ) -> Gains:
     """The best gains for all plants that an estimate leaves possible, one step from the flown."""
-    likeliest = fit.loop(template, sample_time=sample_time, limit=limit)
-    loops = tuple(possible_loops(fit, likeliest, level))
+    loops = tuple(possible_loops(fit, template, level, sample_time, limit))
     where = {"ranges": _ranges(fit, template)} | dict(demands)
-    found = design(likeliest, controller=template, plants=loops[1:], **where)
+    found = design(loops[0], controller=template, plants=loops[1:], **where)
     chosen, remarks = _one_step(found.loop.controller, flown)
     if fit.verdict != "reliable":
         remarks = (f"Set aside: the estimate is an indication, {fit.reason}.", *remarks)
