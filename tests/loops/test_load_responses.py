@@ -212,3 +212,25 @@ def test_steady_states_count_loads():
     found = loop.simulate(np.linspace(0.0, 60.0, 61), 1.0, load=0.5, output_disturbance=0.2)
     assert found.steady_state == pytest.approx(found.outputs[-1], abs=1e-9)
     assert loop.simulate(TIMES, 1.0, noise=0.1).steady_state is None
+
+
+@pytest.mark.parametrize("name", ["reference", "output_disturbance", "noise"])
+@pytest.mark.parametrize("sample_time", [None, 0.1])
+@pytest.mark.parametrize("kind", [dtm.PD, dtm.PV, dtm.PID])
+def test_an_ideal_derivative_sees_the_rate_of_a_smooth_input(name, sample_time, kind):
+    """As the limit of filters whose corner goes to infinity: the error falls with it."""
+    gains = (1.0, 0.1, 0.5) if kind is dtm.PID else (1.0, 0.5)
+    times = np.linspace(0.0, 5.0, 26)
+    given = {"reference": 0.0} | {name: lambda t: np.sin(t) ** 2}
+
+    def outputs(smooth):
+        controller = kind(*gains, smooth)
+        loop = dtm.ControlLoop(
+            dtm.FirstOrder(2.0, 10.0), controller, delay=2.0, sample_time=sample_time
+        )
+        return loop.simulate(times, **given).outputs
+
+    ideal = outputs(None)
+    errors = [np.abs(outputs(dtm.DerivativeFilter(w, 0.7)) - ideal).max() for w in (200.0, 2000.0)]
+    assert errors[1] < 2e-3
+    assert errors[1] < 0.2 * errors[0]

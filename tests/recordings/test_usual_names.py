@@ -70,6 +70,15 @@ def test_milliseconds_are_not_taken_for_seconds(tmp_path):
         read(tmp_path, table("Time (ms),y,u"))
 
 
+def test_stamps_that_are_no_seconds_since_1970_are_refused():
+    rows = np.arange(20.0)
+    table = {"Timestamp": 1.7e12 + 1e3 * rows, "pv": rows, "op": rows % 5}
+    with pytest.raises(dtm.RecordingError, match="which is no time in seconds"):
+        dtm.read_recording(table, command="auto")
+    table["Timestamp"] *= 1e-3
+    assert len(dtm.read_recording(table, command="auto")) == 20
+
+
 def test_a_reference_or_a_command_has_to_be_there(tmp_path):
     assert not read(tmp_path, table("t,u,y")).has_reference
     # Where there is no reference the command is read unasked.
@@ -117,3 +126,9 @@ def test_times_that_repeat_often_or_go_back_are_refused(tmp_path):
         read(tmp_path, table("t,y,u", lambda row: str(row // 2)))
     with pytest.raises(dtm.RecordingError, match="line 12: the time goes back"):
         read(tmp_path, table("t,y,u", lambda row: str(5 if row == 10 else row)))
+
+
+@pytest.mark.parametrize("stamp", ["01/05/2026 08:00:00 AM", "8:00:00"])
+def test_other_dates_are_refused_with_the_one_that_is_read(tmp_path, stamp):
+    with pytest.raises(dtm.RecordingError, match="write a date as 2026-01-31 08:00:00"):
+        read(tmp_path, table("Timestamp,PV,OP", lambda _: stamp))

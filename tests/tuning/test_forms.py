@@ -228,6 +228,11 @@ UNREADABLE = [
     ("set p_roll = 45\nset d_roll = 40\nset d_min_roll = 30", "betaflight", "roll rate", "moves"),
     ("set p_roll = many", "betaflight", "roll rate", "give a number"),
     ("Kc = 1\nTx = 3", "ideal", "", "no number of the form"),
+    ("Kc = 1.2\nTi = 40,5", "ideal", "", "Ti = 40,5: give one number a line"),
+    ("Kc = 1.2\nTi = 2 min", "ideal", "", "times in seconds"),
+    ("Kc=2 Ti=10", "series", "", "one number a line"),
+    ("Kc = 2\nb = 0.5", "ideal", "", "a P has no b"),
+    ("Kc = 2\nTi = 4 %", "ideal", "", "Ti is not in %"),
 ]
 
 
@@ -235,6 +240,15 @@ UNREADABLE = [
 def test_what_cannot_be_read_is_refused(text, form, loop, why):
     with pytest.raises(ValueError, match=re.escape(why)):
         controller_of(text, form, loop=loop)
+
+
+def test_lines_of_a_faceplate_are_read_with_their_units():
+    text = "Kc = 1.2\nTi = 40 s\nTd = off\nb = 0.5\nPB = 50 %"
+    assert controller_of(text, "ideal") == dtm.PI(1.2, 0.03, weight=0.5)
+    assert controller_of("Kc: 2\nTi: off", "ideal") == dtm.P(2.0)
+    assert "-0" not in " ".join(settings_of(dtm.PI(-1.0, -0.1), "ideal").lines)
+    with pytest.raises(ValueError, match="that of no vehicle; leave version out"):
+        settings_of(dtm.P(1.0), "ideal", version="4.7")
 
 
 def test_notes_say_what_the_firmware_does_otherwise():

@@ -47,6 +47,41 @@ def test_each_refusal_has_its_reason(gains, options, reason):
     assert any(re.search(reason, text) for text in found.reasons), found.reasons
 
 
+def test_a_limit_on_one_side_passes_in_the_direction_that_it_leaves():
+    loop = dtm.ControlLoop(dtm.FirstOrder(2.0, 10.0), dtm.PI(1.0, 0.1), delay=2.0, limit=(0.0, 1.0))
+    found = dtm.check_gains(loop, {"Kp": 1.1})
+    assert found.passed
+    assert "limit" in found.checked
+    assert dtm.check_gains(loop.replace(limit=(-1.0, 0.0)), {"Kp": 1.1}).passed
+    # Half of the range counts for the noise.
+    loud = dtm.check_gains(loop, {"Kp": 1.1}, noise=0.1)
+    assert re.search(r"noise on the command .* of the limit", loud.reasons[0])
+
+
+@pytest.mark.parametrize(
+    ("gains", "options", "reason"),
+    [
+        ({"Kp": 1.1, "delay": 0.01}, {}, "delay=0.01 is no gain of the controller: Kp"),
+        ({"Kp": 1.1}, {"flown": {"kp": 0.1}}, "flown has 'kp', which is no gain: Kp, Ki"),
+        ({"Kp": 1.1}, {"noise": float("nan")}, "noise=nan"),
+        ({"Kp": 1.1}, {"noise": 0.1, "bandwidth": -3.0}, "bandwidth=-3"),
+        ({"Kp": 1.1}, {"noise_share": -1.0}, "noise_share=-1"),
+    ],
+)
+def test_what_cannot_be_checked_is_no_gate(gains, options, reason):
+    with pytest.raises(ValueError, match=reason):
+        dtm.check_gains(LOOP, gains, **options)
+
+
+def test_a_derivative_has_two_names_and_what_is_left_out_has_changed():
+    smooth = dtm.DerivativeFilter(60.0)
+    loop = LOOP.replace(controller=dtm.PV(1.5, 0.1, smooth))
+    found = dtm.check_gains(loop, {"Kp": 1.5}, flown=dtm.PD(1.5, 0.02, smooth))
+    assert any("Kd changes from 0.02 to 0.1" in reason for reason in found.reasons)
+    found = dtm.check_gains(LOOP, {"Kp": 1.5}, flown=dtm.PD(1.5, 0.02, smooth))
+    assert any("Kd changes from 0.02 to 0" in reason for reason in found.reasons)
+
+
 def test_hidden_modes_are_refused():
     # (s - 0.1)/((s - 0.1)(s + 1)): the loop does not show the pole at 0.1.
     plant = dtm.RationalPlant([1.0, -0.1], np.convolve([1.0, -0.1], [1.0, 1.0]).tolist())
@@ -74,7 +109,7 @@ def test_an_estimate_must_be_reliable_or_set_aside():
     unsure = fit.doubted("made up")
     found = dtm.check_gains(unsure, {"Kp": 1.4})
     assert not found.passed
-    assert "no reliable one" in found.reasons[0]
+    assert "is not reliable" in found.reasons[0]
     found = dtm.check_gains(unsure, {"Kp": 1.4}, override=True)
     assert found.passed
     assert "made up" in found.overridden[0]

@@ -39,8 +39,8 @@ def command(
     loop: str | None = None,
     firmware: str = "",
     kp: float | None = None,
-    ki: float = 0.0,
-    kd: float = 0.0,
+    ki: float | None = None,
+    kd: float | None = None,
     spans: opt.Ends | None = None,
     filter: float | None = None,  # noqa: A002
     weight: float | None = None,
@@ -121,8 +121,9 @@ def command(
     with stages(1, quiet=as_json) as begin:
         begin("estimating and designing")
         if is_log:
-            own = {"window": part, "plant": plant, "kp": kp, "firmware": firmware, "spans": spans}
-            _refuse({**columns, **own, "sample-time": sample_time, "limit": limit})
+            own = {"window": part, "plant": plant, "firmware": firmware, "spans": spans}
+            gains = {"kp": kp, "ki": ki, "kd": kd}
+            _refuse({**columns, **own, **gains, "sample-time": sample_time, "limit": limit})
             found = tune_loop(
                 open_log(path, flight=flight),
                 loop,
@@ -132,6 +133,8 @@ def command(
                 **demands,
             )
         else:
+            if flight is not None:
+                raise ValueError("--flight is for the log of a vehicle: a table has no flights")
             columns["command"] = columns["command"] or "auto"
             found = tune(
                 read_recording(path, **columns),
@@ -172,17 +175,22 @@ def _template(
     return made
 
 
-def _flown(kind: Kind | None, kp: float | None, ki: float, kd: float) -> Controller | None:
+def _flown(
+    kind: Kind | None, kp: float | None, ki: float | None, kd: float | None
+) -> Controller | None:
     """The controller that was in use, by its gains."""
     if kp is None:
+        if ki is not None or kd is not None:
+            raise ValueError("--ki and --kd are gains that were in use: give --kp with them")
         return None
+    ki, kd = ki or 0.0, kd or 0.0
     return PV(kp, kd) if kind == "PV" else ParallelForm(kp, ki, kd).controller()
 
 
 def _refuse(given: Given) -> None:
     """Refuse what a log says itself."""
     for name, value in given.items():
-        if value:
+        if value not in (None, "", False):
             raise ValueError(f"--{name} is for a table: a log of a vehicle says this itself")
 
 

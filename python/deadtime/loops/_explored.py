@@ -49,8 +49,8 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
     shown = {"weight", "tracking_time"} if known in ("PI", "PID") else set()
     if loop.rate_limit is not None or not shown.issuperset(controller._extras):
         raise ValueError(
-            "the explorer shows no rate limit, no feed-forward and no weight of a derivative: leave "
-            "them out"
+            "the explorer shows no rate limit, no feed-forward and no weight of a derivative: "
+            "leave them out"
         )
     if known not in ("P", "PI", "PD", "PV", "PID"):
         raise ValueError(f"{known}: the explorer shows P, PI, PD, PV and PID controllers")

@@ -307,11 +307,12 @@ class LoopInTime:
             "reads its reference at samples and sees no impulse: use "
             "continuous().impulse_response()"
         )
-        if loop.limit is not None:
-            raise ValueError(
-                f"limit={loop.limit}: the command that an impulse causes is beyond any limit; "
-                "leave it out with loop.replace(limit=None)"
-            )
+        for name in ("limit", "rate_limit"):
+            if getattr(loop, name) is not None:
+                raise ValueError(
+                    f"{name}={getattr(loop, name)!r}: the command that an impulse causes is beyond "
+                    f"any limit; leave it out with loop.replace({name}=None)"
+                )
         found = loop.transfer("output").impulse_response(time)
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
 

@@ -133,7 +133,10 @@ def asked(
     height = finite("size", size)
     if height == 0.0:
         raise ValueError("size=0: there is no load, give a number other than zero")
-    question = DeviationQuestion(load_of(at), height, positive("settling", settling))
+    band = positive("settling", settling)
+    if band >= 1.0:
+        raise ValueError(f"settling={settling}: give a share of the largest deviation, below 1")
+    question = DeviationQuestion(load_of(at), height, band)
     if time is None:
         return question, None
     given = real_array("time", time)

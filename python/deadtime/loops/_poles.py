@@ -20,6 +20,12 @@ from deadtime.roots import (
 )
 from deadtime.roots.certificate import Certificate
 
+#: Numbers of a loop that move no pole of it.
+MOVES_NO_POLE = (
+    "limit", "limit_low", "limit_high", "rate_limit", "tracking_time", "weight",
+    "derivative_weight", "feed_forward",
+)  # fmt: skip
+
 
 class LoopPoles:
     """The poles of a `ControlLoop`; its limit is left out throughout."""
@@ -277,7 +283,7 @@ class LoopPoles:
         Parameters
         ----------
         name : str
-            One of `parameters`, but not ``limit``.
+            One of `parameters` that moves a pole: no limit, no weight of the reference.
 
         Returns
         -------
@@ -313,10 +319,10 @@ class LoopPoles:
         """
         loop = self.specification
         values = loop.parameters
-        if name not in values or name == "limit":
+        if name not in values or name in MOVES_NO_POLE:
             raise ValueError(
                 f"{name!r} is not a number whose range can be sought: choose one of "
-                f"{', '.join(known for known in values if known != 'limit')}"
+                f"{', '.join(known for known in values if known not in MOVES_NO_POLE)}"
             )
         if not self.is_stable():
             raise ValueError(

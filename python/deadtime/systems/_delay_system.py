@@ -231,13 +231,17 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         """
         return self.transfer_function(output, input).margin()
 
-    def hinf_norm(self, output: int = 0, input: int = 0) -> float:  # noqa: A002
+    def hinf_norm(
+        self,
+        output: int | None = None,
+        input: int | None = None,  # noqa: A002
+    ) -> float:
         """Largest gain from one input to one output over all frequencies.
 
         Parameters
         ----------
-        output, input : int, default 0
-            Which ones, from zero.
+        output, input : int, optional
+            Which ones, from zero; to be given where there are several.
 
         Returns
         -------
@@ -247,7 +251,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         Raises
         ------
         ValueError
-            As in `characteristic` and in `TransferFunction.hinf_norm`.
+            As in `characteristic` and in `TransferFunction.hinf_norm`; also if there are several
+            inputs or outputs and none is chosen, since the norm over all of them is another number.
         IndexError
             If there is no such input or output.
 
@@ -257,7 +262,16 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         >>> round(dtm.DelaySystem({0.36: -2.0}, {0.36: 2.0}).hinf_norm(), 4)
         1.3002
         """
-        return self.transfer_function(output, input).hinf_norm()
+        for name, chosen, count in (
+            ("output", output, self.n_outputs),
+            ("input", input, self.n_inputs),
+        ):
+            if chosen is None and count > 1:
+                raise ValueError(
+                    f"the system has {count} {name}s: choose one by {name}=; the norm from all "
+                    "inputs to all outputs is not computed"
+                )
+        return self.transfer_function(output or 0, input or 0).hinf_norm()
 
     def zeros(
         self,

@@ -73,11 +73,19 @@ def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:
     if loop.sample_time is not None:
         half = math.pi / loop.sample_time
         return half if bandwidth is None else min(bandwidth, half)
+    if bandwidth is not None:
+        return bandwidth
     late = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0)
-    return bandwidth or _BANDWIDTH / (late or 1.0)
+    return _BANDWIDTH / (late or 1.0)
 
 
-def largest_command(loop: ControlLoop) -> float:
-    """The largest size of the command in both directions; inf without a limit."""
+def half_range(loop: ControlLoop) -> float:
+    """Half of the range of the command; inf without a limit, or with one on one side alone."""
     low, high = loop.specification.bounds
-    return min(-low, high)
+    return 0.5 * (high - low)
+
+
+def limit_in_words(loop: ControlLoop) -> str:
+    """The limit of the command: one number where both bounds are alike."""
+    low, high = loop.specification.bounds
+    return f"{high:g}" if high == -low else f"{low:g} to {high:g}"

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from deadtime._base.frozen import ReadOnlyArrays
-from deadtime._base.validation import finite, positive
+from deadtime._base.validation import non_negative, positive
 from deadtime.estimation import DelayEstimate, PlantEstimate
 from deadtime.loops import Controller, ControlLoop
-from deadtime.tuning._demands import largest_command, white_to
+from deadtime.tuning._demands import half_range, limit_in_words, white_to
 from deadtime.tuning._found_plants import possible_loops, refusal
 from deadtime.tuning._native import noise_gain
 from deadtime.tuning._region import NUMBERS, region_of
@@ -27,6 +27,9 @@ LARGEST_SENSITIVITY = 2.0
 
 #: Largest standard deviation of the noise on the command, as a share of the limit.
 LARGEST_NOISE = 0.1
+
+#: What gains are called.
+GAINS = ("Kp", "Ki", "Kd", "Kv")
 
 #: A mode that does not show in the loop gain is hidden where pole and zero agree to this part; one
 #: is slow where it is nearer to the axis than this part of the crossover.
@@ -113,7 +116,8 @@ def check_gains(
     gains : Controller or mapping of str to float
         What is to be set. A mapping changes gains of the loop's controller.
     flown : Controller or mapping of str to float, optional
-        The gains that the machine has now: those of the loop of an estimate if not given.
+        The gains that the machine has now: those of the loop of an estimate if not given. A gain
+        that it does not have yet is not compared.
     loops : sequence of ControlLoop, optional
         Further plants that the gains must hold for.
     max_sensitivity : float
@@ -141,7 +145,8 @@ def check_gains(
     Raises
     ------
     ValueError
-        If the delay of a loop is not known, or a number is out of its range.
+        If the delay of a loop is not known, a number is out of its range, or a mapping names what
+        is no gain.
     TypeError
         If `of` is neither an estimate nor a loop.
 
@@ -161,7 +166,11 @@ def check_gains(
     judge.hidden_modes(loop)
     judge.limit(every, amplitude)
     size = noise if noise is not None else _noise_of(of)
-    judge.noise(every, size, finite("noise_share", noise_share), bandwidth)
+    if size is not None:
+        size = non_negative("noise", size)
+    if bandwidth is not None:
+        positive("bandwidth", bandwidth)
+    judge.noise(every, size, positive("noise_share", noise_share), bandwidth)
     if flown is None and not isinstance(of, PlantEstimate):
         flown = (of.loop if isinstance(of, DelayEstimate) else of).controller
     if flown is not None:
@@ -214,7 +223,7 @@ class _Judge:
         """Note why an estimate cannot be relied on, if it cannot."""
         self.checked.append("estimate")
         if why is not None:
-            reason = f"the estimate is no reliable one: {why}"
+            reason = f"the estimate is not reliable: {why}"
             (self.overridden if override else self.reasons).append(reason)
 
     def loops_of(
@@ -319,12 +328,9 @@ class _Judge:
         self.checked.append("limit")
         for loop in bounded:
             command = loop.specification.command_at_rest(1.0)
-            height = amplitude
-            if height is None:
-                most = largest_command(loop)
-                # An integrator rests at any output: the step that the gain drives to the limit.
-                need = abs(command) if command else max(map(abs, loop.controller.gains.values()))
-                height = 0.5 * most / need if need else 1.0
+            # An integrator rests at any output: the step that the gain drives to the limit.
+            need = command or max(loop.controller.gains.values(), key=abs)
+            height = _largest_step(loop, need) if amplitude is None else amplitude
             try:
                 settled = loop.step_response(amplitude=height).info()["settling_time"]
             except ValueError:
@@ -332,7 +338,7 @@ class _Judge:
             if not math.isfinite(settled):
                 self.reasons.append(
                     f"a step of {height:.3g} does not come to rest within the limit of "
-                    f"{largest_command(loop):g} with {_told(loop)}"
+                    f"{limit_in_words(loop)} with {_told(loop)}"
                 )
                 return
 
@@ -348,7 +354,7 @@ class _Judge:
             return
         gains = [noise_gain(loop.specification.kernel, white_to(loop, bandwidth)) for loop in every]
         self.on_command = max(gains) * size
-        limit = largest_command(every[0])
+        limit = half_range(every[0])
         if math.isinf(limit):
             return
         self.checked.append("noise")
@@ -365,9 +371,13 @@ class _Judge:
         """No gain changes by more than a factor, or its sign."""
         self.checked.append("change")
         before = flown.gains if isinstance(flown, Controller) else dict(flown)
-        for name, now in loop.controller.gains.items():
-            was = before.get(name)
-            if was is None or was == now:
+        for name in before:
+            if name not in GAINS:
+                raise ValueError(f"flown has {name!r}, which is no gain: {', '.join(GAINS)}")
+        after = _by_term(loop.controller.gains)
+        for name, was in _by_term(before).items():
+            now = after.get(name, 0.0)
+            if was == now:
                 continue
             told = f"from {was:.4g} to {now:.4g}"
             if was * now < 0.0:
@@ -376,14 +386,35 @@ class _Judge:
                 self.reasons.append(f"{name} changes {told}, by more than a factor of {most:g}")
 
 
+def _by_term(gains: Mapping[str, float]) -> dict[str, float]:
+    """Gains by their term: that of a derivative has two names."""
+    return {"Kd" if name == "Kv" else name: value for name, value in gains.items()}
+
+
 def _with(loop: ControlLoop, gains: Controller | Mapping[str, float]) -> ControlLoop:
     if isinstance(gains, Controller):
         return loop.replace(controller=gains)
+    own = loop.controller.gains
+    for name, value in gains.items():
+        if name not in own:
+            raise ValueError(f"{name}={value!r} is no gain of the controller: {', '.join(own)}")
     return loop.replace(**gains)
+
+
+def _largest_step(loop: ControlLoop, need: float) -> float:
+    """Half of the largest step with a rest within the limit; a step of 1 needs `need`."""
+    low, high = loop.specification.bounds
+    if need == 0.0:
+        return 1.0
+    down, up = sorted((low / need, high / need))
+    most = up if up >= -down else down
+    return 0.5 * most if math.isfinite(most) else 1.0
 
 
 def _noise_of(of: ControlLoop | DelayEstimate | PlantEstimate) -> float | None:
     """The standard deviation of the measurement noise by an estimate, where it has one."""
+    if isinstance(of, PlantEstimate):
+        return of.noise_std if math.isfinite(of.noise_std) else None
     if isinstance(of, DelayEstimate) and of.noise is not None:
         return of.noise.white
     return None

@@ -8,8 +8,6 @@ from functools import cached_property
 from math import isfinite, nan
 from typing import NamedTuple
 
-import numpy as np
-
 from deadtime._base.arrays import Array
 from deadtime._base.digits import between
 from deadtime._base.drawing import Figure
@@ -18,6 +16,7 @@ from deadtime._base.notebook import Pictured
 from deadtime.loops import Controller, ControlLoop, Explorer, explorer_of
 from deadtime.stability import StabilityMap
 from deadtime.tuning._candidates import Scenario
+from deadtime.tuning._demands import limit_in_words
 from deadtime.tuning._gate import Gate, gate_of_loops
 from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._region import ConfidenceRegion
@@ -259,7 +258,7 @@ class Design(ReadOnlyArrays, Pictured):
         step = f"settles in {settled:.3g} s" if isfinite(settled) else "not proved to settle"
         step += f", overshoot {info['overshoot']:.2g} %, peak command {info['peak_command']:.3g}"
         if self.loop.limit is not None:
-            step += f", {info['time_at_limit']:.2g} s at the limit of {_shown(self.loop.limit)}"
+            step += f", {info['time_at_limit']:.2g} s at the limit of {limit_in_words(self.loop)}"
         lines = [
             f"{type(self.loop.controller).__name__}: {gains}",
             f"worst {over}: {figure_in_words(self.objective, self.value)}; spectral abscissa "
@@ -293,10 +292,6 @@ class Design(ReadOnlyArrays, Pictured):
         from deadtime.tuning._plots import plot_design
 
         return plot_design(self)
-
-
-def _shown(limit: float | tuple[float, float]) -> str:
-    return " to ".join(f"{bound:g}" for bound in np.atleast_1d(limit))
 
 
 def _in_words(region: ConfidenceRegion) -> str:

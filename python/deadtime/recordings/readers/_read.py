@@ -8,6 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from deadtime._base.errors import RecordingError
 from deadtime._base.validation import OpenRange, Range, open_interval
 from deadtime.recordings._first_bytes import HEAD, format_of, opened, whole
@@ -20,6 +23,9 @@ from deadtime.recordings.readers._mat73 import mat73_file
 from deadtime.recordings.readers._tables import LABEL, table_in_memory
 from deadtime.recordings.readers._text import as_text, not_text
 from deadtime.recordings.readers._usual import chosen_columns
+
+#: Latest time in s, the year 5138 if it counts from 1970: later ones are of a smaller unit.
+LATEST = 1e11
 
 #: From the label of a table and the names of its columns to the name for each signal.
 Choice: TypeAlias = Callable[[object, Sequence[str]], dict[str, str]]
@@ -122,6 +128,7 @@ def read_recording(
             raise ValueError(f"delimiter={delimiter!r}: a table in memory has none; leave it out")
         table = table_in_memory(source)
         columns = read_table(table, choose(LABEL, table.names), ends)
+    _refuse_other_units(label, columns["time"])
     try:
         recording = Recording(
             columns["time"],
@@ -140,6 +147,16 @@ def read_recording(
             "step; choose another column or window, or name the column of the command"
         )
     return recording
+
+
+def _refuse_other_units(label: str, time: NDArray[np.float64]) -> None:
+    """Refuse stamps that are milliseconds or shorter since 1970."""
+    first = float(np.ma.getdata(time)[0]) if time.size else 0.0
+    if first > LATEST:
+        raise RecordingError(
+            f"{label}: the time begins at {first:.6g}, which is no time in seconds since 1970. "
+            "Divide milliseconds by 1000, microseconds by a million"
+        )
 
 
 def _from_file(

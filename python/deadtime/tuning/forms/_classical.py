@@ -36,8 +36,9 @@ DIGITS = 4
 
 SOURCE = "Åström and Hägglund 2006, section 3.2"
 
-#: A line such as ``Ti = 40 s``.
-LINE = re.compile(r"^\s*(\w+)\s*[=:]\s*(\S+)", re.M)
+#: A line such as ``Ti = 40 s``, and what stands behind its sign.
+LINE = re.compile(r"^\s*(\w+)\s*[=:]\s*(.*?)\s*$", re.M)
+VALUE = re.compile(r"([-+0-9.eE]+|off)\s*(s|%|)", re.I)
 
 #: What the weights of the set point and the time of back-calculation are called.
 WEIGHTS = {"weight": "b", "derivative_weight": "c", "tracking_time": "Tt"}
@@ -308,8 +309,7 @@ def write(controller: Controller, form: str, spans: tuple[float, float] | None) 
 
 def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = False) -> Controller:
     """The controller of typed numbers."""
-    text = given.replace(OFF, "inf") if isinstance(given, str) else given
-    values = numbers_from(text, form, LINE)
+    values = _numbers(given, form) if isinstance(given, str) else numbers_from(given, form, LINE)
     kind = FORMS[form]
     names = kind.__dataclass_fields__
     unknown = [name for name in values if name not in (*names, *WEIGHTS.values(), FILTER, "PB")]
@@ -324,11 +324,37 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
     weights: Any = {name: values[short] for name, short in WEIGHTS.items() if short in values}
     if "tracking_time" in weights:
         weights["anti_windup"] = BackCalculation(weights.pop("tracking_time"))
-    return controller_from(*parts[:3], smooth if parts[2] else None, on_measurement, **weights)
+    made = controller_from(*parts[:3], smooth if parts[2] else None, on_measurement, **weights)
+    for name, short in WEIGHTS.items():
+        if short in values and name not in made.parameters:
+            raise ValueError(f"{short} = {values[short]:g}: a {type(made).__name__} has no {short}")
+    return made
+
+
+def _numbers(text: str, form: str) -> dict[str, float]:
+    """Values by name of lines of text; other lines are skipped, and what is no number refused."""
+    found = {}
+    for name, told in LINE.findall(text):
+        match = VALUE.fullmatch(told)
+        try:
+            if match is None:
+                raise ValueError
+            value, unit = match[1].lower(), match[2]
+            off = math.inf if name == "Ti" else 0.0
+            found[name] = off if value == OFF else float(value)
+        except ValueError:
+            raise ValueError(
+                f"{name} = {told}: give one number a line, times in seconds, such as {name} = 40.5"
+            ) from None
+        if (unit == "%") != (name == "PB") and unit:
+            raise ValueError(f"{name} = {told}: {name} is not in {unit}")
+    if not found:
+        raise ValueError(f"no line of the text is one of the form {form!r}: {text[:60]!r}")
+    return found
 
 
 def _typed(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+    return float(f"{value:.{DIGITS}g}") + 0.0  # no -0
 
 
 def _shown(name: str, value: float) -> str:

@@ -65,7 +65,7 @@ def settings_of(
     """
     if not isinstance(controller, Controller):
         raise TypeError(f"controller={controller!r}: give P, PV, PD, PI or PID")
-    _check(form, loop)
+    _check(form, loop, version)
     if form in _classical.FORMS:
         return _classical.write(controller, form, spans)
     if spans is not None:
@@ -79,7 +79,7 @@ def settings_of(
 
 def check_form(controller: Controller, form: Form, loop: str, version: str = "") -> None:
     """Refuse a form that cannot express a controller of this kind, before its gains are known."""
-    _check(form, loop)
+    _check(form, loop, version)
     if form == "betaflight":
         _betaflight.check(controller)
     elif form not in _classical.FORMS:
@@ -125,7 +125,7 @@ def controller_of(
     >>> controller_of("ATC_RAT_RLL_P,0.135\nATC_RAT_RLL_I,0.09", "ardupilot", loop="roll rate")
     PI(Kp=0.135, Ki=0.09)
     """
-    _check(form, loop)
+    _check(form, loop, version)
     if form in _classical.FORMS:
         return _classical.read(settings, form)
     if form == "betaflight":
@@ -143,11 +143,15 @@ LOOPS_OF_FORMS: dict[str, tuple[str, ...]] = {
 }
 
 
-def _check(form: str, loop: str) -> None:
+def _check(form: str, loop: str, version: str) -> None:
     if form not in get_args(Form):
         raise ValueError(f"form={form!r} is not one of {', '.join(get_args(Form))}")
-    if form in _classical.FORMS and loop:
-        raise ValueError(f"loop={loop!r}: the form {form!r} is that of no vehicle; leave loop out")
+    if form in _classical.FORMS:
+        for name, value in (("loop", loop), ("version", version)):
+            if value:
+                raise ValueError(
+                    f"{name}={value!r}: the form {form!r} is that of no vehicle; leave {name} out"
+                )
     if form in LOOPS_OF_FORMS and loop not in LOOPS_OF_FORMS[form]:
         raise ValueError(
             f"loop={loop!r}: the loops of {form} are {', '.join(LOOPS_OF_FORMS[form])}"

@@ -99,7 +99,7 @@ def controller_from(
     on_measurement: bool = False,
     **weights: float,
 ) -> Controller:
-    """The simplest controller with these gains; weights are those of PI and PID."""
+    """The simplest controller with these gains; weights are those of PD, PI and PID."""
     if derivative == 0.0:
         if integral == 0.0:
             return P(proportional)
@@ -108,8 +108,10 @@ def controller_from(
         if on_measurement:
             weights["derivative_weight"] = 0.0
         return PID(proportional, integral, derivative, smooth, **weights)
-    kind = PV if on_measurement else PD
-    return kind(proportional, derivative, smooth)
+    if on_measurement:
+        return PV(proportional, derivative, smooth)
+    weights.pop("anti_windup", None)
+    return PD(proportional, derivative, smooth, **weights)
 
 
 def weights_of(controller: Controller) -> tuple[float, float]:

@@ -18,6 +18,9 @@ from deadtime.tuning._result import Design
 #: integrals are left out; smaller: their responses take long to come to rest.
 LEAST = 2e-3
 
+#: Largest relative change of Ms by that of a gain: at an Ms of 3 it is about twice the latter.
+ROUNDED = 3.0
+
 #: Change of a gain, as a share, that is not worth a sentence.
 SAME = 1e-3
 
@@ -95,7 +98,7 @@ def refusals(
         typed,
         flown=typed if flown is None else flown,
         loops=gains.loops[1:],
-        max_sensitivity=max(LARGEST_SENSITIVITY, most or 0.0),
+        max_sensitivity=max(LARGEST_SENSITIVITY, most or 0.0) * (1.0 + ROUNDED * rounding),
         largest_change=LARGEST_CHANGE * (1.0 + rounding),
         noise=fit.noise_std,
     )
@@ -123,6 +126,11 @@ def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller,
     gains = wanted.gains
     for name, gain in wanted.gains.items():
         if old := flown.gains.get(name, 0.0):
+            if old * gain < 0.0:
+                raise ValueError(
+                    f"{name} = {old:g} was in use, and this plant needs {gain:.3g}, of the other "
+                    "sign: check the signs of command and measurement"
+                )
             low, high = sorted((old / LARGEST_CHANGE, old * LARGEST_CHANGE))
             gains[name] = min(max(gain, low), high)
     changed = [

@@ -75,8 +75,8 @@ impl ControlLoop {
         update: Option<Update>,
         values: &Values<S>,
     ) -> Result<LinearLoop<S>, Error> {
-        let made = LinearLoop::new(equations, values.delay, values.sample_time, values.limit);
-        let mut made = made?;
+        let limit = values.limit.filter(|_| values.low.is_none());
+        let mut made = LinearLoop::new(equations, values.delay, values.sample_time, limit)?;
         if let Some(low) = values.low {
             let high = values.limit.unwrap_or_else(|| S::from(f64::INFINITY));
             made = made.with_bounds(low, high)?;

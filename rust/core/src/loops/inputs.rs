@@ -70,7 +70,9 @@ fn add(
         }
         for next in place..place + degree {
             a[next * side + next + 1] = 1.0;
-            equations.k.push(0.0);
+            // The ideal derivative of the input itself, whose rate is the second state.
+            let of_rate = if next == place { column.impulse } else { 0.0 };
+            equations.k.push(of_rate);
             equations.c.push(0.0);
             equations.impulses.push(0.0);
         }

@@ -67,7 +67,7 @@ pub(super) fn overshoot(of: &ControlLoop, span: f64, task: &Task) -> Result<f64,
 
 fn without_limit(of: &ControlLoop) -> ControlLoop {
     let mut values = of.values().clone();
-    values.limit = None;
+    (values.limit, values.low, values.rate) = (None, None, None);
     of.with(values)
 }
 
@@ -105,8 +105,8 @@ pub(super) fn steepest(
         made.with_number(Place::Controller(i), 0.0)
     });
     let mut values = open.values().clone();
-    (values.limit, values.sample_time, values.delay) = (None, None, 0.0);
-    open = open.with(values);
+    (values.sample_time, values.delay) = (None, 0.0);
+    open = without_limit(&open.with(values));
     let linear = open.linear(Input::Load)?;
     let slow = open.slowest_time()?;
     let span = if slow > 0.0 { FIRST * slow } else { 1.0 };

@@ -318,7 +318,14 @@ impl Row<'_> {
                     "is not a number: write a decimal point and no comma".to_owned(),
                 ));
             }
-            Err(NoNumber::Other) => return Err(fault("is not a number".to_owned())),
+            Err(NoNumber::Other) => {
+                let date = if text(cell).contains(['/', ':']) {
+                    ": write a date as 2026-01-31 08:00:00, or give seconds"
+                } else {
+                    ""
+                };
+                return Err(fault(format!("is not a number{date}")));
+            }
         };
         if value.is_infinite() {
             return Err(self.not_finite(name, value));
