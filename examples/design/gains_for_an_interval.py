@@ -2,8 +2,8 @@
 Choose gains for an interval of the delay
 =========================================
 
-``design`` looks for the gains with the fastest settling in the worst case over the interval, with
-a gain margin of at least 2.5 everywhere in it. The summary says what each requirement costs.
+``design`` looks for the gains that settle fastest in the worst case over the interval. The gain
+margin is at least 2.5 everywhere in it. The summary says what each requirement costs.
 """
 
 import deadtime as dtm

@@ -2,9 +2,9 @@
 The delay while flying
 ======================
 
-The delay of a height loop in gusts jumps from 0.20 to 0.32 s. ``online`` shows what is known of it
-at each row from that row and those before; `OnlineEstimator` does the same row by row while the
-loop runs. The dotted line is where the jump was found.
+The delay of a height loop in gusts jumps from 0.20 to 0.32 s. ``online`` shows what each row and
+those before it say of the delay. `OnlineEstimator` does the same while the loop runs. The dotted
+line is where the jump was found.
 """
 
 import deadtime as dtm

@@ -1,10 +1,10 @@
 """
-What an experiment will tell
+What an experiment will show
 ============================
 
 The Cramér-Rao bound before anything is recorded: the smallest standard error that any unbiased
-method can reach. When air moves the vehicle, a longer wait after one step tells nothing more, and
-a pseudo-random square wave tells more with every second.
+method can reach. In wind a longer wait after one step adds nothing. A pseudo-random square wave
+adds information with every second.
 """
 
 import deadtime as dtm

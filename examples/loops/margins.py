@@ -2,8 +2,8 @@
 Gain, phase and delay margin
 ============================
 
-The margins come from the exact frequency response. The delay margin says how many seconds more the
-loop bears, which is the number to compare with a network or a camera that is to be added.
+The margins come from the exact frequency response. The delay margin says how many more seconds of
+delay the loop tolerates. Compare it with the network or the camera that is to be added.
 """
 
 import matplotlib.pyplot as plt

@@ -3,8 +3,8 @@ Gains for every delay of an interval
 ====================================
 
 The delay of a real loop is known up to an interval. ``robust_map`` proves for each cell that the
-loop is stable for all delays of the interval, or that it is not for some; ``largest_stable_box``
-finds a rectangle of gains that is safe as a whole.
+loop is stable for all delays of the interval, or that it is unstable for some.
+``largest_stable_box`` finds a rectangle of gains that is safe as a whole.
 """
 
 import deadtime as dtm

@@ -3,7 +3,7 @@ A boiler: are gains for a dead time safe for many lags?
 =======================================================
 
 **Question.** The steam of a boiler follows its burner through four equal lags, without a dead time.
-An estimate describes it by a dead time and two lags. Are PI gains for that estimate safe?
+An estimate describes it by a dead time and two poles. Are PI gains for that estimate safe?
 
 **Data.** A bump test, made by the first lines of the script: time (s), burner (%) and pressure
 (bar). The boiler has a gain of 1.5 and four lags of 15 s; the noise is 0.1 bar.

@@ -10,9 +10,9 @@ and an overshoot of 2.30 %. They print no record. The first lines of the script 
 time (s), reference (m) and height (m), with 0.36 s of delay and 2 cm of noise.
 
 **Answer.** The overshoot alone gives 0.360 s by the paper's formula, and 0.369 s if the limit of
-the speed is simulated; neither has an interval. The whole record gives 0.358 s (95 %: 0.349 to
-0.367 s), and the verdict is *reliable*. P control is stable up to a gain of 3.96 at the longest of
-these delays. PV control with Kp = 1.84 and Kv = 0.227 settles in 1.5 s instead of 2.5 s.
+the speed is simulated. Neither number has an interval. The whole record gives 0.358 s (95 %: 0.349
+to 0.367 s), and the verdict is *reliable*. P control is stable up to a gain of 3.96 at the longest
+of these delays. PV control with Kp = 1.84 and Kv = 0.227 settles in 1.5 s instead of 2.5 s.
 
 **Next.** Fly the whole experiment on the emulated drone::
 

@@ -1,4 +1,4 @@
-"""
+r"""
 An Internet loop: can one step measure a delay that varies?
 ===========================================================
 

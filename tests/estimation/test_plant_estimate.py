@@ -247,9 +247,12 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
 
 
 def test_the_picture_has_the_verdict(fit):
-    pytest.importorskip("matplotlib")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
     upper, lower = fit.plot()
     assert upper.get_title().startswith("reliable")
+    # It was drawn on a figure that `pyplot.show()` did not know.
+    assert pyplot.fignum_exists(upper.figure.number)
+    pyplot.close(upper.figure)
     assert lower.get_xlabel() == "time / s"
 
 

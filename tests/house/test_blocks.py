@@ -16,12 +16,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+FENCED = re.DOTALL | re.MULTILINE
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def blocks(page: Path) -> Iterator[str]:
     text = page.read_text(encoding="utf-8")
-    for block in re.findall(r"^```(?:python|pycon|py)\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+    for block in re.findall(r"^```(?:python|pycon|py)\n(.*?)^```", text, FENCED):
         examples = doctest.DocTestParser().get_examples(block)
         source = "".join(example.source for example in examples)
         # The parser drops a line that is nothing but a comment.
@@ -98,13 +99,17 @@ def is_installed(source: str) -> bool:
 
 
 @pytest.mark.parametrize("page", list(without_results()))
-def test_blocks_without_printed_results_run(page, tmp_path, monkeypatch):
+def test_blocks_without_printed_results_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for _, source in blocks(page):
         if is_installed(source):
             exec(compile(source, str(page), "exec"), names)
     assert len(names) > 2
+    # A page whose code prints nothing shows what commands print.
+    if printed := capsys.readouterr().out:
+        for shown in re.findall(r"^```text\n(.*?)^```", page.read_text(encoding="utf-8"), FENCED):
+            assert shown in printed, f"the page shows\n{shown}\nand its code prints\n{printed}"
 
 
 @pytest.mark.parametrize(

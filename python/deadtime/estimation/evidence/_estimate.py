@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from deadtime._base.drawing import Axes, Figure, new_figure
+from deadtime._base.drawing import Axes, Figure, new_figure, shown_rows
 from deadtime._base.notebook import Pictured
 from deadtime._base.plain import plain
 from deadtime.estimation.evidence._causes import Cause, SensorFault
@@ -144,7 +144,7 @@ class PlantEstimate(FoundPlant, Pictured):
         -------
         list of matplotlib.axes.Axes
         """
-        upper, lower = new_figure(7.0, 4.6, rows=2)[1] if ax is None else ax
+        upper, lower = shown_rows(ax, 2)
         time = self.recording.time
         upper.plot(time, self.recording.output, ".", color="0.35", ms=3, label="measured")
         upper.plot(time, self.fitted, lw=1.6, label=self.best.in_words())

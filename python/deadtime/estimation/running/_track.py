@@ -11,7 +11,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array, Mask
 from deadtime._base.digits import between
-from deadtime._base.drawing import Axes, new_figure
+from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.errors import RecordingError
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.verdicts import claimed
@@ -134,8 +134,7 @@ class DelayTrack(ReadOnlyArrays):
         -------
         matplotlib.axes.Axes
         """
-        if ax is None:
-            ax = new_figure()[1]
+        ax = shown_axes(ax)
         shown = np.where(self.known, self.delay, np.nan)
         ax.fill_between(
             self.time, self.low, self.high, where=self.known.tolist(), alpha=0.25, linewidth=0.0
