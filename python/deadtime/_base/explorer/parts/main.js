@@ -41,6 +41,8 @@ async function main() {
 
   function change(numbers) {
     state = completed({ ...state, ...numbers });
+    // What was said of other numbers does not hold.
+    if (Object.keys(numbers).length) $("suggestion").textContent = "";
     if (isDue) return;
     isDue = true;
     requestAnimationFrame(draw);
