@@ -168,7 +168,7 @@ class RecordingView {
   }
 
   show(rows, found) {
-    // As many digits as tell the ends apart.
+    // Enough digits for the ends to differ.
     const digits = (low, high) => Math.min(9, Math.max(3, 1 + Math.ceil(Math.log10(Math.abs(high) / (high - low)))));
     const said = ({ value, low, high }, unit) =>
       found.reliable
