@@ -211,11 +211,25 @@ def test_a_design_is_that_of_python(
     known = dtm.design(dtm.ControlLoop(plant, dtm.P(1.0), delay=0.4), controller=controller)
     slack = 0.1 if controller is dtm.PI else 0.0
     request = numbers(known.loop.replace(weight=1.0) if slack else known.loop)
-    sensitivity, load, weight, *gains = web.call("design", [*request, 1.6, slack])
+    sensitivity, load, weight, *gains = web.call("design", [*request, 1, 0.4, 1.6, slack])
     assert gains == pytest.approx(list(known.gains.values()), rel=1e-6)
     assert sensitivity == pytest.approx(1.6, rel=1e-6)
     assert load == pytest.approx(known.value, rel=1e-6)
     assert weight == pytest.approx(known.loop.controller.weight) if slack else np.isnan(weight)
+
+
+def test_a_design_holds_for_an_interval_of_the_delay(web: WebKernels) -> None:
+    loop = dtm.ControlLoop(dtm.Integrator(0.9, 0.2), dtm.PV(1.0, 0.1), delay=0.4)
+    known = dtm.design(loop, delay=(0.35, 0.5))
+    delays = [3, 0.4, 0.35, 0.5]
+    sensitivity, load, _, *gains = web.call("design", [*numbers(loop), *delays, 1.6, 0.0])
+    assert gains == pytest.approx(list(known.gains.values()), rel=1e-3)
+    assert load == pytest.approx(known.value, rel=1e-3)
+    assert sensitivity == pytest.approx(1.6, rel=1e-6)
+    for late in delays[1:]:
+        late_loop = loop.replace(delay=late, Kp=gains[0], Kv=gains[1])
+        assert late_loop.margin().max_sensitivity <= 1.6 * (1.0 + 1e-6)
+    assert dtm.design(loop).gains["Kp"] > 1.1 * gains[0]
 
 
 #: A request for the roots of a loop, as `Request::control_loop` reads it.

@@ -379,6 +379,31 @@ def test_suggested_gains_are_those_of_the_package(page: Page) -> None:
     assert margin in page.tab.inner_text("#suggestion")
 
 
+def test_what_a_loop_meets_acts_in_the_step(page: Page, tmp_path: Path) -> None:
+    page.choose("#controller", "PI")
+    for name, value in (("weight", "0.5"), ("load", "0.25"), ("Ki", "0.5"), ("limit", "0.75")):
+        page.tab.fill(f"#number-{name}", value)
+        page.tab.keyboard.press("Enter")
+    page.tab.check("#unequal")
+    page.choose("#guard", "tracking")
+    for name, value in (("low", "-0.125"), ("tracking_time", "2")):
+        page.tab.fill(f"#number-{name}", value)
+        page.tab.keyboard.press("Enter")
+    assert page.drawn["state"]["guard"] == "tracking"
+    with page.tab.expect_download() as waiting:
+        page.tab.click("#json")
+    waiting.value.save_as(tmp_path / "loop.json")
+    found = json.loads((tmp_path / "loop.json").read_text())["response"]
+    time = np.array(found["time"])
+    controller = dtm.PI(1.5, 0.5, weight=0.5, anti_windup=2.0)
+    loop = LOOP.replace(controller=controller, limit=(-0.125, 0.75))
+    load = np.where(time >= time[-1] / 2.0, 0.25, 0.0)
+    known = loop.simulate(time, np.ones(time.size), load=load)
+    np.testing.assert_allclose(found["commands"], known.inputs, atol=1e-9)
+    assert known.inputs.max() == 0.75
+    assert known.inputs.min() == -0.125
+
+
 def test_the_roots_fill_their_picture(page: Page) -> None:
     """The rightmost two are not drawn on one line by a chain far away."""
     places = page.tab.evaluate(

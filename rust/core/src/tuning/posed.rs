@@ -83,12 +83,13 @@ pub(super) struct Ray {
 }
 
 impl Posed {
-    /// All gains of one loop for the response to a load, under a largest Ms.
-    pub fn for_loads(of: ControlLoop, max_sensitivity: f64, slack: f64) -> Self {
+    /// All gains for the response to a load, under a largest Ms; the search begins with all loops.
+    pub fn for_loads(loops: Vec<ControlLoop>, max_sensitivity: f64, slack: f64) -> Self {
+        let gains = loops.first().map(|of| of.controller().kind.gains().len());
         Self {
-            first: 1,
-            free: (0..of.controller().kind.gains().len()).collect(),
-            loops: vec![of],
+            first: loops.len(),
+            free: (0..gains.unwrap_or(0)).collect(),
+            loops,
             wish: Wish {
                 load: 1.0,
                 by_integral: false,

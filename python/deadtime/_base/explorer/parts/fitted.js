@@ -102,14 +102,15 @@ function loopOf(loop, found, rows, commands, kernels) {
     limit: loop.limit >= most ? loop.limit : 0,
     interval: [delay.low, delay.high],
     height: size || loop.height,
-    load: 0.2 * most,
+    load: Number((0.2 * most).toPrecision(2)),
   };
   const edge = ultimate(made, kernels);
   if (edge && rows.command) {
     // Those of Skogestad's rules for an integrator, where the file does not show its own.
     const { Kp, omega } = edge;
-    Object.assign(made, { Kp: Kp / 3, Ki: (Kp * omega) / 36, Kd: 0, Kv: 0, omega: 10 * omega });
-    Object.assign(made, { tracking_time: ownTime(made) }, proportional(rows, commands));
+    const begun = { Kp: Kp / 3, Ki: (Kp * omega) / 36, omega: 10 * omega, tracking_time: ownTime(made) };
+    for (const [name, value] of Object.entries(begun)) made[name] = Number(value.toPrecision(3));
+    Object.assign(made, { Kd: 0, Kv: 0 }, proportional(rows, commands));
   }
   return { ...made, ranges: rangesOf(made, most, edge), x_range: null, y_range: null };
 }

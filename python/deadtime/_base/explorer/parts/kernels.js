@@ -62,19 +62,20 @@ async function kernelsOf(module) {
     rightmost(loop, many) {
       const answer = call("rightmost", [...encoded(linear(loop)), many]);
       const roots = [];
-      for (let i = 2; i < answer.length; i += 4) {
-        roots.push({ re: answer[i], im: answer[i + 1], multiplicity: answer[i + 2] });
-      }
+      for (let i = 2; i < answer.length; i += 2) roots.push({ re: answer[i], im: answer[i + 1] });
       return { abscissa: answer[0], chains: answer[1], roots };
     },
     margins(loop) {
       const [stable, gain, reduction, phase, delay, omega] = call("margins", encoded(linear(loop)));
       return { stable: stable === 1, gain, reduction, phase, delay, omega };
     },
-    // The gains with the best response to a load, and the weight of the reference where it is chosen.
+    // The gains with the best response to a load, at the worst of the interval of the delay, and the
+    // weight of the reference where it is chosen.
     design(loop) {
       const { gains: names, integrates } = CONTROLLERS[loop.controller];
-      const request = [...encoded(linear(loop)), MOST_SENSITIVITY, integrates ? SLACK : 0];
+      const delays = [loop.delay, ...(loop.interval ?? [])];
+      const wanted = [delays.length, ...delays, MOST_SENSITIVITY, integrates ? SLACK : 0];
+      const request = [...encoded(linear(loop)), ...wanted];
       const [sensitivity, load, weight, ...gains] = call("design", request);
       const found = Object.fromEntries(names.map((name, i) => [name, gains[i]]));
       if (Number.isFinite(weight)) found.weight = weight;

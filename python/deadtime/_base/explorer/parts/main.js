@@ -41,6 +41,8 @@ async function main() {
 
   function change(numbers) {
     state = completed({ ...state, ...numbers });
+    // What was said of other numbers does not hold.
+    if (Object.keys(numbers).length) $("suggestion").textContent = "";
     if (isDue) return;
     isDue = true;
     requestAnimationFrame(draw);
@@ -71,8 +73,9 @@ async function main() {
       change({ ...found.gains, ranges, ...moved });
       const { gain, phase, delay } = kernels.margins(state);
       const left = CONTROLLERS[state.controller].integrates ? "the IAE of a unit load is" : "a unit load leaves";
+      const where = state.interval ? " over the interval of the delay" : "";
       said.textContent =
-        `Ms ${shown(found.sensitivity, 3)}, gain margin ${shown(gain, 3)}, phase margin ${shown(phase, 3)}°, ` +
+        `Ms ${shown(found.sensitivity, 3)}${where}, gain margin ${shown(gain, 3)}, phase margin ${shown(phase, 3)}°, ` +
         `delay margin ${shown(delay, 3)} s; ${left} ${shown(found.load, 3)}`;
     } catch (error) {
       said.textContent = error.message;

@@ -4,7 +4,9 @@ const ROOTS = 16;
 
 // A plot by its width: both plots and the margins stand beside the map.
 const heightOf = (width) => Math.max(200, Math.round(0.42 * width));
-const TIMES = 500;
+
+// Times of a response, the middle one among them.
+const TIMES = 501;
 
 // Roots by which the picture is scaled: the rightmost two pairs, if they turn by less than this angle
 // in a delay, as the roots of a chain do not.

@@ -1,6 +1,10 @@
 // A recording that is dropped on the page: its columns, the fit of the loop to it, the delay.
 
-const MOST_ROWS = 3000;
+// A fit takes some 5 ms for a row.
+const MOST_ROWS = 20_000;
+
+// Rows that are drawn.
+const MOST_DRAWN = 2000;
 
 const SIGNALS = ["time", "reference", "output", "command"];
 
@@ -164,8 +168,8 @@ class RecordingView {
   }
 
   show(rows, found) {
-    // As many digits as tell the ends apart.
-    const digits = (low, high) => Math.min(9, Math.max(3, 2 + Math.ceil(Math.log10(Math.abs(high) / (high - low)))));
+    // Enough digits for the ends to differ.
+    const digits = (low, high) => Math.min(9, Math.max(3, 1 + Math.ceil(Math.log10(Math.abs(high) / (high - low)))));
     const said = ({ value, low, high }, unit) =>
       found.reliable
         ? `${shown(value, digits(low, high))}${unit}, between ${shown(low, digits(low, high))} and ` +
@@ -206,7 +210,9 @@ class RecordingView {
     const put = (values, name) =>
       group.append(svg("path", { d: frame.path(rows.time, values), class: name }));
     put(rows.reference, "aim");
+    const stride = Math.ceil(rows.time.length / MOST_DRAWN);
     rows.output.forEach((value, i) => {
+      if (i % stride) return;
       const place = { cx: frame.px(rows.time[i]), cy: frame.py(value), r: 1.6, class: "row" };
       group.append(svg("circle", place));
     });
