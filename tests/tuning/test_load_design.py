@@ -278,3 +278,35 @@ def test_gains_from_a_bump_test_are_nearly_the_best():
         max_sensitivity=own.margin().max_sensitivity,
     )
     assert own.step_response().info()["settling_time"] <= 1.15 * best.value
+
+
+def test_a_settling_time_that_the_weight_brings_costs_nothing():
+    loop = dtm.ControlLoop(dtm.Integrator(1.0), dtm.PI(1.0, 0.1), delay=0.5)
+    best = dtm.design(loop, controller=dtm.PI)
+    settled = best.loop.step_response().info()["settling_time"]
+    asked = dtm.design(loop, controller=dtm.PI, settling_time=1.02 * settled)
+    assert asked.value <= best.value * (1 + 1e-3)
+    assert asked.loop.step_response().info()["settling_time"] <= 1.02 * settled
+
+
+def test_limits_of_the_command_do_not_move_a_design_by_responses():
+    loop = dtm.ControlLoop(dtm.FirstOrder(2.0, 10.0), dtm.PI(1.0, 0.1), delay=2.0)
+    free = dtm.design(loop, controller=dtm.PI)
+    for limits in ({"limit": (0.0, 1.0)}, {"limit": (-0.5, 1.0)}, {"rate_limit": 0.1}):
+        held = dtm.design(loop.replace(**limits), controller=dtm.PI)
+        assert held.gains == free.gains
+        assert held.summary()
+    assert (
+        "s at the limit of 0 to 1"
+        in dtm.design(loop.replace(limit=(0.0, 1.0)), controller=dtm.P).summary()
+    )
+
+
+def test_a_plant_with_delays_inside_has_a_design_by_the_integral_alone():
+    loop = dtm.ControlLoop(
+        dtm.DelaySystem({0.0: -0.1, 0.5: -0.2}, 1.0), dtm.PI(1.0, 0.1), delay=0.3
+    )
+    with pytest.raises(ValueError, match="take objective='load_ie'"):
+        dtm.design(loop, controller=dtm.PI)
+    found = dtm.design(loop, controller=dtm.PI, objective="load_ie")
+    assert found.loop.margin().max_sensitivity == pytest.approx(1.6, rel=1e-6)

@@ -111,9 +111,12 @@ class Wanted:
         problem = self.problem
         corners = [problem.middle, *(one for one in problem.corners if one != problem.middle)]
         every = [*corners, *(one for one in fine(problem) if one not in corners)]
-        found, middle = self._weighted(
-            self.gains(every, len(corners), slack=self.slack), every, len(corners)
-        )
+        if not problem.loop.plant.is_rational and self.objective != "load_ie":
+            raise ValueError(
+                "a plant with delays inside has no response to a load or to a step here: take "
+                "objective='load_ie' or objective='abscissa'"
+            )
+        found, middle = self._found(every, len(corners))
         gains = found.gains
         judged = problem.candidates(corners)
         point = np.array([gains])
@@ -151,19 +154,36 @@ class Wanted:
         place -= len(self.others)
         return every[place] if place >= corners else every[0]
 
+    def _found(self, every: Sequence[Scenario], corners: int) -> tuple[RobustGains, ControlLoop]:
+        """The gains, and the loop with them.
+
+        The search judges a demand on the settling time without a weight of the reference. So gains
+        that are sought without it come first: with their weight they may meet it.
+        """
+        longest = self.demands.settling_time
+        if longest is not None:
+            free = replace(self, demands=self.demands.without("settling_time"))
+            for slack in (0.0, SLACK):
+                best = free.gains(every, corners, slack=slack)
+                found, loop, settled = free._weighted(best, every, corners)
+                if settled <= longest:
+                    return found, loop
+        return self._weighted(self.gains(every, corners, slack=self.slack), every, corners)[:2]
+
     def _weighted(
         self, found: RobustGains, every: Sequence[Scenario], corners: int
-    ) -> tuple[RobustGains, ControlLoop]:
+    ) -> tuple[RobustGains, ControlLoop, float]:
         """The gains and the weight of the reference with which a step settles first at its worst.
 
-        Of the gains that lose no more than the slack of the response to a load. The weight moves
-        no margin and no such response. A weight that is given stays.
+        And when it does, infinite where that is not known. Of the gains that lose no more than the
+        slack of the response to a load. The weight moves no margin and no such response. A weight
+        that is given stays.
         """
         problem = self.problem
         loop = problem.at(found.gains)
         controller = loop.controller
         if not isinstance(controller, (PI, PID)) or not loop.plant.is_rational:
-            return found, loop
+            return found, loop, math.inf
         given = controller.weight
         weights = _WEIGHTS if given is None else np.array([given])
         moving = loop.replace(controller=replace(controller, weight=float(weights[-1])))
@@ -185,7 +205,7 @@ class Wanted:
         worst = settled.max(axis=2)
         least = worst.min()
         if not np.isfinite(least):
-            return found, loop
+            return found, loop, math.inf
         # Of those that are as good the best response to a load, and the largest weight.
         good = worst <= least * (1.0 + _NOTHING)
         value = np.array([one for _, _, one in near])
@@ -197,7 +217,7 @@ class Wanted:
         chosen = loop.controller
         if given is None and isinstance(chosen, (PI, PID)):
             loop = loop.replace(controller=replace(chosen, weight=weight))
-        return found, loop
+        return found, loop, float(worst[row].min())
 
     def _trades(
         self, found: RobustGains, margins: LeastMargins, every: Sequence[Scenario], corners: int
@@ -215,10 +235,13 @@ class Wanted:
             if name != "max_sensitivity":
                 without = self.gains(every, corners, self.demands.without(name)).value
             lost = (found.value - without) / abs(without)
-            price = f"{100.0 * lost:.2g} % lost" if lost > _NOTHING else "nothing lost"
             words = f"{what} holds the design back"
             if name != "max_sensitivity":
-                words += f": without it {figure_in_words(self.objective, without)} ({price})"
+                if lost <= _NOTHING:
+                    made.append(Trade(name, asked, had, False, without, f"{what} is met anyway"))
+                    continue
+                words += f": without it {figure_in_words(self.objective, without)}"
+                words += f" ({100.0 * lost:.2g} % lost)"
             made.append(Trade(name, asked, had, True, without, words))
         if len(every) > 1:
             without = self.gains(every[:1], 1).value

@@ -261,10 +261,16 @@ impl Search<'_> {
             found = self.on_grid()?;
         }
         let Some(start) = found else {
+            let demands = &self.posed.demands;
             refuse!(
-                "no gains with Ms of at most {} are stable: ask for less, take a controller with a \
+                "no gains were found with Ms of at most {}{}: ask for less, take a controller with a \
                  derivative, or give ranges=",
-                self.posed.demands.max_sensitivity
+                demands.max_sensitivity,
+                if demands.has_others() {
+                    " that meet the other demands"
+                } else {
+                    ""
+                }
             );
         };
         self.refined(start, 1.0)
