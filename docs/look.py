@@ -57,6 +57,9 @@ WORDS = {
 }
 FIRST = 10
 
+#: Longest time of a search, ms: on a busy machine one of a thousand results takes half a minute.
+PATIENCE = 180_000
+
 
 class Quiet(SimpleHTTPRequestHandler):
     """Serves the pages without a line for each request."""
@@ -104,6 +107,7 @@ def too_long(browser: Any, address: str, root: Path) -> Iterator[str]:
 def not_found(browser: Any, address: str) -> Iterator[str]:
     """Words that the search does not lead to their page."""
     tab = browser.new_page()
+    tab.set_default_timeout(PATIENCE)
     for word, page in WORDS.items():
         tab.goto(f"{address}/search.html?q={word}")
         tab.wait_for_selector("#search-results p.search-summary:not(:empty)")
