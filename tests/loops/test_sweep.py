@@ -8,8 +8,6 @@ import deadtime as dtm
 import numpy as np
 import pytest
 import scipy.linalg
-from deadtime.loops._settled import TIME_CONSTANTS
-from deadtime.loops._sweep import _Sets
 from hypothesis import assume, given, settings, strategies as st
 from loops import loops
 
@@ -357,14 +355,6 @@ def test_instruction_sets_agree_to_the_bit():
     assert run("plain") == run("avx2") == run("avx512")
 
 
-@pytest.mark.parametrize("loop", LOOPS[14:], ids=range(14, len(LOOPS)))
-def test_the_poles_of_many_loops_are_those_of_each(loop):
-    values = random_values(loop, 5)
-    rates = _Sets(loop, values, (5,), 1.0, 0.02, (0.1, 0.9), 1).rates()
-    alone = [-single(loop, values, i).spectral_abscissa() for i in range(5)]
-    np.testing.assert_allclose(rates, alone, rtol=1e-9)
-
-
 @pytest.mark.parametrize(
     "loop",
     [
@@ -379,25 +369,20 @@ def test_the_poles_of_many_loops_are_those_of_each(loop):
 def test_sets_stay_settled_where_their_slowest_root_says_so(loop):
     rng = np.random.default_rng(7)
     values = {"Kp": rng.uniform(0.1, 4.0, 300), "delay": rng.uniform(0.0, 0.6, 300)}
-    sets = _Sets(loop, values, (300,), 1.0, 0.02, (0.1, 0.9), 1)
-    rates = sets.rates()
-    inside = np.abs(TIME_CONSTANTS / rates) * (1.0 + np.geomspace(1e-6, 3.0, 300))
-    inside[::2] = np.abs(TIME_CONSTANTS / rates[::2]) / (1.0 + np.geomspace(1e-6, 3.0, 150))
-    never, end = np.zeros(300), 2.0 * inside.max()
-    stay = sets.stay(end - inside, never, end)
-    np.testing.assert_array_equal(stay, inside * rates >= TIME_CONSTANTS)
-    # No time at all is not enough, and gives no warning.
-    assert not sets.stay(np.full(300, end), never, end).any()
-
-
-@settings(max_examples=60, deadline=None)
-@given(loop=loops())
-def test_the_rest_of_many_loops_is_that_of_each(loop):
-    gains = np.linspace(0.5, 1.5, 7) * loop.controller.Kp
-    sets = _Sets(loop, {"Kp": gains}, (7,), 1.0, 0.02, (0.1, 0.9), 1)
-    found, _ = sets.kernel.sweep_rest(sets.native)
-    alone = [loop.replace(Kp=gain).specification.kernel.rest_gains()[1] for gain in gains]
-    np.testing.assert_array_equal(found, alone)
+    found = dtm.sweep(loop, values)
+    known = np.flatnonzero(found.status == dtm.loops.SweepStatus.OK)
+    rates = np.full(300, np.nan)
+    for place in known:
+        alone = loop.replace(**{name: array[place] for name, array in values.items()})
+        rates[place] = -alone.spectral_abscissa()
+    for span in (5.0, 10.0, 40.0):
+        inside = span - found["settling_time"][known]
+        judged = dtm.sweep(loop, values, span)
+        settled = judged.status[known] == dtm.loops.SweepStatus.OK
+        assert settled[inside * rates[known] >= 3.0 * (1.0 + 1e-6)].all()
+        # No time at all is not enough.
+        assert not settled[inside <= 0.0].any()
+        assert np.isfinite(judged["settling_time"][known[settled]]).all()
 
 
 @settings(max_examples=40, deadline=None)

@@ -49,14 +49,8 @@ from deadtime.loops._plants import (
 )
 from deadtime.loops._rate_limits import RateLimited
 from deadtime.loops._runs import LoopRun as LoopRun
-from deadtime.loops._sampled_gain import SampledLoopGain as SampledLoopGain
 from deadtime.loops._specification import numbers_of as numbers_of
-from deadtime.loops._sweep import (
-    Sweep,
-    SweepStatus,
-    commands_at_rest as commands_at_rest,
-    sweep,
-)
+from deadtime.loops._sweep import Sweep, SweepStatus, sweep
 
 __all__ = [
     "PAIR",

@@ -27,7 +27,6 @@ from deadtime.loops._native import LoopResponse, driven_loop, on_samples
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._runs import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
-from deadtime.loops._settled import stays_settled
 from deadtime.loops._specification import LoopSpecification
 from deadtime.systems import Response, response_of, until_settled
 
@@ -427,7 +426,9 @@ class _Again:
 
     def stays_settled(self, time: Array, inputs: Array, settled: float) -> bool:
         """Whether the response stays in the band in which it is since `settled`, s."""
-        return stays_settled(self.loop, time - time[0], inputs, self._rest()[1], settled)
+        command = self._rest()[1]
+        rest = np.nan if command is None else command
+        return self.loop.kernel.stays_settled(time - time[0], inputs, rest, settled)
 
     def _rest(self) -> tuple[float | None, float | None]:
         """Output and command at rest under the last reference and inputs, limits left out."""

@@ -171,6 +171,13 @@ class LoopSpecification(PickledByFields):
         given = self.plant._given({**numbers, **values}) if numbers.keys() & values.keys() else None
         return self.kernel.at(dict(values), given)
 
+    def kernels_at(self, sets: Sequence[Mapping[str, float]]) -> list[Loop]:
+        """The loops of the kernel with other numbers."""
+        numbers = self.plant.parameters
+        given = self.plant._given(numbers)
+        each = [given and self.plant._given({**numbers, **one}) for one in sets]
+        return self.kernel.at_each([*map(dict, sets)], each)
+
     def outputs_at(
         self,
         values: Mapping[str, float],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deadtime._base.arrays import Array, Indices, Mask
+from deadtime._base.arrays import Array
 from deadtime._base.frozen import ReadOnlyArrays
 from deadtime._base.progress import Progress, Report, reported
 from deadtime._base.validation import (
@@ -31,35 +31,7 @@ from deadtime._base.validation import (
 from deadtime.loops._control_loop import ControlLoop
 from deadtime.loops._load_response import DeviationQuestion, load_of
 from deadtime.loops._native import Loop, sweep_deviations
-from deadtime.loops._settled import (
-    TIME_CONSTANTS,
-    counts_as_settled,
-    rests_at_limit,
-    slowest_rates,
-    time_inside,
-)
-from deadtime.loops._specification import UNEQUAL, refuse_discretised
-from deadtime.systems import first_duration
-
-# Sets that have not settled are simulated again over a longer time. The simulation times are the
-# first one times powers of 2^(1/_PER_DOUBLING), so that sets with the same time run together: a
-# larger number fits the times better to the sets and makes smaller groups. _MOST_STEPS is the
-# largest power: a larger one settles slower loops and takes longer.
-_PER_DOUBLING = 2
-_MOST_STEPS = 10 * _PER_DOUBLING
-
-# Simulation time of a set whose output is outside its band at the end, in slowest time constants of
-# its closed loop. A deviation as large as the step has then decayed to 3e-4 of it (e^-8): fewer
-# repeat the simulation more often, more make it longer.
-_TO_SETTLE = 8.0
-
-# Added to a number of steps before it is rounded up, so that a rounding error does not make the
-# time too short.
-_STEP_ROUNDING = 1e-6
-
-# Status given by the native part to a response that is inside its band at the end, of which neither
-# itself nor a test of the poles shows whether it stays there.
-_DOUBTFUL = 4
+from deadtime.loops._specification import refuse_discretised
 
 #: Metrics of a step response, in the order of the native part.
 _METRICS = (
@@ -315,7 +287,7 @@ def sweep(
             return sets.outputs(times, report)
         found = None
         if metrics is None or not set(_METRICS).isdisjoint(names):
-            found = sets.until_settled(report) if times is None else sets.decided(times, report)
+            found = sets.measured(times, report)
         if metrics is None and found is not None:
             return found
         return sets.with_deviations(found, names, load_of(load_at), times, report)
@@ -331,21 +303,6 @@ class LoopSets(NamedTuple):
     amplitude: float
 
 
-class _Run(NamedTuple):
-    """What was measured of sets in one run, flat arrays."""
-
-    metrics: dict[str, Array]
-    #: Sets of which the poles have to show whether they have settled are _DOUBTFUL.
-    status: NDArray[np.uint8]
-    #: The last time at which each command was at its limit; 0 where it never was.
-    limited_until: Array
-
-    @property
-    def settled(self) -> Array:
-        """The times since which outputs are in their bands."""
-        return self.metrics["settling_time"]
-
-
 @dataclass(frozen=True, eq=False)
 class _Sets:
     """The arguments of `sweep`, checked."""
@@ -357,14 +314,6 @@ class _Sets:
     settling: float
     rise: tuple[float, float]
     threads: int | None
-
-    def only(self, places: Indices) -> _Sets:
-        """The sets at `places`, as a one-dimensional array of sets."""
-        arrays = {
-            name: np.broadcast_to(array, self.shape).reshape(-1)[places]
-            for name, array in self.arrays.items()
-        }
-        return replace(self, arrays=arrays, shape=places.shape)
 
     @cached_property
     def native(self) -> LoopSets:
@@ -419,127 +368,21 @@ class _Sets:
         shown = np.array([0.0, end or 0.0]) if found is None else found.time
         return Sweep(dict(self.arrays), self.shape, shown, status, {n: known[n] for n in names})
 
-    def measured(self, span: float, progress: Report | None = None) -> _Run:
-        """Metrics of `span` seconds of each response."""
-        count = math.prod(self.shape)
-        # One piece of memory, which the next sweep uses again; many would be given back to the
-        # system and cleared by it each time, at a tenth of the cost of a sweep.
-        found = np.empty((len(_METRICS) + 1, count))
-        status = np.empty(count, dtype=np.uint8)
-        # Rows without elements would lie at one address.
-        self.kernel.sweep_metrics(
+    def measured(self, times: Array | None, progress: Report | None) -> Sweep:
+        """Metrics between the first and the last time, or until the responses have settled."""
+        found = self.kernel.sweep_metrics(
             self.native,
-            columns=list(found) if count else [],
-            status=status,
-            span=span,
+            span=None if times is None else float(times[-1] - times[0]),
             settling=self.settling,
             rise=self.rise,
             threads=self.threads,
             progress=progress,
         )
-        return _Run(dict(zip(_METRICS, found, strict=False)), status, found[-1])
-
-    def decided(self, times: Array, progress: Report | None) -> Sweep:
-        """Metrics; a doubtful set counts as settled if it was in the band for long enough."""
-        span = float(times[-1] - times[0])
-        found = self.measured(span, progress)
-        doubtful = np.flatnonzero(found.status == _DOUBTFUL)
-        if doubtful.size:
-            limited = found.limited_until[doubtful]
-            stay = self.only(doubtful).stay(found.settled[doubtful], limited, span)
-            found.status[doubtful[stay]] = SweepStatus.OK
-        return self._final(found, times)
-
-    def until_settled(self, progress: Report | None) -> Sweep:
-        """Metrics of all sets; sets that have not settled are simulated over a longer time."""
-        loop = self.loop
-        numbers: dict[str, Any] = loop.parameters | dict(self.arrays)
-        waits = np.add(numbers["delay"], numbers.get("sample_time", 0.0))
-        longest_wait = float(np.max(waits, initial=0.0))
-        span = first_duration(loop.specification.model.A, longest_wait)
-        found = self.measured(span, progress)
-        settled, status, limited = found.settled, found.status, found.limited_until
-
-        def run_on(places: Indices, step: float) -> None:
-            longer = self.only(places).measured(span * _longer(step))
-            done = longer.status != SweepStatus.REFUSED
-            for name, array in longer.metrics.items():
-                found.metrics[name][places[done]] = array[done]
-            limited[places[done]] = longer.limited_until[done]
-            status[places] = np.where(done, longer.status, SweepStatus.UNSETTLED)
-
-        due, longest = np.flatnonzero(_is_open(status)), 0.0
-        if due.size:
-            # Poles are expensive, and most of these sets settle within twice the first time.
-            longest = float(_PER_DOUBLING)
-            run_on(due, longest)
-            due = due[_is_open(status[due])]
-        open_sets = self.only(due)
-        closed = open_sets.rates() if due.size else np.empty(0)
-        alone, rests = open_sets.at_limit()
-        steps = np.full(due.size, longest)
-        while due.size:
-            ends = span * _longer(steps)
-            # NaN if the output is outside the band at the end.
-            inside, stays = time_inside(settled[due], limited[due], ends, rests)
-            rates = np.where(stays, alone, closed)
-            is_settled = counts_as_settled(inside, rates)
-            status[due[is_settled]] = SweepStatus.OK
-            more = ~is_settled & (rates > 0.0) & (steps < _MOST_STEPS)
-            lasts = np.where(
-                np.isnan(inside), _TO_SETTLE / rates, ends - inside + TIME_CONSTANTS / rates
-            )
-            with np.errstate(invalid="ignore"):  # of sets that do not run again
-                needed = np.ceil(_PER_DOUBLING * np.log2(lasts / span) + _STEP_ROUNDING)
-            steps = np.minimum(np.maximum(needed, steps + 1.0), _MOST_STEPS)
-            longest = max(longest, steps.max(initial=0.0, where=more))
-            for step in np.unique(steps[more]):
-                run_on(due[more & (steps == step)], step)
-            late = more & _is_open(status[due])
-            due, closed, alone, rests = due[late], closed[late], alone[late], rests[late]
-            steps = steps[late]
-        return self._final(found, np.array([0.0, span * _longer(longest)]))
-
-    def _final(self, found: _Run, times: Array) -> Sweep:
-        """The result: doubtful sets count as unsettled, and these have no settling time."""
-        status = found.status.reshape(self.shape)
-        status[status == _DOUBTFUL] = SweepStatus.UNSETTLED
-        shaped = {name: array.reshape(self.shape) for name, array in found.metrics.items()}
-        unsettled = status == SweepStatus.UNSETTLED
-        if unsettled.any():
-            shaped["settling_time"] = np.where(unsettled, np.nan, shaped["settling_time"])
-        return Sweep(dict(self.arrays), self.shape, times, status, shaped)
-
-    def at_limit(self) -> tuple[Array, Mask]:
-        """Decay rates of plant and controller alone, 1/s, and which commands rest at the limit."""
-        command, slowest = self.kernel.sweep_rest(self.native)
-        values = self.native.values
-        own = self.loop.bounds
-        if "limit" in values:
-            bounds: Any = (-values["limit"], values["limit"])
-        else:
-            pairs = zip(UNEQUAL, own, strict=True)
-            bounds = tuple(values.get(name, bound) for name, bound in pairs)
-        return slowest_rates(slowest).reshape(self.shape), rests_at_limit(command, bounds).reshape(
-            self.shape
-        )
-
-    def stay(self, settled: Array, limited_until: Array, end: float) -> Mask:
-        """Whether sets that are in their bands at the end since `settled` count as settled."""
-        alone, rests = self.at_limit()
-        inside, stays = time_inside(settled, limited_until, end, rests)
-        if self.loop.is_sampled:
-            return counts_as_settled(inside, np.where(stays, alone, self.rates()))
-        # None of them decays fast enough for no time at all.
-        with np.errstate(divide="ignore"):
-            least = TIME_CONSTANTS / np.maximum(inside, 0.0)
-        found = self.kernel.sweep_decay(self.native, least, threads=self.threads)
-        return np.where(stays, counts_as_settled(inside, alone), found.reshape(self.shape))
-
-    def rates(self) -> Array:
-        """Decay rate of the slowest root of each set without its limit, 1/s; NaN if not found."""
-        found = self.kernel.sweep_abscissae(self.native, threads=self.threads)
-        return -found.reshape(self.shape)
+        shaped = {
+            name: row.reshape(self.shape) for name, row in zip(_METRICS, found.metrics, strict=True)
+        }
+        shown = np.array([0.0, found.span]) if times is None else times
+        return Sweep(dict(self.arrays), self.shape, shown, found.status.reshape(self.shape), shaped)
 
 
 def _chosen(metrics: Sequence[str] | None, responses: bool) -> tuple[str, ...]:
@@ -555,22 +398,6 @@ def _chosen(metrics: Sequence[str] | None, responses: bool) -> tuple[str, ...]:
     if unknown or not metrics:
         raise ValueError(f"metrics={list(metrics)}: choose from {', '.join(known)}")
     return tuple(dict.fromkeys(metrics))
-
-
-def _is_open(status: NDArray[np.uint8]) -> Mask:
-    return np.asarray(np.isin(status, (SweepStatus.UNSETTLED, _DOUBTFUL)))
-
-
-def _longer(steps: Any) -> Any:
-    """Ratio of the simulation time after `steps` steps to the first one."""
-    return 2.0 ** (steps / _PER_DOUBLING)
-
-
-def commands_at_rest(loop: ControlLoop, values: Mapping[str, Array], amplitude: float) -> Array:
-    """Commands at rest of loops with these numbers, the limit left out."""
-    shape = np.broadcast_shapes(*(np.shape(array) for array in values.values()))
-    sets = _Sets(loop, values, shape, amplitude, 0.0, (0.0, 0.0), None)
-    return sets.kernel.sweep_rest(sets.native)[0].reshape(shape)
 
 
 def require_loop(loop: object) -> None:

@@ -392,6 +392,7 @@ def stability_map(
         alpha = missing if cells.abscissa is None else cells.abscissa
         if report is not None:
             report(math.prod(size))
+    loop = family if isinstance(family, ControlLoop) else None
     return StabilityMap(
         (first, second),
         axes,
@@ -401,5 +402,5 @@ def stability_map(
         question.decay,
         question.damping,
         judged,
-        family.replace(**fixed) if isinstance(family, ControlLoop) else None,
+        loop.replace(**fixed) if loop is not None and fixed else loop,
     )

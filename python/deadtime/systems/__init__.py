@@ -16,7 +16,6 @@ from deadtime.systems._margins import Margins, margins as margins, margins_of as
 from deadtime.systems._plots import plot_bode as plot_bode, plot_responses as plot_responses
 from deadtime.systems._response import (
     Response,
-    first_duration as first_duration,
     response_of as response_of,
     until_settled as until_settled,
 )

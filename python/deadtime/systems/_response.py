@@ -15,15 +15,13 @@ from deadtime._base.drawing import Axes, shown_axes
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import finite, positive, real_array
+from deadtime.systems._native import first_duration
 from deadtime.systems._step_metrics import OneSignal
 
-# The default time of a step response is _SHORTEST times the longest of all time constants, delays
-# and _LEAST seconds. It is doubled, at most _DOUBLINGS times, until the last quarter of the _TIMES
-# outputs is within _SETTLED of the steady state, or one is farther from it than _LOST: a longer
-# first time and a smaller _SETTLED show more of a slow end and less of a fast beginning.
+# The first time of a step response is doubled, at most _DOUBLINGS times, until the last quarter of
+# the _TIMES outputs is within _SETTLED of the steady state, or one is farther from it than _LOST: a
+# smaller _SETTLED shows more of a slow end and less of a fast beginning.
 _TIMES = 501
-_SHORTEST = 10.0
-_LEAST = 0.01
 _DOUBLINGS = 10
 _SETTLED = 0.005
 _LOST = 20.0
@@ -279,13 +277,6 @@ def response_of(run: KeptRun) -> Response:
     # Nearly everyone reads these, and a descriptor takes longer than the array.
     parts["outputs"] = run.found.outputs
     return response
-
-
-def first_duration(A: Array, delay: float) -> float:
-    """First duration of a step response in s, by its longest delay and its slowest pole."""
-    slowest = [1.0 / abs(pole) for pole in np.linalg.eigvals(A) if abs(pole) > 0.0]
-    duration: float = _SHORTEST * max([delay, *slowest, _LEAST])
-    return duration
 
 
 def until_settled(run: Callable[[Array], Response], A: Array, delay: float) -> Response:

@@ -10,10 +10,9 @@ such gains.
 
 # The files. `_problem` holds what is free and what is not known, `_region` the region of an
 # estimate, `_stabilising` where to look for gains, `_objectives` what is made best, `_margins` what
-# must hold. `_candidates` hands loops to the kernel, which judges many of them at once and improves
-# gains. `_survey` maps the gains, `_search` finds the best of them, `_exchange` looks for the
-# delay at which they are worst and repeats the search until it finds none that is worse, and
-# `_made` puts the result together. `_responses` designs by responses under the demands of
+# must hold. `_candidates` hands loops to the kernel. `_survey` maps the gains, `_exchange` has the
+# best of them found by the kernel, with the scenarios in which they are worst, and `_made` puts the
+# result together. `_responses` designs by responses under the demands of
 # `_demands`, in one call of the kernel; `_rules` is the table of rules and `_gate` the gate.
 # `_filter_choice` chooses the filter of the derivative.
 

@@ -1,25 +1,17 @@
-"""Gains that are best in the worst case, by exchange.
+"""Gains that are best in the worst case, which the kernel finds in one call, and what is proved.
 
-    min over gains of max over p of cost(gains; p), margins(gains; p) >= required for all p
-
-has infinitely many p: every delay of an interval. The exchange method takes a few (ends and
-middles), finds the best gains for those, looks over the whole interval for a p that is worse,
-adds it, and repeats until there is none (Hettich and Kortanek, "Semi-infinite programming", SIAM
-Review 35, 1993). The margins of the search are estimates: a requirement that the exact margins
-miss is raised by what is missing, in the same rounds.
-
-The look over the intervals is a search, not a proof: a fine grid of scenarios, and between the
-neighbours of the worst of them a search along the delay; or the points around the region of an
-estimate. Stability itself, the gain margin and the delay margin of a continuous loop are proved for
-all of the intervals at once, by boxes: a gain margin of 2 is the stability of all plants up to
-twice as strong, a delay margin that of all delays up to this margin longer.
+Stability itself, the gain margin and the delay margin of a continuous loop are proved for all of
+the intervals at once, by boxes: a gain margin of 2 is the stability of all plants up to twice as
+strong, a delay margin that of all delays up to this margin longer.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,28 +19,11 @@ from deadtime._base.arrays import Array
 from deadtime.loops import ControlLoop
 from deadtime.stability import proved_boxes
 from deadtime.tuning._candidates import Scenario
-from deadtime.tuning._margins import MARGINS, UNITS, RequiredMargins, exact_margins
-from deadtime.tuning._objectives import NEVER, Objective
-from deadtime.tuning._problem import Problem
-from deadtime.tuning._search import Search
-from deadtime.tuning._survey import surveyed
-
-#: Most rounds of the exchange: two or three suffice where costs are continuous, and where steps are
-#: simulated, which jump, more do not help.
-_ROUNDS = 12
-_ROUNDS_SIMULATED = 5
-
-#: How far above a required margin the search aims, relatively: less needs more rounds.
-_ABOVE = 1e-5
-#: Relative shortfall of an exact margin that counts as rounding.
-_MISSED = 1e-12
-
-#: Relative improvement below which a round is the last: where roots meet at some delay, the worst
-#: case has cusps in the delay, and a few scenarios never bound it exactly.
-_STALLED = 1e-3
-
-#: Estimated shortfall of the margins beyond which further rounds cannot meet them.
-_HOPELESS = 3e-3
+from deadtime.tuning._margins import MARGINS, UNITS, RequiredMargins
+from deadtime.tuning._native import FoundGains, GainSearch, Loop
+from deadtime.tuning._objectives import NEVER, SIMULATED
+from deadtime.tuning._problem import ObjectiveName, Problem
+from deadtime.tuning._survey import Survey
 
 #: Values of each unknown number in a check, for one and two of them: of the objective, and of the
 #: exact margins, which cost more.
@@ -57,134 +32,152 @@ _FINE_MARGINS = {1: 9, 2: 3}
 #: Points of a region for each margin.
 _LEAST = 2
 
-#: Halvings of the way to gains that miss a margin: more end closer to them.
-_HALVINGS = 40
-
 #: Most boxes of a proof (bounds time).
 _BOXES = 20_000
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Gains, the scenarios they are best for, and their cost in the worst of all scenarios."""
+class Found(NamedTuple):
+    """Gains, the scenarios they are best for, and their value in the worst of all scenarios."""
 
     gains: Array
-    scenarios: tuple[Scenario, ...]
-    cost: float
+    scenarios: list[tuple[int, float]]
+    value: float
     worst: Scenario
     checked: int
 
 
-def best_gains(search: Search, start: Array | None = None) -> Found:
-    """The best gains in the worst scenario of all, from the map or from around a start."""
-    problem, objective, required = search.problem, search.objective, search.required
-    scenarios = list(problem.corners)
-    search = replace(search, required=required.scaled(1.0 + _ABOVE), scenarios=tuple(scenarios))
-    gains = search.globally() if start is None else search.locally(start)
-    best: Found | None = None
-    for _ in range(_ROUNDS_SIMULATED if objective.simulated else _ROUNDS):
-        everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
-        cost, worst = worst_scenario(problem, objective, gains, everywhere)
-        seen = objective.worst(problem, gains, scenarios)
-        added = [worst] if cost > seen + objective.tolerance * abs(seen) else []
-        missing = underestimated = np.zeros(3)
-        if required.named:
-            places = [*margin_places(search, gains), *scenarios[len(problem.corners) :]]
-            each = exact_margins(problem, gains, places, required)
-            missing = _missing(required, each)
-            added += [places[int(np.argmin(each[:, i]))] for i in np.flatnonzero(missing)]
-            known = [one in scenarios for one in places]
-            if any(known):
-                underestimated = _missing(required, each[known])
-        stalled = best is not None and cost > best.cost - _STALLED * abs(best.cost)
-        if not missing.any() and (best is None or cost < best.cost):
-            best = Found(gains, tuple(scenarios), cost, worst, len(everywhere))
-        if missing.any() and search.short(gains) > _HOPELESS:
-            break
-        added = [one for one in added if one not in scenarios]
-        if not missing.any() and (stalled or not added):
-            break
-        scenarios += [one for i, one in enumerate(added) if one not in added[:i]]
-        aimed = search.required.raised(underestimated)
-        search = replace(search, required=aimed, scenarios=tuple(scenarios))
-        gains = search.locally(gains)
-        if required.named and search.short(gains) > _HOPELESS:
-            # Gains that have the margins in an added scenario may be far away.
-            search = replace(search, survey=surveyed(problem, search.survey.shape, scenarios))
-            gains = search.globally()
-    if best is None:
-        best = _just_inside(search, required, gains)
-    if best is None:
-        raise _unmet(search, required, gains)
-    if best.cost >= NEVER:
-        raise ValueError(
-            f"a step of {problem.amplitude:g} does not settle with any gains that were tried: the "
-            "limit may not let the output stay there; give a smaller amplitude, or another "
-            "objective"
+class _Question(NamedTuple):
+    """What the kernel looks for; scenarios by their places among the loops."""
+
+    loops: list[Loop]
+    free: list[int]
+    corners: list[int]
+    fine: list[int]
+    places: list[int] | None
+    objective: str
+    required: tuple[float, float, float]
+    amplitude: float
+    axes: tuple[Array, ...]
+    abscissa: Array
+    threads: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A search for the gains that are best in the worst scenario, with the required margins."""
+
+    problem: Problem
+    objective: ObjectiveName
+    survey: Survey
+    required: RequiredMargins
+
+    @cached_property
+    def _fine(self) -> tuple[Scenario, ...]:
+        return fine(self.problem)
+
+    @cached_property
+    def _exact(self) -> tuple[Scenario, ...]:
+        return _margin_places(self.problem)
+
+    @cached_property
+    def _scenarios(self) -> list[Scenario]:
+        """Each once: those it begins with, those it judges and those of exact margins."""
+        problem = self.problem
+        every = [problem.middle, *problem.corners, *self._fine, *self._exact]
+        return [*{tuple(one.items()): one for one in every}.values()]
+
+    def _places(self, scenarios: Sequence[Scenario]) -> list[int]:
+        known = {tuple(one.items()): place for place, one in enumerate(self._scenarios)}
+        return [known[tuple(one.items())] for one in scenarios]
+
+    @cached_property
+    def _native(self) -> GainSearch:
+        problem, gathered = self.problem, self.problem.gathered
+        is_region = problem.region is not None
+        return GainSearch(
+            _Question(
+                loops=gathered.at(self._scenarios),
+                free=gathered.free,
+                corners=self._places(problem.corners),
+                fine=self._places(self._fine),
+                places=None if is_region else self._places(self._exact),
+                objective=self.objective,
+                required=self.required,
+                amplitude=problem.amplitude,
+                axes=self.survey.axes,
+                abscissa=self.survey.abscissa,
+                threads=problem.threads,
+            )
         )
-    return replace(best, scenarios=tuple(scenarios))
+
+    def _scenario(self, spot: tuple[int, float]) -> Scenario:
+        return self._scenarios[spot[0]] | {"delay": spot[1]}
+
+    def best(self, start: Array | None = None) -> Found:
+        """The best gains in the worst scenario of all, from the map or from around a start."""
+        found = self._native.best(None if start is None else start.tolist())
+        if not isinstance(found, FoundGains):
+            raise _unmet(self, found.alone, found.gains, found.together)
+        problem = self.problem
+        if found.cost >= NEVER:
+            raise ValueError(
+                f"a step of {problem.amplitude:g} does not settle with any gains that were tried: "
+                "the limit may not let the output stay there; give a smaller amplitude, or another "
+                "objective"
+            )
+        worst = self._scenario(found.worst)
+        return Found(np.array(found.gains), found.scenarios, found.value, worst, found.checked)
+
+    def value_without(
+        self, required: RequiredMargins, scenarios: list[tuple[int, float]] | None = None
+    ) -> float:
+        """The value of the best gains for some scenarios alone, or in the middle of all."""
+        if scenarios is None:
+            middle = self.problem.middle
+            (place,) = self._places([middle])
+            scenarios = [(place, middle["delay"])]
+        return self._native.best_in(scenarios, required)
+
+    def proved(self, found: Found) -> float:
+        """The value, where it is simulated with a proof of what follows the simulated time."""
+        if self.objective not in SIMULATED:
+            return found.value
+        problem = self.problem
+        judged = [*self._fine, found.worst]
+        places = zip(self._near(judged), judged, strict=True)
+        spots = [(place, one["delay"]) for place, one in places]
+        worst = found.value
+        steps = self._native.proved_steps(spots, found.gains.tolist())
+        for one, step in zip(judged, steps, strict=True):
+            if step is None:
+                told = ", ".join(f"{name} = {number:.6g}" for name, number in one.items())
+                raise ValueError(
+                    f"a step of {problem.amplitude:g} settles in simulation with "
+                    f"{problem.named(found.gains)}, but for {told} it is not proved to stay in the "
+                    "band: ask for margins, or for another objective"
+                )
+            worst = max(worst, step[SIMULATED.index(self.objective)])
+        return worst
+
+    def _near(self, scenarios: Sequence[Scenario]) -> list[int]:
+        """Places of loops that differ from these scenarios in the delay at most."""
+        rest = [{**one, "delay": 0.0} for one in self._scenarios]
+        return [rest.index({**one, "delay": 0.0}) for one in scenarios]
 
 
-def _just_inside(search: Search, required: RequiredMargins, gains: Array) -> Found | None:
-    """The last gains that have the margins, on the way to gains that miss them by little.
-
-    Where the best loop is deadbeat its cost falls without bound, whatever margin it misses.
-    """
-    problem, scenarios = search.problem, search.scenarios
-    search = replace(search, required=required.scaled(1.0 + _ABOVE))
-    points = search.survey.points[search.survey.stable]
-    if not len(points) or search.short(gains) > _HOPELESS:
-        return None
-    inside, outside = points[int(np.argmin(search.shortfalls(points)))], gains
-    if search.short(inside) > 0.0:
-        return None
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (inside + outside)
-        if search.short(middle) > 0.0:
-            outside = middle
-        else:
-            inside = middle
-    if _missing(required, exact_margins(problem, inside, scenarios, required)).any():
-        return None
-    everywhere = [*fine(problem), *scenarios[len(problem.corners) :]]
-    cost, worst = worst_scenario(problem, search.objective, inside, everywhere)
-    return Found(inside, tuple(scenarios), cost, worst, len(everywhere))
-
-
-def _missing(required: RequiredMargins, each: Array) -> Array:
-    """What margins (scenarios, 5) miss of the requirements at their least."""
-    missing = np.maximum(required.vector * (1.0 - _MISSED) - least_margins(each[:, :3]), 0.0)
-    return np.where(required.vector > 0.0, missing, 0.0)
-
-
-def least_margins(each: Array) -> Array:
-    """Least of margins (scenarios, 3); none at all where a scenario is not stable."""
-    return np.asarray(np.where(np.isnan(each), 0.0, each).min(axis=0))
-
-
-def _unmet(search: Search, required: RequiredMargins, gains: Array) -> ValueError:
+def _unmet(
+    search: Search, alone: list[float], gains: list[float], together: list[float]
+) -> ValueError:
     """The error that names the requirements that are not met, and what is possible."""
-    problem, scenarios = search.problem, search.scenarios
-    points = search.survey.points[search.survey.stable]
-    alone = (
-        problem.candidates(scenarios).all_margins(points, problem.threads).min(axis=1).max(axis=0)
-    )
-    nearest = points[int(np.argmin(search.shortfalls(points)))]
-    best = min([gains, nearest], key=search.short)
-    least = least_margins(exact_margins(problem, best, scenarios)[:, :3])
-    wanted = ", ".join(_with_unit(name, value) for name, value in required.named.items())
-    most = ", ".join(
-        _with_unit(name, value)
-        for name, value in zip(MARGINS, alone, strict=True)
-        if name in required.named
-    )
-    together = ", ".join(
-        _with_unit(name, value) for name, value in zip(MARGINS, least, strict=True)
-    )
-    at = ", ".join(f"{n} = {v:.4g}" for n, v in problem.named(best).items())
+    required = search.required.named
+    wanted = ", ".join(_with_unit(name, value) for name, value in required.items())
+    pairs = zip(MARGINS, alone, strict=True)
+    most = ", ".join(_with_unit(name, value) for name, value in pairs if name in required)
+    nearest = ", ".join(map(_with_unit, MARGINS, together))
+    at = ", ".join(f"{n} = {v:.4g}" for n, v in search.problem.named(gains).items())
     return ValueError(
         f"no gains in the ranges have {wanted}: taken alone, the most that can be reached is "
-        f"{most}; together the nearest is {together} at {at}. Ask for less, or widen the ranges"
+        f"{most}; together the nearest is {nearest} at {at}. Ask for less, or widen the ranges"
     )
 
 
@@ -200,11 +193,16 @@ def fine(problem: Problem) -> tuple[Scenario, ...]:
     return problem.scenarios(_FINE.get(_unknown(problem), 1))
 
 
-def margin_places(search: Search, gains: Array) -> tuple[Scenario, ...]:
+def _margin_places(problem: Problem) -> tuple[Scenario, ...]:
+    if problem.region is not None:
+        return ()
+    return problem.scenarios(_FINE_MARGINS.get(_unknown(problem), 1))
+
+
+def margin_places(problem: Problem, gains: Array) -> tuple[Scenario, ...]:
     """Those its exact margins are computed in: of a region the points with the least estimates."""
-    problem = search.problem
     if problem.region is None:
-        return problem.scenarios(_FINE_MARGINS.get(_unknown(problem), 1))
+        return _margin_places(problem)
     points = problem.region.points
     each = problem.candidates(points).all_margins(gains[None, :], problem.threads)[0]
     least = np.argsort(each, axis=0, kind="stable")[:_LEAST]
@@ -213,24 +211,6 @@ def margin_places(search: Search, gains: Array) -> tuple[Scenario, ...]:
 
 def _unknown(problem: Problem) -> int:
     return sum(low < high for low, high in problem.intervals.values())
-
-
-def worst_scenario(
-    problem: Problem, objective: Objective, gains: Array, scenarios: Sequence[Scenario]
-) -> tuple[float, Scenario]:
-    """Cost of gains in the worst scenario, which may lie between those given, and that scenario."""
-    costs = objective.costs(problem, gains[None, :], scenarios)[0]
-    place = int(np.argmax(costs))
-    worst, least = scenarios[place], float(costs[place])
-    delays = sorted({one["delay"] for one in scenarios})
-    at = delays.index(worst["delay"])
-    low, high = delays[max(at - 1, 0)], delays[min(at + 1, len(delays) - 1)]
-    if high > low and not objective.simulated and problem.region is None:
-        of = problem.candidates(scenarios)
-        late, cost = of.worst_delay(gains.tolist(), objective.name, place, (low, high))
-        if cost > least:
-            return cost, worst | {"delay": late}
-    return least, worst
 
 
 def proved(problem: Problem, gains: Array, required: RequiredMargins) -> tuple[str, ...]:

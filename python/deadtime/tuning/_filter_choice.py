@@ -27,14 +27,13 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
-from deadtime.tuning._exchange import best_gains, fine
+from deadtime.tuning._exchange import Search
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
 from deadtime.tuning._native import noise_gain as noise_gain_of
-from deadtime.tuning._objectives import Objective, objective_named
+from deadtime.tuning._objectives import lost, objective_named
 from deadtime.tuning._problem import ObjectiveName, Problem, controller_template, pose
 from deadtime.tuning._result import FilterChoice
-from deadtime.tuning._search import Search
 from deadtime.tuning._survey import Survey, surveyed
 
 #: Number of corners tried, and the slowest and fastest in units of 1/(delay + lag + half a sample).
@@ -146,7 +145,7 @@ def design_filter(
 
 def filter_choice(
     problem: Problem,
-    objective: Objective,
+    objective: ObjectiveName,
     required: RequiredMargins,
     shape: Sequence[int] | None,
     loss: float = 0.1,
@@ -157,7 +156,7 @@ def filter_choice(
     bandwidth: float | None = None,
 ) -> FilterChoice:
     """Design with every corner, and choose."""
-    if objective.name == "overshoot":
+    if objective == "overshoot":
         raise ValueError(
             "objective='overshoot': it can be none with any filter; choose by 'abscissa', "
             "'damping' or 'settling_time'"
@@ -186,12 +185,12 @@ def filter_choice(
     else:
         loss = positive("loss", loss)
         rule = f"the slowest that loses at most {100 * loss:g} %"
-        lost = [objective.lost(one.value, ideal.value) for one in tried]
+        worse = [lost(objective, one.value, ideal.value) for one in tried]
         omega = _last(
-            task, corners, tried, -1, lambda one: objective.lost(one.value, ideal.value) <= loss
+            task, corners, tried, -1, lambda one: lost(objective, one.value, ideal.value) <= loss
         )
         if omega is None:
-            raise _too_slow(corners, lost, loss)
+            raise _too_slow(corners, worse, loss)
     chosen = made(task.at(omega), objective, required, shape)
     return FilterChoice(
         omega=omega,
@@ -227,7 +226,7 @@ class _Task:
     """Everything but the corner."""
 
     problem: Problem
-    objective: Objective
+    objective: ObjectiveName
     required: RequiredMargins
     damping: float
     bandwidth: float
@@ -246,11 +245,12 @@ class _Task:
             shape = self.survey.abscissa.shape
             survey = surveyed(problem, shape) if alone else self.survey
             search = Search(problem, self.objective, survey, self.required)
-            found = best_gains(search, None if alone else start)
+            found = search.best(None if alone else start)
         except ValueError:
             return _Tried(math.nan, math.nan, start)
-        value = self.objective.value(problem, found.gains, [*fine(problem), found.worst])
-        return _Tried(value, noise_gain(problem.at(found.gains), self.bandwidth), found.gains)
+        (middle,) = problem.gathered.at([problem.middle])
+        noise = noise_gain_of(middle.at(problem.named(found.gains)), self.bandwidth)
+        return _Tried(found.value, noise, found.gains)
 
 
 def _corners(problem: Problem, omegas: ArrayLike | None) -> Array:

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 from deadtime.tuning._demands import white_to
-from deadtime.tuning._exchange import Found, best_gains, fine, least_margins, margin_places, proved
-from deadtime.tuning._margins import UNITS, RequiredMargins, exact_margins
+from deadtime.tuning._exchange import Found, Search, fine, margin_places, proved
+from deadtime.tuning._margins import UNITS, RequiredMargins, exact_margins, least_margins
 from deadtime.tuning._native import noise_gain
-from deadtime.tuning._objectives import Objective
-from deadtime.tuning._problem import Problem
+from deadtime.tuning._objectives import lost
+from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
-from deadtime.tuning._search import Search
 from deadtime.tuning._settling import step_info
 from deadtime.tuning._survey import surveyed
 
@@ -33,19 +31,19 @@ _NOTHING = 1e-3
 
 def made(
     problem: Problem,
-    objective: Objective,
+    objective: ObjectiveName,
     required: RequiredMargins,
     shape: Sequence[int] | None,
 ) -> Design:
     """Find the gains of a problem."""
     survey = surveyed(problem, shape)
     search = Search(problem, objective, survey, required)
-    found = best_gains(search)
+    found = search.best()
     judged = [*fine(problem), found.worst]
     each = problem.candidates(judged)
-    value = objective.proved(problem, found.gains, judged)
+    value = search.proved(found)
     middle = problem.at(found.gains)
-    places = [*margin_places(search, found.gains), found.worst]
+    places = [*margin_places(problem, found.gains), found.worst]
     exact = exact_margins(problem, found.gains, places)
     margins = LeastMargins(
         *least_margins(exact[:, :3]).tolist(), *exact[:, 3:].max(axis=0).tolist()
@@ -59,7 +57,7 @@ def made(
         margins=margins,
         delays=problem.delays,
         gain=problem.intervals.get("gain"),
-        objective=objective.name,
+        objective=objective,
         value=value,
         step_info=step_info(middle, problem.amplitude),
         amplitude=problem.amplitude,
@@ -78,31 +76,26 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
     """The price of each margin, of all of them, and of the intervals."""
     objective, problem, required = search.objective, search.problem, search.required
     made = []
-
-    def best_without(rest: RequiredMargins, scenarios: tuple[dict[str, float], ...]) -> float:
-        gains = replace(search, scenarios=scenarios, required=rest).globally()
-        return objective.value(problem, gains, scenarios)
-
     for name, least in required.named.items():
         achieved = float(getattr(margins, name))
         active = achieved <= least * _ACTIVE
         what = f"{name.replace('_', ' ')} of at least {least:g}{UNITS[name]}"
         without = value
         if achieved <= least * _NEAR:
-            without = best_without(required.without(name), found.scenarios)
-            active = active or objective.lost(value, without) > _NOTHING
+            without = search.value_without(required.without(name), found.scenarios)
+            active = active or lost(objective, value, without) > _NOTHING
         if active:
             words = f"{what} holds the design back: {_price(search, value, without)}"
         else:
             words = f"{what} is met anyway: {achieved:.4g}{UNITS[name]}"
         made.append(Trade(name, least, achieved, active, without, words))
     if sum(trade.active for trade in made) > 1:
-        without = best_without(RequiredMargins(), found.scenarios)
+        without = search.value_without(RequiredMargins(), found.scenarios)
         words = f"all margins together: {_price(search, value, without, 'them')}"
         made.append(Trade("all_margins", math.nan, math.nan, True, without, words))
     if any(low < high for low, high in problem.intervals.values()):
-        without = best_without(required, (problem.middle,))
-        lost = objective.lost(value, without)
+        without = search.value_without(required)
+        price = lost(objective, value, without)
         *others, last = (name for name, (low, high) in problem.intervals.items() if low < high)
         names = f"{', '.join(others)} and {last}" if others else last
         known = "in the middle of its interval"
@@ -110,15 +103,15 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
             known = "exactly as estimated"
         words = (
             f"uncertainty of the {names}: if known to be {known}, "
-            f"{figure_in_words(objective.name, without)} ({_part(lost)})"
+            f"{figure_in_words(objective, without)} ({_part(price)})"
         )
-        made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))
+        made.append(Trade("interval", math.nan, math.nan, price > _NOTHING, without, words))
     return tuple(made)
 
 
 def _price(search: Search, value: float, without: float, what: str = "it") -> str:
-    lost = search.objective.lost(value, without)
-    return f"without {what} {figure_in_words(search.objective.name, without)} ({_part(lost)})"
+    price = lost(search.objective, value, without)
+    return f"without {what} {figure_in_words(search.objective, without)} ({_part(price)})"
 
 
 def _part(lost: float) -> str:

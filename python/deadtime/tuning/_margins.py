@@ -21,9 +21,6 @@ from deadtime.tuning._problem import Problem
 MARGINS = ("gain_margin", "phase_margin", "delay_margin")
 UNITS = {"gain_margin": "", "phase_margin": "°", "delay_margin": " s"}
 
-#: What is added to a requirement, as a multiple of what the exact margins miss of it.
-_RAISED = 1.1
-
 
 class RequiredMargins(NamedTuple):
     """Least gain margin (a factor), phase margin in degrees and delay margin in s; 0 for none."""
@@ -56,32 +53,16 @@ class RequiredMargins(NamedTuple):
         """The margins that are required, by name."""
         return {name: value for name, value in self._asdict().items() if value > 0.0}
 
-    @property
-    def vector(self) -> Array:
-        return np.array(self)
-
     def without(self, name: str) -> RequiredMargins:
         """The other requirements."""
         return self._replace(**{name: 0.0})
 
-    def scaled(self, factor: float) -> RequiredMargins:
-        """All requirements multiplied by a factor."""
-        return RequiredMargins(*(factor * self.vector).tolist())
 
-    def raised(self, missing: Array) -> RequiredMargins:
-        """Each requirement raised by what is missing, and a little more."""
-        return RequiredMargins(*(self.vector + _RAISED * missing).tolist())
+def exact_margins(problem: Problem, gains: Array, scenarios: Sequence[Scenario]) -> Array:
+    """Gain, phase and delay margin, Ms and Mt in each scenario, shape (scenarios, 5)."""
+    return problem.candidates(scenarios).margins(gains.tolist(), True)
 
 
-def exact_margins(
-    problem: Problem,
-    gains: Array,
-    scenarios: Sequence[Scenario],
-    required: RequiredMargins | None = None,
-) -> Array:
-    """Gain, phase and delay margin, Ms and Mt in each scenario, shape (scenarios, 5).
-
-    With `required` the delay margin, which takes most of the time, may be NaN where it is not.
-    """
-    late = required is None or required.delay_margin > 0.0
-    return problem.candidates(scenarios).margins(gains.tolist(), late)
+def least_margins(each: Array) -> Array:
+    """Least of margins (scenarios, 3); none at all where a scenario is not stable."""
+    return np.asarray(np.where(np.isnan(each), 0.0, each).min(axis=0))

@@ -88,16 +88,20 @@ class Problem(PickledByFields):
 
     def candidates(self, scenarios: Sequence[Scenario]) -> Candidates:
         """The loops with any gains in these scenarios, for the kernel."""
-        return self._gathered.at(scenarios)
+        return Candidates(self.gathered.at(scenarios), self.gathered.free)
 
     @cached_property
-    def _gathered(self) -> Gathered:
-        return Gathered(self.loop, self.free, tuple(self.intervals))
+    def gathered(self) -> Gathered:
+        """The loops of the kernel."""
+        return Gathered(self.loop, self.free)
 
     def filtered(self, smooth: DerivativeFilter | None) -> Problem:
         """The same problem with another filter of the derivative, or none."""
         controller = with_filter(self.loop.controller, smooth)
-        return replace(self, loop=self.loop.replace(controller=controller))
+        found = replace(self, loop=self.loop.replace(controller=controller))
+        # Where gains are looked for follows from proportional control, which has no filter.
+        vars(found)["spans"] = self.spans
+        return found
 
     def scenarios(self, points: int) -> tuple[Scenario, ...]:
         """Every combination of `points` values of each unknown number."""
@@ -110,14 +114,14 @@ class Problem(PickledByFields):
             for some in itertools.product(*values)
         )
 
-    @property
+    @cached_property
     def corners(self) -> tuple[Scenario, ...]:
         """Ends and middle of each interval, or the extremes of the region."""
         if self.region is not None:
             return (self.region.estimate, *self.region.extremes)
         return self.scenarios(3)
 
-    @property
+    @cached_property
     def middle(self) -> Scenario:
         """All numbers in the middles of their intervals, or as they were estimated."""
         if self.region is not None:

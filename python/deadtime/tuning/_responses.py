@@ -16,7 +16,7 @@ from deadtime.loops import PI, PID, ControlLoop, sweep
 from deadtime.tuning._candidates import Scenario
 from deadtime.tuning._demands import Demands, white_to
 from deadtime.tuning._exchange import fine, proved
-from deadtime.tuning._native import Loop, RobustGains, noise_gain, robust_gains
+from deadtime.tuning._native import RobustGains, noise_gain, robust_gains
 from deadtime.tuning._problem import ObjectiveName, Problem
 from deadtime.tuning._result import Design, LeastMargins, Trade, figure_in_words
 from deadtime.tuning._settling import step_info
@@ -76,20 +76,18 @@ class Wanted:
     ) -> RobustGains:
         """The best gains over these scenarios, of which the search begins with the corners."""
         problem, needed = self.problem, demands or self.demands
-        specification = problem.loop.specification
-        loops: list[Loop] = [specification.kernel_at(one) for one in scenarios]
+        loops = problem.gathered.at(scenarios)
         template = problem.loop.controller
         loops[corners:corners] = [
             other.replace(controller=template).specification.kernel for other in self.others
         ]
-        names = [*template.gains]
         by_integral, by_settling = RESPONSES[self.objective]
         margins = needed.margins
         spans = problem.given
         return robust_gains(
             loops,
             corners + len(self.others),
-            [names.index(name) for name in problem.free],
+            problem.gathered.free,
             (self.weight, by_integral, by_settling),
             (
                 needed.max_sensitivity or MAX_SENSITIVITY,

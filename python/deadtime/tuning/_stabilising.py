@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from deadtime.loops import ControlLoop, P
 from deadtime.roots import crossings
 from deadtime.systems import TransferFunction
+from deadtime.tuning._native import Candidates
 
 Range = tuple[float, float]
 
@@ -78,11 +79,9 @@ def stable_gains(loop: ControlLoop) -> StableGains:
     far = 2.0 * max(abs(edges[0]), abs(edges[-1])) or 1.0
     tests = [-far, *(0.5 * (low + high) for low, high in pairwise(edges)), far]
     ends = [-np.inf, *edges, np.inf]
-    stable = [
-        gap
-        for gap, gain in zip(pairwise(ends), tests, strict=True)
-        if plain.replace(Kp=gain).is_stable()
-    ]
+    judged = Candidates([plain.specification.kernel], [0])
+    late = judged.costs(np.array(tests)[:, None], "abscissa", None)[:, 0]
+    stable = [gap for gap, pole in zip(pairwise(ends), late, strict=True) if pole < 0.0]
     return StableGains(_joined(stable), most, sign)
 
 
@@ -166,8 +165,8 @@ def _most(plain: ControlLoop, num: NDArray[np.float64], den: NDArray[np.float64]
 
 def _sampled_edges(plain: ControlLoop) -> list[float]:
     """Gains of either sign at which a pole of a sampled loop may be on the unit circle."""
-    up, down = plain.margin().gain_margins, plain.replace(Kp=-1.0).margin().gain_margins
-    every = np.append(up, -down)
+    up, down = (loop._margin(delay_margin=False) for loop in (plain, plain.replace(Kp=-1.0)))
+    every = np.append(up.gain_margins, -down.gain_margins)
     # A zero or pole of the plant on the unit circle gives a gain that is rounding only.
     size = np.median(np.abs(every)) if every.size else 1.0
     known = (np.abs(every) < size / _ROUNDING) & (np.abs(every) > size * _ROUNDING)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from deadtime._base.arrays import Array, Mask
+from deadtime._base.arrays import Array
 from deadtime.stability import StabilityMap, stability_map
 from deadtime.tuning._candidates import Scenario
 from deadtime.tuning._problem import Problem
@@ -25,15 +25,6 @@ _BEYOND = 0.5
 
 #: How far a map without a survey reaches, as a multiple of the gains.
 _SHOWN = 3.0
-
-#: Further gains between zero and the first cell, as parts of it, and the points along each other
-#: gain there: an integral gain that small gives steps that no cell shows. Loops with still smaller
-#: ones take hundreds of settling times to come to rest.
-_FRINGE = np.array([0.5, 0.25])
-_FRINGE_SIDES = {1: 1, 2: 31, 3: 7}
-
-#: Least distance between two points from which searches begin, in cells of the map.
-_APART = 3.5
 
 #: Maps by the numbers that are the same in all their cells.
 Maps = dict[frozenset[tuple[str, float]], StabilityMap]
@@ -58,68 +49,16 @@ class Survey:
     maps: Maps = field(default_factory=dict, repr=False)
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """Points along each axis."""
-        return tuple(map(len, self.axes))
-
-    @property
-    def points(self) -> Array:
-        """Every point of the grid, one a row."""
-        return grid_points(self.axes)
-
-    @property
-    def stable(self) -> Mask:
-        """Points that are stable in every scenario, those with gains of zero left out."""
-        found = np.isfinite(self.abscissa.ravel()) & np.any(self.points != 0.0, axis=1)
-        return np.asarray(found)
-
-    @property
-    def fringes(self) -> list[list[Array]]:
-        """Grids with one gain between zero and its first cell, where an axis begins at zero."""
-        found = []
-        sides = _FRINGE_SIDES[len(self.axes)]
-        for i, (axis, side) in enumerate(zip(self.axes, self.spacing, strict=True)):
-            if axis[0] * axis[-1] == 0.0:
-                grid = [other[:: -(-len(other) // sides)] for other in self.axes]
-                grid[i] = np.sort(np.sign(axis[0] + axis[-1]) * side * _FRINGE)
-                found.append(grid)
-        return found
-
-    def off_zero(self, start: Array) -> Array:
-        """Lower and upper bounds of a search by simulation, rows: gains stay off zero."""
-        bounds = np.array(self.bounds).T
-        off = _FRINGE.min() * self.spacing
-        away = (bounds == 0.0) & (start != 0.0)
-        return np.asarray(np.where(away, np.array([off, -off]), bounds))
-
-    @property
-    def spacing(self) -> Array:
-        return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
-
-    @property
-    def bounds(self) -> list[tuple[float, float]]:
-        return [(float(axis[0]), float(axis[-1])) for axis in self.axes]
-
-    def chosen(self, points: Array, costs: Array, most: int) -> Array:
-        """The points with the least finite costs that are no neighbours of one another."""
-        found: list[Array] = []
-        left = costs.copy()
-        while len(found) < most and np.isfinite(left.min()):
-            best = points[int(np.argmin(left))]
-            found.append(best)
-            left[np.all(np.abs(points - best) <= _APART * self.spacing, axis=1)] = np.inf
-        return np.array(found)
+    def is_empty(self) -> bool:
+        """Whether no gains but those of zero are stable in every scenario."""
+        stable = np.isfinite(self.abscissa)
+        zero = np.ix_(*(axis == 0.0 for axis in self.axes))
+        stable[zero] = False
+        return not stable.any()
 
 
-def grid_points(axes: Sequence[Array]) -> Array:
-    """Every point of a grid, one a row."""
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
-
-
-def surveyed(
-    problem: Problem, shape: Sequence[int] | None, scenarios: Sequence[Scenario] = ()
-) -> Survey:
-    """Map the free gains of a problem in each of its corners, or in these scenarios."""
+def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
+    """Map the free gains of a problem in each of its corners."""
     free = problem.free
     counts = _SHAPES[len(free)] if shape is None else tuple(shape)
     if len(counts) != len(free) or min(counts) < 2:
@@ -131,9 +70,9 @@ def surveyed(
             np.linspace(*spans[name], count) for name, count in zip(free, counts, strict=True)
         )
         maps: Maps = {}
-        worst = worst_abscissa(problem, axes, scenarios or problem.corners, maps)
+        worst = worst_abscissa(problem, axes, problem.corners, maps)
         survey = Survey(axes, worst, maps)
-        if survey.stable.any():
+        if not survey.is_empty:
             return survey
     tried = ", nor in ".join(
         " and ".join(f"{name} from {low:.4g} to {high:.4g}" for name, (low, high) in spans.items())
@@ -236,7 +175,8 @@ def _by_the_rest(
 
 def _mapped(problem: Problem, numbers: dict[str, float], axes: dict[str, Array]) -> StabilityMap:
     held = {name: value for name, value in numbers.items() if name not in axes}
-    return stability_map(problem.loop.replace(**held), axes, threads=problem.threads)
+    loop = problem.loop.replace(**held) if held else problem.loop
+    return stability_map(loop, axes, threads=problem.threads)
 
 
 def _judged(chart: StabilityMap) -> Array:

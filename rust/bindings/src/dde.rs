@@ -167,10 +167,6 @@ impl PyLinearLoop {
     pub(crate) fn of(inner: LinearLoop, output_lead: f64) -> Self {
         Self { inner, output_lead }
     }
-
-    pub(crate) fn core(&self) -> &LinearLoop {
-        &self.inner
-    }
 }
 
 #[pymethods]

@@ -31,7 +31,6 @@ mod runtime;
 mod solver;
 mod special;
 mod stability;
-mod sweeps;
 mod systems;
 mod tuning;
 mod ufunc;
@@ -93,8 +92,8 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::loops::{
-        LoopSensitivities, PyHeldPlane, PyLoop, SweepResponses, canonical_form,
-        feedback_polynomials, plant_polynomials, sampled_filter,
+        LoopSensitivities, PyHeldPlane, PyLoop, SweepMetrics, SweepResponses, canonical_form,
+        feedback_polynomials, first_duration, plant_polynomials, sampled_filter,
     };
     #[pymodule_export]
     use super::matrix::CharacteristicMatrix;
@@ -119,7 +118,8 @@ mod _deadtime {
     };
     #[pymodule_export]
     use super::tuning::{
-        PyCandidates, RobustGains, half_rule, lasting_load, noise_gain, robust_gains, tuning_rules,
+        FoundGains, GainSearch, PyCandidates, RobustGains, UnmetMargins, half_rule, lasting_load,
+        noise_gain, proved_step, robust_gains, tuning_rules,
     };
     #[pymodule_export]
     use super::ufunc::limit_threads;

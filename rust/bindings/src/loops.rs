@@ -5,16 +5,15 @@
 use std::sync::OnceLock;
 
 use deadtime::Error;
-use deadtime::dde::ensemble::Measures;
 use deadtime::dde::fixed_step::{self, Rest};
 use deadtime::dde::{Criteria, Request};
 use deadtime::loops::{
     ControlLoop, Controller, Each, Extra, Extras, Factors, Fraction, GivenPlant, HeldPlane, Input,
-    Kind, Monomial, Path, Place, Plant, Rule, SampledFilter, SlopesAsked, SweptLoops, Symbol,
-    Values,
+    Kind, Monomial, Path, Place, Plant, Rule, SampledFilter, SlopesAsked, SweptLoops, SweptMetrics,
+    Symbol, Values, first_duration as duration,
 };
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray1,
+    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -28,7 +27,6 @@ use crate::runtime::{run, run_attached, run_here};
 use crate::stability::{
     ByName, MapBoundary, MapCells, MapQuestion, cells_of, curves_of, specification,
 };
-use crate::sweeps::put;
 
 type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -240,6 +238,14 @@ pub(crate) struct LoopSets<'py> {
     amplitude: f64,
 }
 
+/// Metrics of step responses, a row a metric; what became of each loop; the longest response, s.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct SweepMetrics {
+    metrics: Py<PyArray2<f64>>,
+    status: Py<PyArray1<u8>>,
+    span: f64,
+}
+
 /// Step responses from rest, a row a loop, and what became of each.
 #[pyclass(frozen, get_all, module = "deadtime._deadtime")]
 pub(crate) struct SweepResponses {
@@ -300,6 +306,17 @@ impl PyLoop {
             values.given = Some(Fraction { num, den });
         }
         Ok(Self::of(self.inner.with(values)))
+    }
+
+    /// The same loop with other numbers, many times.
+    fn at_each(
+        &self,
+        numbers: Vec<ByName<f64>>,
+        given: Vec<Option<Given<f64>>>,
+    ) -> PyResult<Vec<Self>> {
+        let each = numbers.into_iter().zip(given);
+        each.map(|(numbers, given)| self.at(numbers, given))
+            .collect()
     }
 
     /// Raise where the parts do not fit.
@@ -534,87 +551,56 @@ impl PyLoop {
         })
     }
 
-    /// Measure step responses of `span` seconds. Metrics, with the last times at which commands were at
-    /// their limits behind them, and status are written to `columns` and `status`, one element for each
-    /// loop.
-    #[pyo3(signature = (sets, *, columns, status, span, settling, rise, threads=None, progress=None))]
+    /// Measure step responses over `span` seconds, or without that until they have settled.
+    #[pyo3(signature = (sets, *, span, settling, rise, threads=None, progress=None))]
     #[expect(
         clippy::too_many_arguments,
         reason = "keywords with the names of the public function"
     )]
-    fn sweep_metrics<'py>(
+    fn sweep_metrics(
         &self,
-        py: Python<'py>,
-        sets: LoopSets<'py>,
-        mut columns: Vec<PyReadwriteArray1<'py, f64>>,
-        mut status: PyReadwriteArray1<'py, u8>,
-        span: f64,
+        py: Python<'_>,
+        sets: LoopSets<'_>,
+        span: Option<f64>,
         settling: f64,
         rise: (f64, f64),
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<()> {
+    ) -> PyResult<SweepMetrics> {
         let criteria = Criteria { rise, settling };
-        let columns = columns.iter_mut().map(|column| column.as_slice_mut());
-        let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
-        let status = status.as_slice_mut()?;
-        self.swept(&sets, |swept| {
+        let found = self.swept(&sets, |swept| {
             run(py, threads, progress.as_ref(), |task| {
-                let keep = |sets: &[usize], measures: &Measures| {
-                    for (column, metrics) in columns.iter_mut().zip(measures.columns()) {
-                        put(column, sets, metrics);
-                    }
-                    for (&set, outcome) in sets.iter().zip(measures.outcomes()) {
-                        if let Some(place) = status.get_mut(set) {
-                            *place = outcome as u8;
-                        }
-                    }
-                };
-                swept.metrics(span, &criteria, task, keep)
+                swept.measured(span, &criteria, task)
             })
+        })?;
+        let status = column(&found.outcomes, |outcome| *outcome as u8)?;
+        let shape = [SweptMetrics::METRICS, status.len()];
+        Ok(SweepMetrics {
+            span: found.span,
+            metrics: found
+                .into_metrics()
+                .into_pyarray(py)
+                .reshape(shape)?
+                .unbind(),
+            status: status.into_pyarray(py).unbind(),
         })
     }
 
-    /// Command at rest of each loop, limit left out, and the slowest time of its plant and controller, s.
-    fn sweep_rest<'py>(
+    /// Whether a simulated response stays in the band in which it is since `settled`, s; `command` is
+    /// that at rest without limits, NaN without a rest.
+    fn stays_settled(
         &self,
-        py: Python<'py>,
-        sets: LoopSets<'py>,
-    ) -> PyResult<(Vector<'py>, Vector<'py>)> {
-        let found = self.swept(&sets, |swept| converted(swept.resting()))?;
-        let command = column(&found, |one| one.command)?;
-        let slowest = column(&found, |one| one.slowest)?;
-        Ok((command.into_pyarray(py), slowest.into_pyarray(py)))
-    }
-
-    /// Spectral abscissae of loops without their limits, 1/s; NaN where none is found.
-    #[pyo3(signature = (sets, *, threads=None))]
-    fn sweep_abscissae<'py>(
-        &self,
-        py: Python<'py>,
-        sets: LoopSets<'py>,
-        threads: Option<usize>,
-    ) -> PyResult<Vector<'py>> {
-        let found = self.swept(&sets, |swept| {
-            run(py, threads, None, |task| swept.abscissae(task))
-        })?;
-        Ok(found.into_pyarray(py))
-    }
-
-    /// Whether loops without their limits decay at `rates` in 1/s at least; one for each loop.
-    #[pyo3(signature = (sets, rates, *, threads=None))]
-    fn sweep_decay<'py>(
-        &self,
-        py: Python<'py>,
-        sets: LoopSets<'py>,
-        rates: Floats<'py>,
-        threads: Option<usize>,
-    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let rates = in_order(&rates)?;
-        let found = self.swept(&sets, |swept| {
-            run(py, threads, None, |task| swept.decay(&rates, task))
-        })?;
-        Ok(found.into_pyarray(py))
+        py: Python<'_>,
+        times: Floats<'_>,
+        commands: Floats<'_>,
+        command: f64,
+        settled: f64,
+    ) -> PyResult<bool> {
+        let (times, commands) = (in_order(&times)?, in_order(&commands)?);
+        run_here(py, |task| {
+            self.inner
+                .stays_settled(&times, &commands, command, settled, task)
+        })
     }
 
     /// Step responses at times after the start.
@@ -765,4 +751,11 @@ pub(crate) fn sampled_filter<'py>(
         found.c.into_pyarray(py),
         found.d,
     ))
+}
+
+/// First duration of a step response in s, by its longest delay and the poles of A.
+#[pyfunction]
+pub(crate) fn first_duration(a: Floats<'_>, delay: f64) -> PyResult<f64> {
+    let side = a.shape().first().copied().unwrap_or(0);
+    converted(duration(&in_order(&a)?, side, delay))
 }

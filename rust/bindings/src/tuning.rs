@@ -1,57 +1,32 @@
 //! Bindings of `deadtime::tuning`.
 
 use deadtime::Error;
+use deadtime::frequency::Margins;
+use deadtime::loops::ControlLoop;
 use deadtime::tuning::{
-    self, Candidates, Decisive, Demands, Goal, Loops, Objective, Posed, Scenario, Wish, Within,
+    self, Candidates, Demands, Found, Objective, Posed, Sought, Spot, Step, Survey, Wish,
 };
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use numpy::{
+    IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
+};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{converted, rows};
-use crate::dde::PyLinearLoop;
+use crate::arrays::{converted, owned, rows};
 use crate::frequency::PyMargins;
 use crate::loops::PyLoop;
 use crate::runtime::{run, run_here};
-use crate::stability::PyFamily;
 
 type Points<'py> = PyReadonlyArray2<'py, f64>;
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
+type Floats<'py> = PyReadonlyArrayDyn<'py, f64>;
 
-/// What the gains act on: the characteristic function, or of each kind of scenario the loops with one
-/// gain of one and the others of zero.
-#[derive(FromPyObject)]
-pub(crate) enum GivenLoops<'py> {
-    Continuous(Bound<'py, PyFamily>),
-    Sampled(Vec<Vec<Bound<'py, PyLinearLoop>>>),
+fn objective_of(name: &str) -> PyResult<Objective> {
+    Objective::named(name)
+        .ok_or_else(|| PyValueError::new_err(format!("{name:?}: there is no such objective")))
 }
 
-/// The numbers of a loop besides its free gains, the kind of a sampled loop, and lag and sample time.
-#[derive(FromPyObject)]
-pub(crate) struct GivenScenario(Vec<f64>, usize, f64);
-
-/// What is made best, the least margins, and the size of the objective.
-#[derive(FromPyObject)]
-pub(crate) struct GivenGoal {
-    objective: String,
-    required: [f64; 3],
-    scale: f64,
-}
-
-impl From<GivenGoal> for Goal {
-    fn from(given: GivenGoal) -> Self {
-        Self {
-            objective: objective_of(&given.objective),
-            required: given.required,
-            scale: given.scale,
-        }
-    }
-}
-
-fn objective_of(name: &str) -> Objective {
-    match name {
-        "damping" => Objective::Damping,
-        _ => Objective::Abscissa,
-    }
+fn cores(loops: &[Bound<'_, PyLoop>]) -> Vec<ControlLoop> {
+    loops.iter().map(|of| of.get().core().clone()).collect()
 }
 
 /// Loops that differ in the gains of their controller, in some scenarios.
@@ -64,39 +39,14 @@ pub(crate) struct PyCandidates {
 #[pymethods]
 impl PyCandidates {
     #[new]
-    fn new(
-        loops: GivenLoops<'_>,
-        gains: usize,
-        delay: usize,
-        scenarios: Vec<GivenScenario>,
-    ) -> PyResult<Self> {
-        let loops = match loops {
-            GivenLoops::Continuous(function) => {
-                converted(Loops::continuous(&function.get().inner, gains))?
-            }
-            GivenLoops::Sampled(kinds) => {
-                let kind = |loops: &Vec<Bound<'_, PyLinearLoop>>| {
-                    let loops = loops.iter();
-                    loops.map(|one| one.get().core().clone()).collect()
-                };
-                Loops::Sampled(kinds.iter().map(kind).collect())
-            }
-        };
-        let scenario = |GivenScenario(numbers, kind, time)| Scenario {
-            numbers,
-            kind,
-            time,
-        };
-        let scenarios: Vec<Scenario> = scenarios.into_iter().map(scenario).collect();
-        let count = scenarios.len();
-        let inner = Candidates::new(loops, delay, scenarios);
-        Ok(Self {
-            inner,
-            scenarios: count,
-        })
+    fn new(loops: Vec<Bound<'_, PyLoop>>, free: Vec<usize>) -> Self {
+        Self {
+            scenarios: loops.len(),
+            inner: Candidates::new(cores(&loops), free),
+        }
     }
 
-    /// The cost of each row of gains in each scenario.
+    /// The cost of each row of gains in each scenario, by its poles.
     fn costs<'py>(
         &self,
         py: Python<'py>,
@@ -104,26 +54,13 @@ impl PyCandidates {
         objective: &str,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let objective = objective_of(objective);
+        let objective = objective_of(objective)?;
         let found = self.of_points(py, &points, threads, |points, task| {
             self.inner.costs(objective, points, task)
         })?;
         found
             .into_pyarray(py)
             .reshape([points.as_array().nrows(), self.scenarios])
-    }
-
-    /// The worst spectral abscissa of each row of gains, infinite where a loop is not stable.
-    fn stable_abscissae<'py>(
-        &self,
-        py: Python<'py>,
-        points: Points<'py>,
-        threads: Option<usize>,
-    ) -> PyResult<Vector<'py>> {
-        let found = self.of_points(py, &points, threads, |points, task| {
-            self.inner.stable_abscissae(points, task)
-        })?;
-        Ok(found.into_pyarray(py))
     }
 
     /// Margins of each row of gains in each scenario, where all of them are stable.
@@ -140,82 +77,7 @@ impl PyCandidates {
         found.concat().into_pyarray(py).reshape(shape)
     }
 
-    /// By how much rows of gains of stable loops fall short of margins; where it is more than `most`
-    /// it may be too small.
-    fn shortfalls<'py>(
-        &self,
-        py: Python<'py>,
-        points: Points<'py>,
-        required: [f64; 3],
-        most: f64,
-        threads: Option<usize>,
-    ) -> PyResult<Vector<'py>> {
-        let goal = Goal {
-            objective: Objective::Abscissa,
-            required,
-            scale: 1.0,
-        };
-        let found = self.of_points(py, &points, threads, |points, task| {
-            self.inner.shortfalls(&goal, points, most, task)
-        })?;
-        Ok(found.into_pyarray(py))
-    }
-
-    /// Place and cost of the best row of gains.
-    fn least(&self, py: Python<'_>, points: Points<'_>, goal: GivenGoal) -> PyResult<(usize, f64)> {
-        let (goal, points) = (goal.into(), rows(&points));
-        let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
-        run_here(py, |task| tuning::least(&self.inner, &goal, &points, task))
-    }
-
-    /// The cost of gains with what they miss of the margins.
-    fn total(&self, py: Python<'_>, gains: Vec<f64>, goal: GivenGoal) -> PyResult<f64> {
-        let goal = Goal::from(goal);
-        let mut last = Decisive::default();
-        run_here(py, |task| {
-            goal.total(&self.inner, &gains, f64::INFINITY, &mut last, task)
-        })
-    }
-
-    /// The best gains within reach of a start, between the bounds in the rows of a matrix.
-    fn best_within<'py>(
-        &self,
-        py: Python<'py>,
-        goal: GivenGoal,
-        start: Vec<f64>,
-        reach: Vec<f64>,
-        bounds: Vec<(f64, f64)>,
-    ) -> PyResult<Vector<'py>> {
-        let (goal, within) = (
-            goal.into(),
-            Within {
-                start,
-                reach,
-                bounds,
-            },
-        );
-        let found = run_here(py, |task| {
-            tuning::best_within(&self.inner, &goal, &within, task)
-        })?;
-        Ok(found.into_pyarray(py))
-    }
-
-    /// The delay at which gains cost most in a scenario, and that cost.
-    fn worst_delay(
-        &self,
-        py: Python<'_>,
-        gains: Vec<f64>,
-        objective: &str,
-        scenario: usize,
-        ends: (f64, f64),
-    ) -> PyResult<(f64, f64)> {
-        let objective = objective_of(objective);
-        run_here(py, |task| {
-            tuning::worst_delay(&self.inner, objective, &gains, scenario, ends, task)
-        })
-    }
-
-    /// Gain, phase and delay margin, Ms and Mt of gains in each scenario, NaN where a loop is not stable.
+    /// Gain, phase and delay margin, Ms and Mt of gains in each scenario.
     fn margins<'py>(
         &self,
         py: Python<'py>,
@@ -223,8 +85,17 @@ impl PyCandidates {
         delay_margin: bool,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let found = run_here(py, |task| self.inner.margins(&gains, delay_margin, task))?;
-        let count = found.len();
-        found.concat().into_pyarray(py).reshape([count, 5])
+        let figures = |found: &Margins| {
+            [
+                found.gain_margin,
+                found.phase_margin,
+                found.delay_margin,
+                found.peaks.sensitivity.value,
+                found.peaks.complementary.value,
+            ]
+        };
+        let rows: Vec<f64> = found.iter().flat_map(figures).collect();
+        rows.into_pyarray(py).reshape([found.len(), 5])
     }
 
     /// Least damping ratio of the dominant poles and spectral abscissa of gains in each scenario.
@@ -255,6 +126,161 @@ impl PyCandidates {
         let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         run(py, threads, None, |task| find(&points, task))
     }
+}
+
+/// What gains are sought for: loops in all scenarios, places of the free gains, scenarios by their places
+/// (`corners` to begin with, `fine` to judge, `places` of exact margins), objective, least margins, step,
+/// and the map to begin from.
+#[derive(FromPyObject)]
+pub(crate) struct GivenSearch<'py> {
+    loops: Vec<Bound<'py, PyLoop>>,
+    free: Vec<usize>,
+    corners: Vec<usize>,
+    fine: Vec<usize>,
+    places: Option<Vec<usize>>,
+    objective: String,
+    required: [f64; 3],
+    amplitude: f64,
+    axes: Vec<Floats<'py>>,
+    abscissa: Floats<'py>,
+    threads: Option<usize>,
+}
+
+/// A scenario: the place of a loop, and a delay.
+type GivenSpot = (usize, f64);
+
+/// The figures of a step that is proved to rest: settling time in s, and overshoot in %.
+type ProvedStep = (f64, f64);
+
+/// A search for gains that are best in the worst of many scenarios.
+#[pyclass(frozen, module = "deadtime._deadtime")]
+pub(crate) struct GainSearch {
+    inner: Sought,
+    threads: Option<usize>,
+}
+
+/// Gains, the scenarios they are best for, their cost in the worst of all, that one, and their value
+/// there.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct FoundGains {
+    gains: Vec<f64>,
+    scenarios: Vec<GivenSpot>,
+    cost: f64,
+    worst: GivenSpot,
+    checked: usize,
+    value: f64,
+}
+
+/// What of each margin is to be had alone; the gains that miss them least, and their least margins.
+#[pyclass(frozen, get_all, module = "deadtime._deadtime")]
+pub(crate) struct UnmetMargins {
+    alone: Vec<f64>,
+    gains: Vec<f64>,
+    together: Vec<f64>,
+}
+
+#[pymethods]
+impl GainSearch {
+    #[new]
+    fn new(question: GivenSearch<'_>) -> PyResult<Self> {
+        let axes = question.axes.iter().map(owned).collect::<PyResult<_>>()?;
+        let inner = Sought {
+            loops: cores(&question.loops),
+            free: question.free,
+            corners: question.corners,
+            fine: question.fine,
+            places: question.places,
+            objective: objective_of(&question.objective)?,
+            required: question.required,
+            amplitude: question.amplitude,
+            survey: Survey {
+                axes,
+                abscissa: owned(&question.abscissa)?,
+            },
+        };
+        Ok(Self {
+            inner,
+            threads: question.threads,
+        })
+    }
+
+    /// The best gains in the worst scenario of all, from the map or from around a start.
+    #[pyo3(signature = (start=None))]
+    fn best(&self, py: Python<'_>, start: Option<Vec<f64>>) -> PyResult<Py<PyAny>> {
+        let found = run(py, self.threads, None, |task| {
+            self.inner.best(start.as_deref(), task)
+        })?;
+        let spot = |one: &Spot| (one.place, one.delay);
+        match found {
+            Found::Gains(found) => Ok(Py::new(
+                py,
+                FoundGains {
+                    scenarios: found.scenarios.iter().map(spot).collect(),
+                    worst: spot(&found.worst),
+                    gains: found.gains,
+                    cost: found.cost,
+                    checked: found.checked,
+                    value: found.value,
+                },
+            )?
+            .into_any()),
+            Found::Unmet(alone, gains, together) => Ok(Py::new(
+                py,
+                UnmetMargins {
+                    alone: alone.to_vec(),
+                    gains,
+                    together: together.to_vec(),
+                },
+            )?
+            .into_any()),
+        }
+    }
+
+    /// The value of the best gains for some scenarios alone.
+    fn best_in(
+        &self,
+        py: Python<'_>,
+        scenarios: Vec<GivenSpot>,
+        required: [f64; 3],
+    ) -> PyResult<f64> {
+        let found = run(py, self.threads, None, |task| {
+            self.inner.best_in(&spots(scenarios), required, task)
+        })?;
+        Ok(found.1)
+    }
+
+    /// Steps with gains in scenarios, proved to rest; none where that fails.
+    fn proved_steps(
+        &self,
+        py: Python<'_>,
+        scenarios: Vec<GivenSpot>,
+        gains: Vec<f64>,
+    ) -> PyResult<Vec<Option<ProvedStep>>> {
+        let found = run(py, self.threads, None, |task| {
+            self.inner.proved_steps(&spots(scenarios), &gains, task)
+        })?;
+        Ok(found.into_iter().map(|step| step.map(figures)).collect())
+    }
+}
+
+fn spots(given: Vec<GivenSpot>) -> Vec<Spot> {
+    let spot = |(place, delay)| Spot { place, delay };
+    given.into_iter().map(spot).collect()
+}
+
+fn figures(step: Step) -> ProvedStep {
+    (step.settling_time, step.overshoot)
+}
+
+/// A step of the reference that is proved to rest; none where that fails.
+#[pyfunction]
+pub(crate) fn proved_step(
+    py: Python<'_>,
+    of: &PyLoop,
+    amplitude: f64,
+) -> PyResult<Option<ProvedStep>> {
+    let found = run_here(py, |task| tuning::proved_step(of.core(), amplitude, task))?;
+    Ok(found.map(figures))
 }
 
 /// Weight of the load, and whether the integral of its error and the settling time of a set point are
@@ -292,9 +318,8 @@ pub(crate) fn robust_gains(
     shape: Option<Vec<f64>>,
     slack: f64,
 ) -> PyResult<RobustGains> {
-    let loops = loops.iter();
     let posed = Posed {
-        loops: loops.map(|of| of.get().core().clone()).collect(),
+        loops: cores(&loops),
         first,
         free,
         wish: Wish {

@@ -138,6 +138,14 @@ impl Task {
         self.done.fetch_add(items, Ordering::Relaxed);
     }
 
+    /// Count `items` less as finished: they are done again.
+    pub(crate) fn take_back(&self, items: u64) {
+        let less = |done: u64| Some(done.saturating_sub(items));
+        let _ = self
+            .done
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
+    }
+
     /// Number of finished items.
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)

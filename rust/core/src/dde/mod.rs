@@ -21,7 +21,7 @@ pub use control_loop::{
     Bounds, Criteria, Deviation, Equations, Kick, LinearLoop, Metrics, Reference, Request,
     Response, Start, Trajectory, Update, ensemble, fixed_step, on_sample, sampled,
 };
-pub(crate) use control_loop::{DeviationMetrics, Ending, RequestedOutput};
+pub(crate) use control_loop::{DeviationMetrics, Ending, RequestedOutput, TIME_CONSTANTS};
 pub(crate) use limits::countable;
 pub use rate_limits::RateLimits;
 pub use scalar::{Dual, Scalar};

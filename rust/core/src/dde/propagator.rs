@@ -76,6 +76,11 @@ impl<S: Scalar> Propagator<S> {
         phi
     }
 
+    /// Φ − I, row-major.
+    pub(crate) fn growth(&self) -> &[S] {
+        &self.growth
+    }
+
     /// Γ of input `i`.
     pub(crate) fn gamma(&self, i: usize) -> &[S] {
         &self.gamma[i * self.n..(i + 1) * self.n]

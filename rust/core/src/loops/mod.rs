@@ -6,7 +6,8 @@
 //!   numbers.
 //! * `equations` closes the loop for the steppers of `dde`, `drive` has what drives it besides the
 //!   reference, `inputs` adds that, `load` measures the response to it, `rest` is where a run starts,
-//!   `settled` how slow its parts are, `slopes` has derivatives of a response, `sweep` many loops.
+//!   `settled` how slow its parts are, `slopes` has derivatives of a response, `sweep` many loops, and
+//!   `settling` whether their responses settle.
 //! * `characteristic` has the characteristic function, families of it and transfer functions, `held`
 //!   the rows of a map of a sampled loop, `plane` that map, and `range` the stable values of a number.
 
@@ -27,6 +28,7 @@ mod polynomial;
 mod range;
 mod rest;
 mod settled;
+mod settling;
 mod slopes;
 mod sweep;
 mod symbol;
@@ -43,6 +45,7 @@ pub use load::{DeviationAsked, Figures, MOST_DELAYS};
 pub use plane::HeldPlane;
 pub use plant::{Factors, Fraction, Plant, StateSpace};
 pub use range::GivenPlant;
+pub use settling::{SweptMetrics, first_duration};
 pub use slopes::SlopesAsked;
 pub use sweep::{Resting, SweptLoops};
 pub use symbol::{Monomial, Symbol};

@@ -19,7 +19,7 @@ use super::settled::slowest;
 const BLOCK: usize = 1 << 13;
 
 /// What memory is asked for.
-const SWEEP: &str = "the sweep";
+pub(super) const SWEEP: &str = "the sweep";
 
 /// Many loops, and the step of their reference.
 #[derive(Debug, Clone)]
@@ -58,7 +58,15 @@ impl<'a> SweptLoops<'a> {
         for (place, numbers) in moving {
             values.set(place, Each::from(numbers));
         }
-        values.given = given;
+        let own = || {
+            let given = of.values().given.as_ref()?;
+            let list = |part: &[f64]| part.iter().copied().map(Each::from).collect();
+            Some(Fraction {
+                num: list(&given.num),
+                den: list(&given.den),
+            })
+        };
+        values.given = given.or_else(own);
         refuse_if!(
             of.controller().is_discretised() && values.sample_time.is_some(),
             "a sweep cannot run a filter in samples: leave its discretisation out, or take loops one \
@@ -70,6 +78,51 @@ impl<'a> SweptLoops<'a> {
             count,
             amplitude,
         })
+    }
+
+    /// The loop whose numbers differ.
+    pub(super) fn of(&self) -> &ControlLoop {
+        self.of
+    }
+
+    /// Number of loops.
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// The numbers of all loops.
+    pub(super) fn values(&self) -> &Values<Each> {
+        &self.values
+    }
+
+    pub(super) fn is_sampled(&self) -> bool {
+        self.values.sample_time.is_some()
+    }
+
+    /// The loops in these places.
+    pub(super) fn only(&self, places: &[usize]) -> Self {
+        Self {
+            values: self.values_at(places),
+            count: places.len(),
+            ..*self
+        }
+    }
+
+    /// The numbers of the loops in these places.
+    fn values_at(&self, places: &[usize]) -> Values<Each> {
+        let part = |each: &Each| match each {
+            Each::Own(numbers) => {
+                let numbers = places.iter().map(|place| numbers[*place]);
+                Each::from(numbers.collect::<Vec<_>>())
+            }
+            shared @ Each::Shared(_) => shared.clone(),
+        };
+        let mut values = self.values.each(&part);
+        values.given = self.values.given.as_ref().map(|given| Fraction {
+            num: given.num.iter().map(part).collect(),
+            den: given.den.iter().map(part).collect(),
+        });
+        values
     }
 
     /// What the settling of each loop is judged by.
@@ -131,20 +184,7 @@ impl<'a> SweptLoops<'a> {
         for first in (0..self.count).step_by(BLOCK) {
             let places: Vec<usize> = (first..self.count.min(first + BLOCK)).collect();
             for places in groups(places, [&num, &den]) {
-                let part = |each: &Each| match each {
-                    Each::Own(numbers) => Each::from(
-                        places
-                            .iter()
-                            .map(|place| numbers[*place])
-                            .collect::<Vec<_>>(),
-                    ),
-                    shared @ Each::Shared(_) => shared.clone(),
-                };
-                let mut values = self.values.each(&part);
-                values.given = self.values.given.as_ref().map(|given| Fraction {
-                    num: given.num.iter().map(part).collect(),
-                    den: given.den.iter().map(part).collect(),
-                });
+                let values = self.values_at(&places);
                 let (states, entries) = self.entries(&values)?;
                 let entries: Vec<&[f64]> = entries.iter().map(Each::numbers).collect();
                 let is_ahead = self.of.is_measured();
@@ -347,7 +387,7 @@ impl<'a> SweptLoops<'a> {
 }
 
 /// The number of a loop.
-fn at(each: &Each, place: usize) -> f64 {
+pub(super) fn at(each: &Each, place: usize) -> f64 {
     match each {
         Each::Shared(number) => *number,
         Each::Own(numbers) => numbers.get(place).copied().unwrap_or(f64::NAN),

@@ -179,20 +179,6 @@ impl Family {
         QuasiPolynomial::new(coefficients, delays)
     }
 
-    /// The terms that depend on one of the first `count` parameters other than by a delay, and the
-    /// others.
-    ///
-    /// # Errors
-    /// None where this family has been checked.
-    pub fn parted(&self, count: usize) -> Result<(Self, Self), Error> {
-        let part = |depends: bool| {
-            let has = |term: &&Term| term.exponents.iter().take(count).any(|e| *e > 0) == depends;
-            let terms = self.terms.iter().flatten().filter(has);
-            Self::new(self.names.clone(), terms.cloned().collect())
-        };
-        Ok((part(true)?, part(false)?))
-    }
-
     /// A and B with h = A + p B, neither depending on the parameter p; `None` where h is not affine
     /// in it.
     pub fn split(&self, parameter: usize) -> Option<(Self, Self)> {

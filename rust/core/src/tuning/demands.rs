@@ -51,19 +51,13 @@ impl Demands {
 
     /// Gain, phase and delay margin of a stable loop as far as they are demanded.
     fn margins_of_stable(&self, of: &ControlLoop, task: &Task) -> Result<[f64; 3], Error> {
-        let turns = self.phase_margin > 0.0 || self.delay_margin > 0.0;
-        // Twice the demand is enough to interpolate.
-        let most = 2.0 * self.gain_margin;
-        if of.values().sample_time.is_none() {
-            let (n, d) = of.loop_gain()?;
-            return margins_of_stable(&n, &d, most, turns, task);
-        }
-        if self.delay_margin > 0.0 {
+        if is_sampled(of) && self.delay_margin > 0.0 {
             let found = margins_of(of, true, task)?;
             return Ok([found.gain_margin, found.phase_margin, found.delay_margin]);
         }
-        let linear = of.linear(Input::Reference)?;
-        held_margins_of_stable(HeldLoop::new(&linear)?, most, turns, task)
+        let turns = self.phase_margin > 0.0 || self.delay_margin > 0.0;
+        // Twice the demand is enough to interpolate.
+        stable_margins(of, (2.0 * self.gain_margin, turns), task)
     }
 
     /// By how much the figures of a stable loop miss the demands, relatively, that of Ms left out; not above
@@ -98,6 +92,27 @@ impl Demands {
     }
 }
 
+/// Does the loop have a hold?
+pub(super) fn is_sampled(of: &ControlLoop) -> bool {
+    of.values().sample_time.is_some()
+}
+
+/// Gain margin up to `most`, phase margin in degrees and delay margin in s of a loop that is stable,
+/// infinite without `turns`: of a sampled one by its turns. See [`margins_of_stable`] and
+/// [`held_margins_of_stable`].
+pub(super) fn stable_margins(
+    of: &ControlLoop,
+    (most, turns): (f64, bool),
+    task: &Task,
+) -> Result<[f64; 3], Error> {
+    if is_sampled(of) {
+        let linear = of.linear(Input::Reference)?;
+        return held_margins_of_stable(HeldLoop::new(&linear)?, most, turns, task);
+    }
+    let (n, d) = of.loop_gain()?;
+    margins_of_stable(&n, &d, most, turns, task)
+}
+
 /// Is a loop stable, hold and delay taken exactly, neutral ones strongly? Where rounding hides it, not.
 ///
 /// # Errors
@@ -121,7 +136,7 @@ pub(super) fn is_stable_loop(of: &ControlLoop, task: &Task) -> Result<bool, Erro
 /// # Errors
 /// As [`margins_of`].
 pub(super) fn sensitivity_of(of: &ControlLoop, task: &Task) -> Result<Option<Peak>, Error> {
-    if of.values().sample_time.is_some() {
+    if is_sampled(of) {
         let linear = of.linear(Input::Reference)?;
         return held_sensitivity(HeldLoop::new(&linear)?, task);
     }

@@ -3,7 +3,8 @@
 //! Margins are requirements: a shortfall costs many times as much as any gain in the objective, and
 //! is zero where the requirements are met.
 
-use super::candidates::{Candidates, Scenario};
+use super::candidates::{Candidates, abscissa, dominant, margins_or_none, unit_of_time};
+use crate::loops::ControlLoop;
 use crate::{Error, Task};
 
 /// Cost of a relative shortfall of 1 of a margin, in units of the objective: large enough that no
@@ -13,8 +14,9 @@ const PENALTY: f64 = 50.0;
 /// Shortfall of an unstable loop, whose crossings are no margins: that of all three together.
 pub(super) const UNSTABLE: f64 = 3.0;
 
-/// Cost of an unstable loop where the damping ratio counts: above every other cost.
-const NEVER: f64 = 1e6;
+/// Cost of an unstable loop where the damping ratio counts, and of a step that does not settle: above
+/// every other cost.
+pub(super) const NEVER: f64 = 1e6;
 
 /// Weight of the abscissa, in units of 1/(delay + lag), where the damping is equal. It is one over
 /// whole ranges of gains.
@@ -27,41 +29,54 @@ pub enum Objective {
     Abscissa,
     /// The damping ratio of the dominant poles largest.
     Damping,
+    /// The settling time of a step smallest.
+    SettlingTime,
+    /// The overshoot of a step smallest.
+    Overshoot,
 }
 
 /// An objective and the least margins: gain margin, phase margin in degrees, delay margin in s; zero
 /// for none.
 #[derive(Debug, Clone, Copy)]
-pub struct Goal {
+pub(super) struct Goal {
     /// What is made best.
-    pub objective: Objective,
+    pub(super) objective: Objective,
     /// See above.
-    pub required: [f64; 3],
+    pub(super) required: [f64; 3],
     /// The size of the objective.
-    pub scale: f64,
+    pub(super) scale: f64,
 }
 
 impl Objective {
-    /// The cost of a loop in one scenario, with another delay if one is given.
+    /// The objective of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "abscissa" => Self::Abscissa,
+            "damping" => Self::Damping,
+            "settling_time" => Self::SettlingTime,
+            "overshoot" => Self::Overshoot,
+            _ => return None,
+        })
+    }
+
+    /// Is it that of a simulated step? Others are of the poles.
+    pub(super) fn is_simulated(self) -> bool {
+        matches!(self, Self::SettlingTime | Self::Overshoot)
+    }
+
+    /// The cost of a loop by its poles.
     ///
     /// # Errors
-    /// As [`Candidates::dominant`].
-    pub(super) fn cost(
-        self,
-        of: &Candidates,
-        gains: &[f64],
-        scenario: &Scenario,
-        late: Option<f64>,
-        task: &Task,
-    ) -> Result<f64, Error> {
-        let (values, time) = of.values(gains, scenario, late);
-        if self == Self::Abscissa {
-            return of.abscissa(&values, scenario, task);
+    /// As [`dominant`].
+    pub(super) fn cost(self, of: &ControlLoop, task: &Task) -> Result<f64, Error> {
+        if self != Self::Damping {
+            return abscissa(of, task);
         }
-        let found = of.dominant(&values, scenario, task)?;
+        let found = dominant(of, task)?;
         if found.damping.is_nan() {
             return Ok(NEVER + found.abscissa);
         }
+        let time = unit_of_time(of);
         let unit = if time == 0.0 { 1.0 } else { time };
         Ok(-found.damping + TIE * found.abscissa * unit)
     }
@@ -69,7 +84,7 @@ impl Objective {
     /// The cost in the worst scenario; where it is more than `most`, perhaps that of another one.
     ///
     /// # Errors
-    /// As [`Candidates::dominant`].
+    /// As [`dominant`].
     pub(super) fn worst(
         self,
         of: &Candidates,
@@ -80,7 +95,7 @@ impl Objective {
     ) -> Result<f64, Error> {
         let mut worst = f64::NEG_INFINITY;
         for place in beginning_with(last.cost, of.scenarios.len()) {
-            let cost = self.cost(of, gains, &of.scenarios[place], None, task)?;
+            let cost = self.cost(&of.at(gains, &of.scenarios[place]), task)?;
             if cost > worst {
                 (worst, last.cost) = (cost, place);
             }
@@ -93,10 +108,7 @@ impl Objective {
 
     /// Is a loop of this cost stable?
     fn is_stable(self, cost: f64) -> bool {
-        cost < match self {
-            Self::Abscissa => 0.0,
-            Self::Damping => NEVER,
-        }
+        cost < if self == Self::Damping { NEVER } else { 0.0 }
     }
 }
 
@@ -110,8 +122,8 @@ impl Goal {
     /// too small.
     ///
     /// # Errors
-    /// As [`Candidates::dominant`].
-    pub fn total(
+    /// As [`dominant`].
+    pub(super) fn total(
         &self,
         of: &Candidates,
         gains: &[f64],
@@ -141,7 +153,7 @@ impl Goal {
     ///
     /// # Errors
     /// Those that end all work.
-    pub fn shortfall(
+    pub(super) fn shortfall(
         &self,
         of: &Candidates,
         gains: &[f64],
@@ -157,9 +169,7 @@ impl Goal {
         let mut least = [f64::INFINITY; 3];
         let mut missing = 0.0;
         for place in beginning_with(last.margins, of.scenarios.len()) {
-            let scenario = &of.scenarios[place];
-            let (values, _) = of.values(gains, scenario, None);
-            let found = of.stable_margins(&values, scenario, wanted, task)?;
+            let found = margins_or_none(&of.at(gains, &of.scenarios[place]), wanted, task)?;
             for (least, margin) in least.iter_mut().zip(found) {
                 *least = least.min(margin);
             }
@@ -181,7 +191,7 @@ impl Goal {
 
 /// The scenarios that decided last: they are looked at first.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Decisive {
+pub(super) struct Decisive {
     cost: usize,
     margins: usize,
 }

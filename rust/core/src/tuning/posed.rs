@@ -4,8 +4,10 @@
 //! the phase crossover of the plant, and the inverse hyperbolic sine of the derivative time in tenths of
 //! that unit. It gives a ray, gains `offset` + k `along`.
 
+use super::candidates::with_gains;
 use super::demands::Demands;
 use super::open::Scale;
+use super::survey;
 use crate::Error;
 use crate::elementary::exp;
 use crate::frequency::{Margins, first_term};
@@ -112,10 +114,7 @@ impl Posed {
 
     /// A loop with these free gains.
     pub(super) fn with(&self, of: &ControlLoop, gains: &[f64]) -> ControlLoop {
-        let pairs = self.free.iter().zip(gains);
-        pairs.fold(of.clone(), |made, (place, gain)| {
-            made.with_number(Place::Controller(*place), *gain)
-        })
+        with_gains(of, &self.free, gains)
     }
 
     /// The loop in a place with these free gains.
@@ -228,18 +227,9 @@ pub fn lasting(of: &ControlLoop) -> Result<f64, Error> {
 
 /// All points of the axes.
 pub(super) fn grid(axes: &[(f64, f64, usize)]) -> Vec<Vec<f64>> {
-    axes.iter()
-        .fold(vec![Vec::new()], |points, (low, high, count)| {
-            let values = (0..*count).map(|k| low + (high - low) * k as f64 / (*count - 1) as f64);
-            let values: Vec<f64> = values.collect();
-            let join = |point: &Vec<f64>, x: &f64| [&point[..], &[*x]].concat();
-            let each = points.iter();
-            each.flat_map(|point| {
-                values
-                    .iter()
-                    .map(move |x| join(point, x))
-                    .collect::<Vec<_>>()
-            })
-            .collect()
-        })
+    let values = |(low, high, count): &(f64, f64, usize)| {
+        let step = |k: usize| low + (high - low) * k as f64 / (*count - 1) as f64;
+        (0..*count).map(step).collect()
+    };
+    survey::grid(&axes.iter().map(values).collect::<Vec<Vec<f64>>>())
 }

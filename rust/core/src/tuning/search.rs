@@ -3,9 +3,10 @@
 //! Every cost has kinks, where two poles are equally far right or two scenarios equally bad, and the
 //! best gains lie on them. So nothing is differentiated. None of this proves a global minimum.
 
-use super::candidates::Candidates;
+use super::candidates::{Candidates, margins_or_none};
 use super::goal::{Decisive, Goal, Objective, UNSTABLE};
 use super::simplices;
+use crate::loops::{ControlLoop, Place};
 use crate::{Error, Task, between, parallel};
 
 /// Accuracy of the gains as a fraction of their ranges, of one gain and of several. Where roots meet
@@ -22,20 +23,20 @@ const ALONG_DELAY: usize = 500;
 
 /// Where gains are sought.
 #[derive(Debug, Clone)]
-pub struct Within {
+pub(super) struct Within {
     /// Where the search begins.
-    pub start: Vec<f64>,
+    pub(super) start: Vec<f64>,
     /// How far from it better ones may be.
-    pub reach: Vec<f64>,
+    pub(super) reach: Vec<f64>,
     /// Ends of each gain.
-    pub bounds: Vec<(f64, f64)>,
+    pub(super) bounds: Vec<(f64, f64)>,
 }
 
 impl Candidates {
     /// The cost of each point in each scenario, points first.
     ///
     /// # Errors
-    /// As [`Candidates::dominant`].
+    /// As [`Candidates::all_dominant`].
     pub fn costs(
         &self,
         objective: Objective,
@@ -43,11 +44,7 @@ impl Candidates {
         task: &Task,
     ) -> Result<Vec<f64>, Error> {
         self.each(points.len() * self.scenarios.len(), task, |place| {
-            let (point, scenario) = (
-                points[place / self.scenarios.len()],
-                &self.scenarios[place % self.scenarios.len()],
-            );
-            objective.cost(self, point, scenario, None, task)
+            objective.cost(&self.pair(points, place), task)
         })
     }
 
@@ -55,11 +52,15 @@ impl Candidates {
     ///
     /// # Errors
     /// Those that end all work.
-    pub fn stable_abscissae(&self, points: &[&[f64]], task: &Task) -> Result<Vec<f64>, Error> {
+    pub(super) fn stable_abscissae(
+        &self,
+        points: &[&[f64]],
+        task: &Task,
+    ) -> Result<Vec<f64>, Error> {
         self.each(points.len(), task, |place| {
             let mut worst = f64::NEG_INFINITY;
             for scenario in &self.scenarios {
-                let found = Objective::Abscissa.cost(self, points[place], scenario, None, task)?;
+                let found = Objective::Abscissa.cost(&self.at(points[place], scenario), task)?;
                 worst = worst.max(found);
                 if worst >= 0.0 {
                     return Ok(f64::INFINITY);
@@ -75,9 +76,7 @@ impl Candidates {
     /// Those that end all work.
     pub fn all_margins(&self, points: &[&[f64]], task: &Task) -> Result<Vec<[f64; 3]>, Error> {
         self.each(points.len() * self.scenarios.len(), task, |place| {
-            let scenario = &self.scenarios[place % self.scenarios.len()];
-            let (values, _) = self.values(points[place / self.scenarios.len()], scenario, None);
-            self.stable_margins(&values, scenario, (f64::INFINITY, true), task)
+            margins_or_none(&self.pair(points, place), (f64::INFINITY, true), task)
         })
     }
 
@@ -85,7 +84,7 @@ impl Candidates {
     ///
     /// # Errors
     /// Those that end all work.
-    pub fn shortfalls(
+    pub(super) fn shortfalls(
         &self,
         goal: &Goal,
         points: &[&[f64]],
@@ -95,6 +94,12 @@ impl Candidates {
         self.each(points.len(), task, |place| {
             goal.shortfall(self, points[place], most, &mut Decisive::default(), task)
         })
+    }
+
+    /// The loop of a place among all points in all scenarios, points first.
+    fn pair(&self, points: &[&[f64]], place: usize) -> ControlLoop {
+        let count = self.scenarios.len();
+        self.at(points[place / count], &self.scenarios[place % count])
     }
 
     fn each<T: Default + Send>(
@@ -120,7 +125,7 @@ impl Candidates {
 ///
 /// # Errors
 /// Those that end all work.
-pub fn least(
+pub(super) fn least(
     of: &Candidates,
     goal: &Goal,
     points: &[&[f64]],
@@ -155,8 +160,8 @@ pub fn least(
 /// The best gains that are found within reach of a start.
 ///
 /// # Errors
-/// As [`Candidates::dominant`].
-pub fn best_within(
+/// As [`Candidates::all_dominant`].
+pub(super) fn best_within(
     of: &Candidates,
     goal: &Goal,
     within: &Within,
@@ -183,24 +188,19 @@ pub fn best_within(
     simplices::minimum(cost, start, &sides, bounds, GAINS_KNOWN)
 }
 
-/// The delay between two ends at which gains cost most in a scenario, and that cost.
+/// The delay between two ends at which a loop costs most, and that cost.
 ///
 /// # Errors
-/// As [`Candidates::dominant`].
-pub fn worst_delay(
-    of: &Candidates,
+/// As [`Candidates::costs`].
+pub(super) fn worst_delay(
+    of: &ControlLoop,
     objective: Objective,
-    gains: &[f64],
-    scenario: usize,
     ends: (f64, f64),
     task: &Task,
 ) -> Result<(f64, f64), Error> {
-    let Some(scenario) = of.scenarios.get(scenario) else {
-        refuse!("{scenario}: there is no such scenario");
-    };
     let cost = |late: f64| {
         task.check()?;
-        Ok(-objective.cost(of, gains, scenario, Some(late), task)?)
+        Ok(-objective.cost(&of.with_number(Place::Delay, late), task)?)
     };
     let (late, cost) = between::minimum(cost, ends, DELAY_KNOWN * ends.1, ALONG_DELAY)?;
     Ok((late, -cost))

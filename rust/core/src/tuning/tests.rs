@@ -1,36 +1,61 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::candidates::Candidates;
+use super::goal::{Decisive, Goal, Objective};
+use super::search::{Within, best_within, least, worst_delay};
 use super::simplices;
-use super::{
-    Candidates, Decisive, Goal, Loops, Objective, Scenario, Within, best_within, least, worst_delay,
-};
-use crate::stability::{Affine, Family, Term};
+use crate::loops::{ControlLoop, Controller, Extras, Factors, Kind, Path, Place, Plant, Values};
 use crate::{Task, between};
 
-/// s + (Kp + Kv s) e^(−s T) with the parameters Kp, Kv, T, in scenarios of T.
+/// A loop around the plant gain/(s (lag s + 1)) with a gain of one.
+fn around(lag: f64, kind: Kind, gains: &[f64], delay: f64) -> ControlLoop {
+    let plant = Plant::Factors(Factors {
+        num: vec![1.0],
+        den: vec![1.0, 0.0],
+        lags: 1,
+        has_zero: false,
+        has_pair: false,
+    });
+    let controller = Controller {
+        kind,
+        is_filtered: false,
+        rule: None,
+        extras: Extras::default(),
+        stops: false,
+    };
+    let values = Values {
+        plant: vec![1.0, lag],
+        controller: gains.to_vec(),
+        delay,
+        sample_time: None,
+        limit: None,
+        low: None,
+        rate: None,
+        given: None,
+    };
+    let names = ["gain", "lag"].map(String::from).to_vec();
+    ControlLoop::new(plant, names, controller, values, Path::Command).unwrap()
+}
+
+/// A loop around an integrator with a lag.
+pub(super) fn loop_of(kind: Kind, gains: &[f64], delay: f64) -> ControlLoop {
+    around(0.1, kind, gains, delay)
+}
+
+/// A loop with other numbers.
+pub(super) fn with(of: &ControlLoop, change: impl Fn(&mut Values)) -> ControlLoop {
+    let mut values = of.values().clone();
+    change(&mut values);
+    of.with(values)
+}
+
+/// 1/s under velocity control, in scenarios of the delay.
 fn velocity_loops(delays: &[f64]) -> Candidates {
-    let term = |exponents: [u32; 3], power, slope| Term {
-        coefficient: 1.0,
-        exponents: exponents.to_vec(),
-        power,
-        delay: Affine {
-            constant: 0.0,
-            slopes: vec![0.0, 0.0, slope],
-        },
-    };
-    let terms = vec![
-        term([0, 0, 0], 1, 0.0),
-        term([1, 0, 0], 0, 1.0),
-        term([0, 1, 0], 1, 1.0),
-    ];
-    let names = ["Kp", "Kv", "T"].map(String::from).to_vec();
-    let loops = Loops::continuous(&Family::new(names, terms).unwrap(), 2).unwrap();
-    let scenario = |delay: &f64| Scenario {
-        numbers: vec![*delay],
-        kind: 0,
-        time: 0.0,
-    };
-    Candidates::new(loops, 2, delays.iter().map(scenario).collect())
+    let of = around(0.0, Kind::PV, &[0.0, 0.0], 0.0);
+    let loops = delays
+        .iter()
+        .map(|late| of.with_number(Place::Delay, *late));
+    Candidates::new(loops.collect(), vec![0, 1])
 }
 
 fn goal(required: [f64; 3]) -> Goal {
@@ -47,7 +72,7 @@ fn margins_and_abscissae_of_proportional_control_are_the_closed_forms() {
     let exact = of.margins(&[1.2, 0.0], true, &task).unwrap();
     let first: Vec<[f64; 3]> = exact
         .iter()
-        .map(|each| [each[0], each[1], each[2]])
+        .map(|each| [each.gain_margin, each.phase_margin, each.delay_margin])
         .collect();
     for margins in [first, of.all_margins(&[&[1.2, 0.0]], &task).unwrap()] {
         for (delay, [gain, phase, late]) in [0.36, 0.5].into_iter().zip(margins) {
@@ -79,7 +104,8 @@ fn the_best_gains_are_where_three_roots_meet() {
         "{gains:?}"
     );
     assert!((gains[1] / (-2.0f64).exp() - 1.0).abs() < 2e-3, "{gains:?}");
-    let found = worst_delay(&of, Objective::Abscissa, &[1.0, 0.0], 0, (0.3, 0.4), &task).unwrap();
+    let slow = of.at(&[1.0, 0.0], &of.scenarios[0]);
+    let found = worst_delay(&slow, Objective::Abscissa, (0.3, 0.4), &task).unwrap();
     assert!((found.0 - 0.3).abs() < 1e-3 || (found.0 - 0.4).abs() < 1e-3);
 }
 

@@ -29,6 +29,7 @@ mod step_metrics;
 pub use deviation::Deviation;
 pub(crate) use deviation::{DeviationMetrics, Ending};
 pub use linear_loop::{Bounds, Equations, Kick, LinearLoop, Start, Update};
+pub(crate) use metrics::TIME_CONSTANTS;
 pub use metrics::{Criteria, Metrics};
 pub use reference::Reference;
 pub(crate) use requested_output::RequestedOutput;
