@@ -48,7 +48,7 @@ pub use held_gain::{held_gain, held_phase};
 pub use held_gain_range::gain_range_held;
 pub use held_range::{Members, Number, held_range};
 pub use margins::{Margins, margins, margins_of_ratio, margins_of_stable};
-pub use norms::{Peaks, hinf_norm, peak, peaks};
+pub use norms::{Peaks, hinf_norm, peak, peak_to, peaks};
 pub use passage::Crossing;
 pub use peaks::Peak;
 pub(crate) use polynomial::roots as small_roots;

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::bounds::{fujiwara, highest_corner};
 use super::chains::Lead;
-use super::peaks::{Modulus, Peak, highest};
+use super::peaks::{CLOSE, Modulus, Peak, highest};
 use super::ratio::ratio_at;
 use super::squares::{DifferenceOfSquares, alike};
 use super::two_sided::TwoSided;
@@ -136,6 +136,21 @@ pub fn peak(
     places: &[f64],
     task: &Task,
 ) -> Result<Peak, Error> {
+    peak_to(n, d, places, CLOSE, task)
+}
+
+/// The same, known but for the part `close` of the value: where it is that of high frequencies, the work
+/// grows without bound as `close` falls.
+///
+/// # Errors
+/// As [`peak`].
+pub fn peak_to(
+    n: &QuasiPolynomial,
+    d: &QuasiPolynomial,
+    places: &[f64],
+    close: f64,
+    task: &Task,
+) -> Result<Peak, Error> {
     if n.is_zero() {
         return Ok(Peak::NONE);
     }
@@ -150,7 +165,7 @@ pub fn peak(
         value: of.far.most,
         omega: f64::INFINITY,
     };
-    highest(&of, known, &mut start, task)
+    highest(&of, known, &mut start, close, task)
 }
 
 /// What is known of n/d at high frequencies.

@@ -11,7 +11,7 @@ use crate::{Error, Task};
 
 /// Relative distance of the level from the largest value known: what the result is known to.
 /// Smaller: rounding hides whether the level is reached; larger: the result is less exact.
-const CLOSE: f64 = 5e-11;
+pub(super) const CLOSE: f64 = 5e-11;
 
 /// Levels before the search is given up.
 const LEVELS: usize = 60;
@@ -58,7 +58,8 @@ pub(super) trait Modulus {
     fn reaching(&self, level: f64, task: &Task) -> Result<(Vec<f64>, f64), Error>;
 }
 
-/// The largest value. `known` is one that is taken, `places` are frequencies to look at first.
+/// The largest value, but for the part `close` of it. `known` is one that is taken, `places` are
+/// frequencies to look at first.
 ///
 /// # Errors
 /// As [`Modulus::reaching`]; [`Error::Argument`] where levels do not come to an end.
@@ -66,6 +67,7 @@ pub(super) fn highest(
     of: &impl Modulus,
     known: Peak,
     places: &mut [f64],
+    close: f64,
     task: &Task,
 ) -> Result<Peak, Error> {
     let mut best = first(of, known, places)?;
@@ -73,7 +75,7 @@ pub(super) fn highest(
         return Ok(best);
     }
     for _ in 0..LEVELS {
-        let level = best.value * (1.0 + CLOSE);
+        let level = best.value * (1.0 + close);
         let (zeros, top) = of.reaching(level, task)?;
         let places: Vec<f64> = [0.0].into_iter().chain(zeros).chain([top]).collect();
         let before = best;

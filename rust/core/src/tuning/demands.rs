@@ -7,7 +7,7 @@ use crate::dde::LinearLoop;
 use crate::elementary::exp;
 use crate::frequency::{
     Margins, Peak, held_gain, held_margins, held_margins_of_stable, held_sensitivity, margins,
-    margins_of_stable, peak, ratio,
+    margins_of_stable, peak, peak_to, ratio,
 };
 use crate::loops::{ControlLoop, Input};
 use crate::quasipoly::{QuasiPolynomial, modulus};
@@ -136,6 +136,15 @@ pub(super) fn is_stable_loop(of: &ControlLoop, task: &Task) -> Result<bool, Erro
 /// # Errors
 /// As [`margins_of`].
 pub(super) fn sensitivity_of(of: &ControlLoop, task: &Task) -> Result<Option<Peak>, Error> {
+    sensitivity_to(of, None, task)
+}
+
+/// The same, of a continuous loop but for a part of it.
+pub(super) fn sensitivity_to(
+    of: &ControlLoop,
+    close: Option<f64>,
+    task: &Task,
+) -> Result<Option<Peak>, Error> {
     if is_sampled(of) {
         let linear = of.linear(Input::Reference)?;
         return held_sensitivity(HeldLoop::new(&linear)?, task);
@@ -145,7 +154,10 @@ pub(super) fn sensitivity_of(of: &ControlLoop, task: &Task) -> Result<Option<Pea
     if !is_stable(&closed, true, task)? {
         return Ok(None);
     }
-    peak(&d, &closed, &[], task).map(Some)
+    match close {
+        Some(close) => peak_to(&d, &closed, &[], close, task).map(Some),
+        None => peak(&d, &closed, &[], task).map(Some),
+    }
 }
 
 /// All margins and sensitivities of a loop; without `delay_margin` that of a sampled one is NaN.

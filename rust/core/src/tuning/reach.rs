@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::demands::{is_stable_loop, sensitivity_of};
+use super::demands::{is_stable_loop, sensitivity_to};
 use super::open::{Gap, Open, Scale, gaps};
 use super::posed::{Posed, Ray, lasting};
 use super::responses::figures;
@@ -145,7 +145,7 @@ impl<'a> Search<'a> {
         if from <= 0.0 {
             // Small gains of two integrators have their peak below all frequencies that are seen.
             let of = self.posed.at(0, &ray.at(end));
-            let found = match sensitivity_of(&of, self.task) {
+            let found = match sensitivity_to(&of, Some(NEARLY - 1.0), self.task) {
                 Err(error) if error.ends_all() => return Err(error),
                 found => found.ok().flatten(),
             };
@@ -158,11 +158,11 @@ impl<'a> Search<'a> {
         let holds = |k: f64| -> Result<bool, Error> {
             for (place, _) in &self.seen {
                 let of = self.posed.at(*place, &ray.at(k));
-                let found = match sensitivity_of(&of, self.task) {
+                let found = match sensitivity_to(&of, Some(0.5 * AIMED), self.task) {
                     Err(error) if error.ends_all() => return Err(error),
                     found => found.ok().flatten(),
                 };
-                if !found.is_some_and(|peak| peak.value <= most) {
+                if !found.is_some_and(|peak| peak.value * (1.0 + 0.5 * AIMED) <= most) {
                     return Ok(false);
                 }
             }
