@@ -212,7 +212,7 @@ def test_a_setpoint_at_rest_shows_no_time(tmp_path):
     assert one.reason in none.summary()
     assert none.headline().startswith("none: no loop of flight.bin shows")
     assert none._repr_html_() is None
-    with pytest.raises(ValueError, match="no loop tells how long"):
+    with pytest.raises(ValueError, match="no loop has a time"):
         none.plot()
 
 
