@@ -43,6 +43,7 @@ from deadtime.systems._transfer import TransferFunction
 class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     """A linear system with delays: any order, any number of inputs and outputs. Immutable.
 
+    E x'(t) + N x'(t - tau) = A x + B u and y = C x + D u, where each product is a sum over delays.
     Every matrix is given as an array, which acts without delay, or as a dict of arrays by their
     delays in s; a number is a matrix with one entry.
 
@@ -59,7 +60,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     E : array_like, shape (n, n), optional
         Factor on the derivative; the identity by default. May be singular.
     N : dict, shape (n, n), optional
-        Factors on earlier derivatives, by their delays, which are above zero; none by default.
+        Factors on earlier derivatives, on the side of E, by their delays, which are above zero;
+        none by default.
 
     Raises
     ------
