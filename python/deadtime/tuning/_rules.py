@@ -17,7 +17,7 @@ SOURCES = {
     "SIMC": "Skogestad 2003, equations 23 to 25 with tau_c = theta, by the half rule (10, 11)",
     "AMIGO": "Astrom and Hagglund 2004",
     "lambda": "Astrom and Hagglund 2006, chapter 6: closed in the lag or three dead times",
-    "Ziegler-Nichols step": "Ziegler and Nichols 1942",
+    "Ziegler-Nichols step": "Ziegler and Nichols 1942; Ti of PI is 3 L for L/0.3, as in textbooks",
     "Ziegler-Nichols frequency": "Ziegler and Nichols 1942",
 }
 
@@ -114,7 +114,8 @@ def rules(loop: object, *, controller: type[Controller] | Controller | None = No
     Process Control 14, 635-650, of lag and dead time by the steepest tangent of the step response
     and the time to 63 %. Lambda: Astrom and Hagglund 2006, Advanced PID Control, chapter 6, for PI,
     with a closed loop as slow as the plant or three dead times. Ziegler and Nichols 1942, Trans.
-    ASME 64, by step and by frequency response. Half a sample counts as dead time.
+    ASME 64, by step (Ti of PI is 3 L for L/0.3, as in textbooks) and by frequency response. Half a
+    sample counts as dead time.
 
     Examples
     --------
