@@ -156,7 +156,7 @@ def test_every_combination_agrees_with_another_simulator(plant, kind):
     cases = [case for case in CASES if case[:2] == (plant, kind)]
     for case in cases:
         compare(case)
-    assert cases or (plant, kind) == ("lead", "PV ideal")
+    assert cases or (kind == "PV ideal" and plant in ("lead", "two lags and a zero"))
 
 
 LINEAR = [case for case in CASES if case[3:] == (None, None, None, WEIGHTS[0])]
