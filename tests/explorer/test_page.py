@@ -238,7 +238,7 @@ def test_a_page_in_a_frame_works(browser: Any, tmp_path: Path) -> None:
     whole, seen = tab.frames[1].evaluate(inner)
     assert whole <= seen
     frame.locator("#suggest").click()
-    frame.get_by_text("gain margin").wait_for()
+    frame.locator("#suggestion", has_text="gain margin").wait_for()
     assert said == []
     tab.close()
 
