@@ -144,6 +144,13 @@ def test_what_does_not_come_to_rest_says_so():
     assert np.isnan(offset.recovery_time)
     assert offset.steady_state == pytest.approx(0.5)
     unstable = dtm.ControlLoop(dtm.Integrator(), dtm.PI(9.0, 1.0), delay=0.3)
+    for limit in (None, 1.0):
+        with pytest.raises(ValueError, match=r"1e150|come to rest within .* after the load"):
+            unstable.replace(limit=limit).load_response()
+    growing = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=2.0)
+    with pytest.raises(ValueError, match="come to rest within"):
+        growing.load_response()
+    assert growing.load_response(30.0).peak > 1.0
     found = dtm.sweep(unstable, {"Kp": np.array([9.0, 1.0])}, metrics=["load_iae", "iae"])
     assert np.isnan([found["load_iae"][0], found["iae"][0]]).all()
     assert found.status.tolist() == [2, 0]

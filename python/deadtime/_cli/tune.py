@@ -42,7 +42,7 @@ def command(
     ki: float | None = None,
     kd: float | None = None,
     spans: opt.Ends | None = None,
-    filter: float | None = None,  # noqa: A002
+    filter_hz: float | None = None,
     weight: float | None = None,
     columns: Annotated[Given, COLUMNS],
     window: opt.Window = None,
@@ -83,7 +83,7 @@ def command(
         Derivative gain that was in use.
     spans
         Spans of measurement and output, for a proportional band.
-    filter
+    filter_hz
         Corner of the derivative's filter, one pole, Hz.
     weight
         Weight of the set point in the proportional term: 1 where your controller has none. Without:
@@ -116,7 +116,7 @@ def command(
         "delay_margin": delay_margin,
     }
     demands: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
-    template = _template(controller, filter, weight)
+    template = _template(controller, filter_hz, weight)
     is_log = path.is_file() and not is_table(path)
     with stages(1, quiet=as_json) as begin:
         begin("estimating and designing")
@@ -159,7 +159,7 @@ def _template(
 ) -> type[Controller] | Controller | None:
     """The kind of controller that is asked for, with its filter and weight; None where none is."""
     if corner is not None and kind not in ("PV", "PD", "PID"):
-        raise ValueError("--filter is that of a derivative: give --controller PV, PD or PID")
+        raise ValueError("--filter-hz is that of a derivative: give --controller PV, PD or PID")
     if weight is not None and kind not in (None, "PI", "PID"):
         raise ValueError("--weight is that of the set point: give --controller PI or PID")
     if corner is None and weight is None:

@@ -245,8 +245,8 @@ class LoopInTime:
         Raises
         ------
         ValueError
-            If the delay is None, an argument is out of its range, the plant has delays inside, or
-            the response grows beyond 1e150.
+            If the delay is None, an argument is out of its range, the plant has delays inside, the
+            response grows beyond 1e150, or it does not come to rest and no end is given.
 
         Notes
         -----
@@ -269,7 +269,13 @@ class LoopInTime:
         loop = self.specification
         question, times = asked(loop, time, size, at, settling)
         found = figures_of(loop, question)
-        times = shown_times(found) if times is None else times
+        if times is None:
+            if not found.is_settled:
+                raise ValueError(
+                    f"the output does not come to rest within {found.span:.4g} s after the load: "
+                    "the loop is not stable, or its limit is too small for this load; give time="
+                )
+            times = shown_times(found)
         name = "load" if question.of == "load" else "output_disturbance"
         load: dict[str, Any] = {name: question.size}
         return load_response_of(self.simulate(times, 0.0, **load), found)

@@ -72,7 +72,12 @@ def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:
     """Up to where measurement noise is taken for white, rad/s."""
     if loop.sample_time is not None:
         half = math.pi / loop.sample_time
-        return half if bandwidth is None else min(bandwidth, half)
+        if bandwidth is not None and bandwidth > half:
+            raise ValueError(
+                f"bandwidth={bandwidth}: noise beyond {half:.4g} rad/s, half the sampling rate, is "
+                "folded into what lies below; give it as the samples see it"
+            )
+        return half if bandwidth is None else bandwidth
     if bandwidth is not None:
         return bandwidth
     late = (loop.delay or 0.0) + loop.parameters.get("lag", 0.0)

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from deadtime._base.validation import finite, non_negative
 from deadtime.estimation import PlantEstimate
-from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.loops import PI, PID, PV, Controller, ControlLoop, DerivativeFilter
 from deadtime.tuning._demands import Demands
 from deadtime.tuning._filter_choice import filter_choice
 from deadtime.tuning._found_plants import possible_loops, refusal
@@ -204,7 +204,7 @@ def design(
                 "its corner by 'abscissa', 'damping' or 'settling_time'"
             )
         weight = _load_weight(objective, load_weight)
-        slack = _load_slack(objective, weight, load_slack, demands)
+        slack = _load_slack(objective, weight, load_slack, demands, template)
         others = _loops_of(plants, template)
         wanted = Wanted(problem, objective, weight, demands, others, doubt, slack)
         return wanted.design()
@@ -212,7 +212,8 @@ def design(
     if objective not in names:
         raise ValueError(f"objective={objective!r}: give one of {', '.join(map(repr, names))}")
     goal = objective_named(objective)
-    _refuse_responses(objective, demands, load_weight, plants)
+    only = {"load_weight": load_weight, "load_slack": load_slack, "bandwidth": bandwidth}
+    _refuse_responses(objective, demands, only, plants)
     if filter != "auto":
         return made(problem, goal, required, shape)
     choice = filter_choice(problem, goal, required, shape)
@@ -230,11 +231,21 @@ def _load_weight(objective: ObjectiveName, given: float | None) -> float:
 
 
 def _load_slack(
-    objective: ObjectiveName, weight: float, given: float | None, demands: Demands
+    objective: ObjectiveName,
+    weight: float,
+    given: float | None,
+    demands: Demands,
+    template: Controller,
 ) -> float:
-    if given is not None:
-        return non_negative("load_slack", given)
-    return SLACK if objective == "load" and weight == 1.0 and not demands.named else 0.0
+    counts = objective == "load" and weight == 1.0
+    if given is None:
+        return SLACK if counts and not demands.named else 0.0
+    if not counts or not isinstance(template, (PI, PID)):
+        raise ValueError(
+            f"load_slack={given}: it is for objective='load' with PI or PID control and no "
+            "load_weight; leave it out"
+        )
+    return non_negative("load_slack", given)
 
 
 def _loops_of(plants: Sequence[object], template: Controller) -> tuple[ControlLoop, ...]:
@@ -247,12 +258,13 @@ def _loops_of(plants: Sequence[object], template: Controller) -> tuple[ControlLo
 def _refuse_responses(
     objective: ObjectiveName,
     demands: Demands,
-    load_weight: float | None,
+    only: Mapping[str, float | None],
     plants: Sequence[object],
 ) -> None:
     """Raise where what belongs to loads and set points is given with another objective."""
     given = list(demands.beyond_margins)
-    given += ["load_weight"] * (load_weight is not None) + ["plants"] * bool(plants)
+    given += [name for name, value in only.items() if value is not None]
+    given += ["plants"] * bool(plants)
     if given:
         raise ValueError(
             f"{', '.join(given)} with objective={objective!r}: give one of "

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 from deadtime._base.arrays import Array
 from deadtime._base.validation import increasing, positive
 from deadtime.loops import PV, Controller, ControlLoop, DerivativeFilter
+from deadtime.tuning._demands import white_to
 from deadtime.tuning._exchange import Search
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
@@ -268,16 +269,9 @@ def _corners(problem: Problem, omegas: ArrayLike | None) -> Array:
 
 
 def _bandwidth(loop: ControlLoop, bandwidth: float | None, fastest: float) -> float:
-    if loop.sample_time is None:
-        return _BEYOND * fastest if bandwidth is None else positive("bandwidth", bandwidth)
-    half = np.pi / loop.sample_time
-    white = half if bandwidth is None else positive("bandwidth", bandwidth)
-    if white > half:
-        raise ValueError(
-            f"bandwidth={white}: noise beyond {half:.4g} rad/s, half the sampling rate, is folded "
-            "into what lies below; give it as the samples see it"
-        )
-    return float(white)
+    if bandwidth is None and loop.sample_time is None:
+        return _BEYOND * fastest
+    return white_to(loop, None if bandwidth is None else positive("bandwidth", bandwidth))
 
 
 def _too_slow(corners: Array, lost: Sequence[float], loss: float) -> ValueError:

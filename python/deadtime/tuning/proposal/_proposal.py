@@ -20,7 +20,7 @@ from deadtime._base.plain import plain_fields
 from deadtime._base.validation import one_dimensional
 from deadtime._base.verdicts import Verdict
 from deadtime.estimation import PlantEstimate
-from deadtime.loops import Controller, ControlLoop
+from deadtime.loops import Controller, ControlLoop, LoadResponse
 from deadtime.tuning._result import Design, LeastMargins
 from deadtime.tuning._rules import RuleTable, compared
 from deadtime.tuning.forms import Settings
@@ -207,8 +207,8 @@ class Proposal(ReadOnlyArrays, Pictured):
                 f"set point: overshoot {info['overshoot']:.2g} %, settles in "
                 f"{info['settling_time']:.3g} s"
             )
-        if self.load is not None:
-            met = self.loop.load_response(size=self.load.size)
+        met = self._met()
+        if self.load is not None and met is not None:
             words = f"load of {self.load.size:.3g}: the output moves by {met.peak:.3g}"
             if isfinite(met.recovery_time):
                 words += f", and is back after {met.recovery_time:.3g} s"
@@ -216,6 +216,15 @@ class Proposal(ReadOnlyArrays, Pictured):
                 words += f", and stays {abs(met.steady_state):.3g} away"
             said.append(words)
         return said
+
+    def _met(self) -> LoadResponse | None:
+        """The response to the load of the recording; None without one, or if it has no end."""
+        if self.load is None:
+            return None
+        try:
+            return self.loop.load_response(size=self.load.size)
+        except ValueError:
+            return None
 
     def summary(self) -> str:
         """Verdict, gains as they are typed, margins, what is expected.
@@ -230,7 +239,7 @@ class Proposal(ReadOnlyArrays, Pictured):
         """The proposal as plain values for JSON, without the arrays."""
         info = None if self.settings is None else self.loop.step_response().info()
         steps = ("overshoot", "settling_time")
-        met = None if self.load is None else self.loop.load_response(size=self.load.size)
+        met = self._met()
         moves = {"set_point": self.set_point, "load": self.load}
         found: dict[str, Any] = {
             "verdict": self.verdict,
