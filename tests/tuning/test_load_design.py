@@ -194,6 +194,23 @@ def test_demands_that_have_no_meaning_are_refused(change, words):
         dtm.design(PROCESS, **({"controller": dtm.PI} | change))
 
 
+@pytest.mark.parametrize("objective", ["load", "abscissa"])
+def test_a_hold_far_shorter_than_the_delay_is_refused(objective):
+    loop = PROCESS.replace(sample_time=1e-9)
+    with pytest.raises(ValueError, match=r"sample_time=1e-09: .* leave sample_time out"):
+        dtm.design(loop, controller=dtm.PI, objective=objective)
+
+
+def test_hundreds_of_samples_in_the_delay_change_little():
+    held = dtm.design(PROCESS.replace(sample_time=PROCESS.delay / 300), controller=dtm.PI)
+    free = dtm.design(PROCESS, controller=dtm.PI)
+    assert held.gains == pytest.approx(free.gains, rel=0.01)
+    assert held.damping == pytest.approx(free.damping, rel=0.01)
+    assert held.step_info["settling_time"] == pytest.approx(
+        free.step_info["settling_time"], rel=0.02
+    )
+
+
 def test_a_loop_that_nothing_limits_is_refused():
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.0)
     with pytest.raises(ValueError, match="nothing limits the gains"):

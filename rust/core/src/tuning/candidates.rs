@@ -1,11 +1,11 @@
 //! Loops that differ in the gains of their controller, each in some scenarios of all other numbers.
 
 use super::demands::{is_sampled, margins_of, stable_margins};
-use crate::dde::control_loop::sampled;
 use crate::frequency::Margins;
 use crate::loops::{ControlLoop, Input, Place};
 use crate::quasipoly::modulus;
 use crate::roots::{chain_abscissa, rightmost};
+use crate::stability::HeldLoop;
 use crate::{Error, Task};
 
 /// Poles that decay at most this many times as fast as the slowest one are dominant. A delay always
@@ -47,7 +47,7 @@ impl Candidates {
     /// The dominant poles of gains in each scenario.
     ///
     /// # Errors
-    /// As [`rightmost`] and [`sampled::poles`].
+    /// As [`rightmost`] and [`HeldLoop::poles`].
     pub fn all_dominant(&self, gains: &[f64], task: &Task) -> Result<Vec<Dominant>, Error> {
         let each = |scenario: &ControlLoop| dominant(&self.at(gains, scenario), task);
         self.scenarios.iter().map(each).collect()
@@ -96,13 +96,11 @@ pub(super) fn abscissa(of: &ControlLoop, task: &Task) -> Result<f64, Error> {
 /// damping ratio is zero.
 ///
 /// # Errors
-/// As [`rightmost`] and [`sampled::poles`].
+/// As [`rightmost`] and [`HeldLoop::poles`].
 pub(super) fn dominant(of: &ControlLoop, task: &Task) -> Result<Dominant, Error> {
     let (poles, chain) = if is_sampled(of) {
-        (
-            sampled::poles(&of.linear(Input::Reference)?)?,
-            f64::NEG_INFINITY,
-        )
+        let linear = of.linear(Input::Reference)?;
+        (HeldLoop::new(&linear)?.poles()?, f64::NEG_INFINITY)
     } else {
         let h = of.characteristic()?;
         (rightmost(&h, POLES, task)?.roots, chain_abscissa(&h))

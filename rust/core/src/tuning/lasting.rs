@@ -8,6 +8,7 @@
 //! u = K x + L w. From values on a grid that divides the delay follow bounds on whole cells: within one of
 //! length h states change by at most (e^(|A| h) − I) |x| and what the commands drive.
 
+use super::contraction::{Matrix, identity, moduli, most};
 use crate::dde::propagator::Propagator;
 use crate::dde::{Equations, LinearLoop, Request, Start};
 use crate::linear_algebra::eigenvalues::eigenvalues;
@@ -21,9 +22,6 @@ const MOST_CELLS: f64 = 512.0;
 
 /// Upper limit on the number of grid points (bounds memory).
 const MOST_POINTS: usize = 400_000;
-
-/// A matrix, its rows of equal length one after the other.
-pub(super) type Matrix = Vec<f64>;
 
 /// The unit responses of one loop, simulated as far as they are asked for.
 #[derive(Debug)]
@@ -255,31 +253,6 @@ impl Fundamental {
     }
 }
 
-pub(super) fn moduli(matrix: &[f64]) -> Matrix {
-    matrix.iter().map(|x| x.abs()).collect()
-}
-
-pub(super) fn identity(n: usize) -> Matrix {
-    let entry = |k: usize| f64::from(u8::from(k / n == k % n));
-    (0..n * n).map(entry).collect()
-}
-
-/// The product of matrices, of which the first has rows of `inner` elements.
-pub(super) fn times(left: &[f64], right: &[f64], inner: usize) -> Matrix {
-    let width = right.len() / inner.max(1);
-    let mut found = Vec::with_capacity(left.len() / inner.max(1) * width);
-    for row in left.chunks_exact(inner.max(1)) {
-        let mut sums = vec![0.0; width];
-        for (x, other) in row.iter().zip(right.chunks_exact(width.max(1))) {
-            for (sum, y) in sums.iter_mut().zip(other) {
-                *sum += x * y;
-            }
-        }
-        found.extend(sums);
-    }
-    found
-}
-
 /// A with the command held behind the states.
 pub(super) fn held(model: &Equations) -> Matrix {
     let n = model.states();
@@ -329,8 +302,4 @@ pub(super) fn states_at(
         found.extend(made.respond(&start, &asked, task)?.outputs);
     }
     Ok(found)
-}
-
-fn most(values: &[f64]) -> f64 {
-    values.iter().copied().fold(0.0, f64::max)
 }

@@ -3,7 +3,8 @@
 //! `candidates` are the loops that differ in their gains, with their poles and margins, `steps` their
 //! steps; `goal` makes one number of these. `survey` is the map from which a search begins, `pattern` the
 //! search, `search`, `simplices` and `between` the minimum of a function with kinks near a start, and
-//! `exchange` finds the scenarios that matter. `tail` and `lasting` prove that a step stays at rest.
+//! `exchange` finds the scenarios that matter. `tail`, with `lasting` and
+//! `sampled_tail`, proves by `contraction` that a step stays at rest.
 //!
 //! By the responses to a load and a set point: `posed` are the loops and rays of gains, `open` what Ms
 //! leaves of a ray, `demands` what else must hold, `responses` what gains give. `reach` joins these for
@@ -11,6 +12,7 @@
 //! has rules of thumb.
 
 mod candidates;
+mod contraction;
 mod demands;
 mod exchange;
 mod goal;
@@ -22,6 +24,7 @@ mod reach;
 mod responses;
 mod robust;
 mod rules;
+mod sampled_tail;
 mod search;
 mod settling;
 mod simplices;

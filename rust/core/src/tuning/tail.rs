@@ -11,26 +11,17 @@
 //! and the command within its limit, the response has settled for good. Between grid points, e^(|A| h)
 //! bounds what states do. Rounding plays no part at these sizes.
 
-use super::lasting::{
-    Fundamental, Matrix, change_within, held, identity, moduli, states_at, times,
-};
+use super::contraction::{Bounds, DOUBLINGS, Matrix, contracts, identity, later, moduli, times};
+use super::lasting::{Fundamental, states_at};
+use super::sampled_tail;
 use super::steps::{Step, one_step};
-use crate::dde::control_loop::sampled::{Timing, transition_matrix};
+use crate::dde::Equations;
 use crate::dde::propagator::Propagator;
-use crate::dde::{Equations, LinearLoop};
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::lu::Lu;
 use crate::linear_algebra::singular::Singular;
 use crate::loops::{ControlLoop, Input};
 use crate::{Error, Task};
-
-/// Part of the deviation that may be left after a period; the period is doubled until it is, at most this
-/// many times.
-const CONTRACTED: f64 = 0.6;
-const DOUBLINGS: u32 = 14;
-
-/// Points in each part of a sample at which the output is bounded: more give a tighter bound.
-const WITHIN: usize = 16;
 
 /// Condition number from which on a loop has no unique rest.
 const SINGULAR: f64 = 1e13;
@@ -44,12 +35,6 @@ const STILL: f64 = 5e-4;
 
 /// Most doublings of the simulated time until the remaining deviation is that small.
 const LONGER: i32 = 6;
-
-/// A margin of what is bounded for rounding, relative.
-const ROUNDING: f64 = 1e-6;
-
-/// Bounds on output and command for all later times.
-pub(super) type Bounds = (f64, f64);
 
 /// A step, simulated until it is proved to rest; none where that fails.
 ///
@@ -106,7 +91,7 @@ pub(super) fn tail_bound(
     let (values, command) = (of.values(), rest[n]);
     let limit = values.limit.unwrap_or(f64::INFINITY);
     let found = if values.sample_time.is_some() {
-        of_sampled(&linear, &rest, limit, end)?
+        sampled_tail::bounds(&linear, &rest, limit, end)?
     } else if values.delay == 0.0 {
         let start = vec![0.0; n];
         let states = states_at(&linear, &[0.0, end], start, amplitude, values.limit, task)?;
@@ -158,26 +143,12 @@ fn radius(matrix: &[f64], n: usize) -> f64 {
     found.unwrap_or(f64::INFINITY)
 }
 
-/// Bound on the sizes at the ends of all later periods; none where these do not contract.
-fn later(period: &[f64], sizes: &[f64]) -> Option<Vec<f64>> {
-    let n = sizes.len();
-    let matrix = identity(n).iter().zip(period).map(|(i, q)| i - q).collect();
-    let mut found = sizes.to_vec();
-    Lu::regular(matrix, n)?.solve(&mut found);
-    let after = times(period, &found, n);
-    let mut each = found.iter().zip(sizes).zip(&after);
-    let holds = each.all(|((v, size), after)| {
-        *v >= 0.0 && size + after <= v * (1.0 + 1e-3 * ROUNDING) + f64::MIN_POSITIVE
-    });
-    holds.then(|| found.iter().map(|v| v * (1.0 + ROUNDING)).collect())
-}
-
 /// The moduli of a power of a matrix that contract, and which power.
 fn power(z: &[f64], n: usize) -> Option<(Matrix, usize)> {
     let mut power = z.to_vec();
     for doubling in 0..DOUBLINGS {
         let sizes = moduli(&power);
-        if radius(&sizes, n) < CONTRACTED {
+        if contracts(&sizes, n) {
             return Some((sizes, 1 << doubling));
         }
         power = times(&power, &power, n);
@@ -195,102 +166,6 @@ fn swept(mut rows: Matrix, z: &[f64], n: usize, count: usize) -> Matrix {
         }
     }
     most
-}
-
-/// Of a sampled loop: z are states, the command that is held, and those under way.
-fn of_sampled(
-    linear: &LinearLoop,
-    rest: &[f64],
-    limit: f64,
-    end: f64,
-) -> Result<Option<Bounds>, Error> {
-    let model = linear.equations();
-    let n = model.states();
-    let period = linear.sample_time().unwrap_or(f64::INFINITY);
-    let timing = Timing::new(linear.delay(), period);
-    let (part, whole) = (timing.early, timing.samples);
-    // With a sample more of delay the newest command is a state beside the oldest one.
-    let more = LinearLoop::new(model.clone(), part + period, Some(period), None)?;
-    let (closed, side) = transition_matrix(&more)?;
-    let kept = |k: usize| if k < n { k } else { n + 1 };
-    let entry = |row: usize, column: usize| closed[row * side + column];
-    let m = n + 1;
-    let mut t = vec![0.0; m * m];
-    for row in 0..n {
-        for column in 0..m {
-            t[row * m + column] = entry(row, kept(column));
-        }
-    }
-    let b: Vec<f64> = (0..n).map(|row| entry(row, n)).chain([1.0]).collect();
-    let c: Vec<f64> = (0..m).map(|column| entry(n, kept(column))).collect();
-    let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-
-    let command = rest[n];
-    let mut state: Vec<f64> = rest.iter().map(|x| -x).collect();
-    let mut under_way = std::collections::VecDeque::from(vec![-command; whole]);
-    for _ in 0..(end / period).ceil() as usize {
-        let newest = (dot(&c, &state) + command).min(limit).max(-limit) - command;
-        under_way.push_back(newest);
-        let acts = under_way.pop_front().unwrap_or(newest);
-        state = times(&t, &state, m);
-        state.iter_mut().zip(&b).for_each(|(x, b)| *x += b * acts);
-    }
-
-    // One sample: the oldest command acts, the newest one goes to the end.
-    let size = m + whole;
-    let unit = |k: usize| (0..size).map(move |i| f64::from(u8::from(i == k)));
-    let newest: Vec<f64> = c.iter().copied().chain(vec![0.0; whole]).collect();
-    let oldest: Vec<f64> = if whole > 0 {
-        unit(m).collect()
-    } else {
-        newest.clone()
-    };
-    let mut z = Vec::with_capacity(size * size);
-    for (row, b) in t.chunks_exact(m).zip(&b) {
-        let own = row.iter().copied().chain(vec![0.0; whole]);
-        z.extend(own.zip(&oldest).map(|(x, acts)| x + b * acts));
-    }
-    for k in 1..whole {
-        z.extend(unit(m + k));
-    }
-    if whole > 0 {
-        z.extend_from_slice(&newest);
-    }
-    let sizes: Vec<f64> = state.iter().chain(&under_way).map(|x| x.abs()).collect();
-    let Some((contracted, count)) = power(&z, size) else {
-        return Ok(None);
-    };
-    let Some(most) = later(&contracted, &sizes) else {
-        return Ok(None);
-    };
-
-    // States and acting command up to the arrival of the next command, and from there on.
-    let mut now: Matrix = (0..n).flat_map(unit).collect();
-    now.resize(m * size, 0.0);
-    let (mut cells, mut changes) = (newest, Vec::new());
-    let output: Vec<f64> = model.c.iter().copied().chain([model.d]).collect();
-    for (length, acts) in [(part, unit(n).collect()), (period - part, oldest)] {
-        now[n * size..].copy_from_slice(&acts);
-        let h = length / WITHIN as f64;
-        let step = Propagator::new(&held(model), &[], h).phi();
-        for _ in 0..WITHIN {
-            cells.extend_from_slice(&now);
-            cells.extend(times(&output, &now, m));
-            now = times(&step, &now, m);
-        }
-        changes.push(change_within(model, h));
-    }
-    let most = times(&swept(cells, &z, size, count), &most, size);
-    let (commands, most) = most
-        .split_first()
-        .map_or((0.0, &[][..]), |(u, rest)| (*u, rest));
-    let weights = moduli(&output);
-    let bounds = most.chunks_exact(m + 1).enumerate().map(|(place, cell)| {
-        let change = &changes[place / WITHIN];
-        let drift = times(change, &cell[..m], m);
-        cell[m] + dot(&weights, &drift)
-    });
-    Ok(Some((bounds.fold(0.0, f64::max), commands)))
 }
 
 /// Of a continuous loop without delay: z are the states, at the ends of short steps.
@@ -321,7 +196,7 @@ fn with_delay(known: &Fundamental, sizes: &[f64], task: &Task) -> Result<Option<
         let Some(bounds) = known.bounds(1 << doubling, task)? else {
             return Ok(None);
         };
-        if radius(&bounds.period, sizes.len()) < CONTRACTED {
+        if contracts(&bounds.period, sizes.len()) {
             let row = |weights: &[f64], most: &[f64]| {
                 weights.iter().zip(most).map(|(w, x)| w * x).sum::<f64>()
             };

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::interval::HeldInterval;
 use super::model::{LoopPolynomials, share_of_errors};
 use super::poles::Poles;
+use super::zeros::Held;
 use crate::dde::control_loop::sampled;
 use crate::dde::{Equations, LinearLoop, Update};
 use crate::elementary::Enclosed;
@@ -140,6 +141,27 @@ impl<'a> HeldLoop<'a> {
         Ok(found.first().map_or(f64::NEG_INFINITY, |pole| pole.re))
     }
 
+    /// All poles s = ln(z)/Ts, without a proof; z = 0 is none. With few samples in the delay they are
+    /// the eigenvalues of the transition matrix.
+    ///
+    /// # Errors
+    /// As [`abscissa`](Self::abscissa).
+    pub fn poles(&self) -> Result<Vec<Complex64>, Error> {
+        let samples = (self.delay() / self.sample_time).ceil();
+        if samples <= FEW {
+            return sampled::poles(self.plant);
+        }
+        let numbers = self.at(self.delay());
+        match numbers.ok().and_then(|numbers| numbers.zeros()) {
+            None => sampled::poles(self.plant),
+            Some(found) => {
+                let pole =
+                    |z: &Complex64| Complex64::new(z.norm().ln(), z.arg()) / self.sample_time;
+                Ok(found.iter().map(pole).collect())
+            }
+        }
+    }
+
     /// The poles s = ln(z)/Ts in a region, in discs that are proved to hold them; z = 0 is none.
     ///
     /// # Errors
@@ -273,6 +295,17 @@ impl HeldNumbers {
     /// σ at s = jω.
     pub fn variable(&self, omega: f64) -> Complex64 {
         self.hold.at(Complex64::new(0.0, omega)).0
+    }
+
+    /// The zeros z of the characteristic polynomial; none where they are not found.
+    fn zeros(&self) -> Option<Vec<Complex64>> {
+        let held = Held {
+            a: &self.a,
+            b: &self.b,
+            samples: (self.delay / self.hold.sample_time).round() as usize,
+            sample_time: self.hold.sample_time,
+        };
+        held.zeros()
     }
 
     fn h(&self) -> Result<QuasiPolynomial, Error> {

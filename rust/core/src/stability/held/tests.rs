@@ -240,3 +240,33 @@ proptest! {
         }
     }
 }
+
+/// The zeros of the polynomial are the eigenvalues of the transition matrix.
+#[test]
+fn poles_with_a_long_delay_are_the_eigenvalues() {
+    let mut seed = 9u64;
+    let mut draw = |low: f64, high: f64| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        low + (high - low) * ((seed >> 11) as f64 / (1u64 << 53) as f64)
+    };
+    for lags in [&[][..], &[0.3], &[0.2, 1.1]] {
+        let of = plant(lags);
+        for _ in 0..12 {
+            let period = draw(0.01, 0.05);
+            let delay = period * draw(11.0, 60.0);
+            let gains = (draw(0.02, 1.5) / delay, draw(-0.1, 0.4));
+            let linear = with_gains(&of, gains, delay, period);
+            let found = HeldLoop::new(&linear).unwrap().poles().unwrap();
+            let expected: Vec<_> = sampled::poles(&linear).unwrap();
+            // Those that fall below a tenth within a sample are far from all that matters.
+            let lasting = |s: &&num_complex::Complex64| s.re * period > -2.3;
+            let count = expected.iter().filter(lasting).count();
+            assert_eq!(found.iter().filter(lasting).count(), count, "{lags:?}");
+            for pole in expected.iter().filter(lasting) {
+                let near = found.iter().map(|s| (s - pole).norm());
+                let least = near.fold(f64::INFINITY, f64::min);
+                assert!(least < 1e-7 * (1.0 / period), "{lags:?} {pole} {least}");
+            }
+        }
+    }
+}
