@@ -48,8 +48,11 @@ const LATEST: usize = 2;
 
 /// How far around the best ratios neighbours are looked for, in the units of the grid, and at how many
 /// points of each of one or two ratios.
-const AROUND_ONE: (f64, usize) = (1.6, 21);
+const AROUND_ONE: (f64, usize) = (1.6, 13);
 const AROUND_TWO: (f64, usize) = (0.8, 5);
+
+/// Halvings of the range of a ratio, until its end lies where the slack does.
+const HALVINGS: usize = 5;
 
 /// Most loops, those with the largest Ms, whose margins are all computed.
 const WORST: usize = 12;
@@ -186,11 +189,13 @@ impl Search<'_> {
             1 => AROUND_ONE,
             _ => AROUND_TWO,
         };
-        let axes: Vec<(f64, f64, usize)> = shape
-            .iter()
-            .map(|x| (x - reach, x + reach, count))
-            .collect();
         let most = (1.0 + self.posed.slack) * value;
+        let mut axes = Vec::new();
+        for (axis, x) in shape.iter().enumerate() {
+            let low = self.extent(shape, axis, -reach, most)?;
+            let high = self.extent(shape, axis, reach, most)?;
+            axes.push((x + low, x + high, count));
+        }
         for shape in grid(&axes) {
             self.task.check()?;
             if let Some(gains) = self.gains(&shape)? {
@@ -205,6 +210,26 @@ impl Search<'_> {
             }
         }
         Ok(found)
+    }
+
+    /// How far a ratio may move towards `reach` with no more than `most` lost, nearly.
+    fn extent(&self, shape: &[f64], axis: usize, reach: f64, most: f64) -> Result<f64, Error> {
+        let (mut inside, mut outside) = (0.0, 2.0 * reach);
+        for _ in 0..=HALVINGS {
+            self.task.check()?;
+            let middle = 0.5 * (inside + outside);
+            let mut moved = shape.to_vec();
+            moved[axis] += middle;
+            let is_good = match self.gains(&moved)? {
+                None => false,
+                Some(gains) => self.value(&gains, most)? <= most,
+            };
+            if is_good && middle == reach {
+                return Ok(reach);
+            }
+            *if is_good { &mut inside } else { &mut outside } = middle;
+        }
+        Ok(inside)
     }
 
     /// Add where the demands are missed; the largest excess, or none where they are met.
