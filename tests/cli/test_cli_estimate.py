@@ -281,7 +281,10 @@ def test_a_file_may_have_a_window_of_its_own(files, tmp_path):
         (["--free", ","], "names nothing to fit: choose from delay, gain, lag"),
         (["--free", "gain"], "the delay is not known, so name it too"),
         (["--free", "delay,start"], "start is for --method waveform"),
-        (["--free", "delay,time_constant"], "this plant has no time_constant, as gain/(time_"),
+        (
+            ["--free", "delay,time_constant"],
+            "this plant has no time_constant, only a plant gain/(time_",
+        ),
         (["--plant", "1/s**2", "--free", "delay,lag"], "choose from delay, gain"),
         (["--plant", "1/(2*s+1)", "--free", "lag"], "choose from delay, gain, time_constant"),
     ],

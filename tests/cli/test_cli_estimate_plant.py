@@ -128,16 +128,16 @@ def test_a_named_plant_is_fitted_and_a_better_one_is_told(files):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--ki", 1], "--ki is for a loop whose controller is named"),
-        (["--method", "gcc"], "--method: this is for a loop whose controller is known"),
-        (["--check"], "--check: this is for a loop whose controller is known"),
+        (["--ki", 1], "--ki is for a loop with a known controller"),
+        (["--method", "gcc"], "--method: this is for a loop with a known controller"),
+        (["--check"], "--check: this is for a loop with a known controller"),
         (["--plant", "1/(s+1)"], "--plant 1/(s+1): without --kp it is one of 'delay', 'lag'"),
         (["--output", "T1"], "no column 'T1' for the output: it has"),
         (["--window", 10, 12], "holds 3 samples"),
         (["--largest-delay", -1], "-1"),
         (
             ["--kp", 1, "--method", "gcc", "--at-rest"],
-            "--at-rest is for a plant that the recording shows: leave it or --method out",
+            "is chosen from the recording: leave out --at-rest, or --method",
         ),
     ],
 )

@@ -61,7 +61,7 @@ REFUSED = [
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
     (["flown.bin", "--kp", 1], "--kp is for a table"),
     (["bump.csv", "--form", "ardupilot"], "the loops of ardupilot"),
-    (["bump.csv", "--filter-hz", 2], "--filter-hz is that of a derivative"),
+    (["bump.csv", "--filter-hz", 2], "--filter-hz is for a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]
 

@@ -39,7 +39,7 @@ def test_fly_and_watch_take_a_key(tmp_path):
         assert done.returncode == 1
         assert "holds no signing key" in done.stderr
     done = run("fly", "--key", "key", cwd=tmp_path)
-    assert "--key signs a --link" in done.stderr
+    assert "--key signs the messages of a link" in done.stderr
     done = run("watch", "table.csv", "--key", "key", cwd=tmp_path)
     assert "is a file" in done.stderr
 
@@ -70,7 +70,7 @@ def test_a_watched_link_with_a_key_believes_signed_messages_only():
 
 def test_restore_needs_a_link_and_names_a_vehicle_that_is_silent(tmp_path):
     done = run("fly", "--restore", cwd=tmp_path)
-    assert "--restore is for a vehicle over --link" in done.stderr
+    assert "--restore is for a vehicle on a link" in done.stderr
 
 
 @pytest.mark.parametrize("foreign", ["\x1b[2J", "\x07", "\x9b31m", "\u202e", "\x00", "\x7f"])

@@ -157,7 +157,7 @@ def test_an_error_loses_no_row_that_came_before(tmp_path):
     done = run("watch", path, "--follow", "--noise", 0.01, "--silence", 0.1)
     assert done.returncode == 1
     assert "line 32" in done.stderr
-    assert "30 rows; of those that are printed above:" in done.stdout
+    assert "30 rows; summary of the rows that are printed above:" in done.stdout
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGTERM to catch")
@@ -176,7 +176,7 @@ def test_sigterm_ends_as_ctrl_c_does(tmp_path):
         rest = watching.stdout.read()
     assert watching.returncode == 0
     # The signal may come before the last rows are read.
-    assert " rows; of those that are printed above:" in rest
+    assert " rows; summary of the rows that are printed above:" in rest
 
 
 def is_free(port):

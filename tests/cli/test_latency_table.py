@@ -70,8 +70,9 @@ def test_loops_that_share_a_reason_have_one_line():
     both = [replace(actuator, loop="roll"), loop("roll", "none", "it rests", time=NAN), actuator]
     assert lines_of(*both) == ["none: roll; from actuator yaw: it rests"]
     # Of several reasons why time is left out, the one that leaves out most.
-    why = "9.3 s are left out: it is on the ground; 188 s are left out: the mode does not close it"
-    assert lines_of(loop("yaw", "none", why)) == ["none: yaw: the mode does not close it"]
+    mode = "the flight mode does not close this loop"
+    why = f"9.3 s are left out: it is on the ground; 188 s are left out: {mode}"
+    assert lines_of(loop("yaw", "none", why)) == [f"none: yaw: {mode}"]
 
 
 def test_lines_are_few_and_fit_a_screen_where_their_parts_do():

@@ -207,7 +207,7 @@ def test_noise_without_a_covariance_is_refused():
 @pytest.mark.parametrize(
     ("change", "experiment", "match"),
     [
-        ({}, dtm.Experiment.relay(5.0, 0.5), "switching of the relay"),
+        ({}, dtm.Experiment.relay(5.0, 0.5), "switching times of the relay"),
         ({"controller": dtm.PI(1.3, 0.2)}, dtm.Experiment.step(), "integral"),
         ({"controller": dtm.PV(1.3, 0.0)}, dtm.Experiment.step(), "P controller"),
         ({}, dtm.Experiment.step(3001 * TS), "3001 samples.*shorter"),

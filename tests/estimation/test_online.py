@@ -72,7 +72,7 @@ def test_the_noise_is_learned_and_the_start_is_told_again():
     time, output, command = flown(40.0)
     found = list(OnlineEstimator(LOOP).run(zip(time, output, command, strict=True)))
     first = next(i for i, one in enumerate(found) if one.known)
-    assert found[first - 1].message == "no estimate yet: the noise is being learned"
+    assert found[first - 1].message == "no estimate yet: the noise is being estimated"
     assert found[first - 1].ci == (0.0, 0.6)
     assert 10.0 <= time[first] < 25.0
     assert abs(found[first].delay - 0.3) < 3.0 * found[first].stderr

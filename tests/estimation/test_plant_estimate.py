@@ -98,7 +98,7 @@ def test_a_command_that_is_a_row_late_or_early_is_moved(late, words):
     found, right = estimate_of_rows(late), estimate_of_rows(0)
     assert found.shift == -late
     assert found.delay == pytest.approx(right.delay, abs=0.01)
-    line = [line for line in found.summary().splitlines() if "row" in line and "moved" in line]
+    line = [line for line in found.summary().splitlines() if "row" in line and "shifted" in line]
     assert bool(line) == (words is not None)
     assert words is None or f"1 row {words}" in line[0]
 
@@ -217,8 +217,8 @@ def test_the_height_servo_is_found_without_being_named(name):
         ({"controller": dtm.PI(1.0, 0.1)}, "only that of a P controller follows"),
         ({"plant": "two poles"}, "plant='two poles' is not one of 'delay', 'lag'"),
         ({"largest_delay": 0.0}, "largest_delay"),
-        ({"method": "gcc"}, "method and free are for a loop"),
-        ({"free": ("delay",)}, "method and free are for a loop"),
+        ({"method": "gcc"}, "method and free are for an estimate with a loop"),
+        ({"free": ("delay",)}, "method and free are for an estimate with a loop"),
         ({"window": (5, 2)}, "5"),
     ],
 )
@@ -236,7 +236,7 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
     with pytest.raises(dtm.RecordingError, match="no command, and without a loop"):
         dtm.estimate_delay(dtm.Recording(time, command, output))
     loop = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0))
-    with pytest.raises(ValueError, match="at_rest is for a recording without a loop"):
+    with pytest.raises(ValueError, match="at_rest is for an estimate without a loop"):
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
     with pytest.raises(ValueError, match="no recording was given"):
         dtm.estimate_delay([])

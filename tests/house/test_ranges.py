@@ -53,7 +53,7 @@ def test_three_numbers_are_no_points_unawares():
         given_points("x", [1.0, 2.0, 9.0])
     with pytest.raises(ValueError, match=r"\(low, high, n\)"):
         given_points("x", (1.0, 2.0))
-    with pytest.raises(ValueError, match="no points are taken"):
+    with pytest.raises(ValueError, match="this takes no points"):
         interval("x", (1.0, 2.0, 5))
 
 

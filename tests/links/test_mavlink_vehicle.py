@@ -425,7 +425,7 @@ def test_only_a_simulator_is_flown_where_one_is_asked_for(firmware):
         async with StandIn(firmware) as vehicle:
             vehicle.parameters.pop("SIM_SPEEDUP", None)
             before = dict(vehicle.parameters)
-            with pytest.raises(LinkError, match=r"is a simulator.*--i-have-a-safe-area"):
+            with pytest.raises(LinkError, match=r"as a simulator.*--i-have-a-safe-area"):
                 async with MAVLinkVehicle(ADDRESS, LIMITS, simulated=True):
                     pass
             assert vehicle.parameters == before

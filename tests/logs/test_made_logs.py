@@ -279,7 +279,12 @@ def test_modes_gaps_and_missing_numbers_bound_the_segments(opened):
     loop = found.loops["vertical speed"]
     expected = np.array([(1.0, 2.0), (2.5, 3.0), (4.0, 6.0)])
     assert np.array(loop.segments) == pytest.approx(expected, abs=0.05)
-    for words in ("the vehicle is disarmed", "the mode does not close it", "no number", "a gap"):
+    for words in (
+        "the vehicle is disarmed",
+        "the flight mode does not close this loop",
+        "no number",
+        "a gap",
+    ):
         assert any(words in reason for reason in loop.why_left_out), words
     assert loop.setpoint.gaps == (pytest.approx((3.0, 4.0), abs=0.03),)
     assert found.gaps == (pytest.approx((7.98, 8.58), abs=0.01),)

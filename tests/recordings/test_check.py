@@ -281,7 +281,7 @@ def test_a_late_or_early_command_is_moved_and_said(law, noise):
     low, high = fit.ci()
     assert noise == 0.0 or low < LOOP.delay < high
     assert f"the command was logged one row {law}" in fit.message
-    assert "moved by 65 ms" in fit.summary()
+    assert "shifted by 65 ms" in fit.summary()
 
 
 def test_noise_of_the_recording_alone_leaves_the_law_approximate():

@@ -162,7 +162,7 @@ def estimated(seeds, kept):
         errors.append(fit.delay_plus_lag - late)
         reliable += fit.verdict == "reliable"
         held += fit.verdict == "reliable" and low < late < high
-        known += "taken for lost" in fit.message
+        known += "assumed to be lost" in fit.message
     return np.sqrt(np.mean(np.square(errors))), reliable, held, known
 
 

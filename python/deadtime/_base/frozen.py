@@ -15,7 +15,9 @@ class FrozenDict(dict[Any, Any]):
     """A dict that does not change; ``dict(found)`` makes one that does."""
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
-        raise TypeError("this dict belongs to a result and does not change: change a dict() of it")
+        raise TypeError(
+            "this dict belongs to a result and does not change: change a copy of it, dict()"
+        )
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse

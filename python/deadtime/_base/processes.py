@@ -68,8 +68,8 @@ def _elsewhere(
                 report(done)
     except BrokenProcessPool as error:
         raise WorkerError(
-            "the other processes cannot start or were killed: in a script, keep what it "
-            'does under `if __name__ == "__main__":`, or give processes=1'
+            "the other processes cannot start or were killed: in a script, put its code "
+            'under `if __name__ == "__main__":`, or give processes=1'
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

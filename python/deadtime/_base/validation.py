@@ -86,8 +86,7 @@ def unmasked(name: str, values: Any) -> Any:
         if masked.size or values is np.ma.masked:
             where = f"[{', '.join(map(str, masked[0]))}]" if values.ndim else ""
             raise ValueError(
-                f"{name}{where} is masked, there is no number to take: leave masked entries out, "
-                "or fill them"
+                f"{name}{where} is masked and has no number: leave masked entries out, or fill them"
             )
         return values.data
     if isinstance(values, (list, tuple)):
@@ -186,7 +185,7 @@ def interval(name: str, given: Any, *, may_be_point: bool = False) -> Range:
     """
     low, high, count = _ends_of(name, given)
     if count is not None:
-        raise ValueError(f"{name}={given!r}: no points are taken here, give the range (low, high)")
+        raise ValueError(f"{name}={given!r}: this takes no points, give the range (low, high)")
     return _increasing(name, given, low, high, may_be_point)
 
 

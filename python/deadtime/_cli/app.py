@@ -24,17 +24,16 @@ FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 COMMANDS = {
     "estimate": "Find the plant of a recording, or the delay of a known loop, with a verdict.",
     "inspect": "List what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
-    "latency": "Show how long each loop of a vehicle takes to respond, by stage, and what that "
-    "costs.",
+    "latency": "Show how long each loop takes to respond, by stage, and which gains this permits.",
     "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
     "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
-    "explore": "Look at a loop live in the browser: its map of gains, roots, margins, responses.",
+    "explore": "Explore a loop in the browser: its map of gains, roots, margins, responses.",
     "design": "Find the gains that are best in the worst case, within margins.",
-    "tune": "Propose gains from a recording, in the form that they are typed in, with what they "
-    "will do.",
+    "tune": "Propose gains from a recording, in the form of your controller, with predicted "
+    "responses.",
     "reproduce": "Reproduce the paper on delays in quadrotor control: each printed number beside "
     "ours.",
-    "fly": "Fly steps under P control, learn the delay, design PV for it, fly that; land.",
+    "fly": "Fly steps under P control, estimate the delay, design PV gains, fly with them, land.",
     "watch": "Follow the delay of a loop row by row, with its interval, while the loop runs.",
     "internet-loop": "Control an integrator over UDP, estimate the loop's delay, and measure it.",
     "simulate": "Simulate the step response of a loop, exactly.",

@@ -41,4 +41,4 @@ def print_grave_findings(findings: Sequence[dict[str, Any]]) -> None:
     for finding in findings:
         print_text("{file.name}, {severity}: {message}".format(**finding), "yellow")
     if findings:
-        print_text("what this does to the delay: --check", "dim")
+        print_text("--check shows the effect on the delay", "dim")

@@ -38,7 +38,7 @@ def command(
     ki: Annotated[opt.Ends | None, typer.Option(help="Range of the integral gain.")] = None,
     kd: Annotated[opt.Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
     fix: Annotated[
-        list[str] | None, typer.Option(help="A gain that is given, such as Kp=2; repeatable.")
+        list[str] | None, typer.Option(help="A gain that is fixed, such as Kp=2; may be repeated.")
     ] = None,
     plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
@@ -50,18 +50,18 @@ def command(
     limit: opt.Limit = None,
     filter: opt.Filter = None,  # noqa: A002
     choose_filter: Annotated[
-        bool, typer.Option("--choose-filter", help="Choose the corner of the filter, too.")
+        bool, typer.Option("--choose-filter", help="Choose the corner of the filter as well.")
     ] = False,
     objective: Annotated[
         Objective | None,
-        typer.Option(help="What to make best: load, or abscissa where the filter is chosen, too."),
+        typer.Option(help="Objective. Default: load, or abscissa if the filter is chosen as well."),
     ] = None,
     max_sensitivity: Annotated[
         float | None, typer.Option(help="Largest Ms, for loads and set points; 1.6 if not given.")
     ] = None,
     noise_gain: Annotated[
         float | None,
-        typer.Option(help="Largest noise of the command over that of the measurement."),
+        typer.Option(help="Largest ratio of the noise of the command to that of the measurement."),
     ] = None,
     settling_time: Annotated[
         float | None, typer.Option(help="Longest settling time of a step, s.")

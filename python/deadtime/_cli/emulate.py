@@ -117,7 +117,7 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
     options = emulator.options
     warning = (
         f"{options.host} can be reached by others. Only {', '.join(options.clients)} is answered, "
-        "but addresses can be forged and nothing authenticates them: keep to a closed network."
+        "but addresses can be forged, and there is no authentication: use a closed network."
     )
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)

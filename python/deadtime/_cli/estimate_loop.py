@@ -79,8 +79,8 @@ class NamedLoop:
         """The loop of each file."""
         if not self.gains["kp"]:
             raise ValueError(
-                f"{', '.join(self.named) or 'several files'}: this is for a loop whose controller "
-                "is known: give --kp, or leave it out"
+                f"{', '.join(self.named) or 'several files'}: this is for a loop with a known "
+                "controller: give --kp, or leave the option out"
             )
         if self.corner is not None and not (self.gains["kv"] or self.gains["kd"]):
             raise ValueError("--filter is for the derivative: give --kv or --kd, or leave it out")
@@ -177,8 +177,8 @@ def _chosen(method: str | None, number: int, options: Mapping[str, Any]) -> str:
         raise ValueError(f"--method {method} is not one of {', '.join(CHOICES)}")
     if method == "all" and number > 1:
         raise ValueError(
-            f"--method all compares methods on one file, these are {number}: fit them together by "
-            f"--method {' or '.join(JOINT)}"
+            f"--method all compares methods on one file, and there are {number}: fit them "
+            f"together by --method {' or '.join(JOINT)}"
         )
     if method == "all" and options:
         option = next(iter(options)).replace("_", "-")
@@ -242,7 +242,7 @@ def _show_all(
     print_grave_findings(findings)
     print_table(estimates_table(comparison))
     print_text(
-        f"in brackets: taken as given; sum: delay and lag; off: sum less that of "
+        "in brackets: assumed; sum: delay plus lag; off: difference of the sum from that of "
         f"{comparison.best.method}, in s and in its standard errors",
         "dim",
     )

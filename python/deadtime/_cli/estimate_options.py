@@ -38,31 +38,33 @@ Kd = Annotated[
 Plant = Annotated[
     str | None,
     typer.Option(
-        help="Without: the recording shows which. A kind, such as 'two lags'; or with --kp a "
-        "formula, such as '0.9/(s*(0.1*s+1))', where delay(T) is a delay of T s, added to that "
-        "of the loop. auto/s: an integrator with as many lags as the recording shows; auto: the "
-        "same without an integrator."
+        help="Default: chosen from the recording. A kind, such as 'two lags'; or with --kp a "
+        "formula, such as '0.9/(s*(0.1*s+1))', where delay(T) is a delay of T s, added to "
+        "that of the loop. auto/s: an integrator with as many lags as the recording shows; "
+        "auto: the same without an integrator."
     ),
 ]
 Method = Annotated[
     str | None,
     typer.Option(
-        help=f"{', '.join(CHOICES)}: for an integrator, or the formula of --plant. all: beside "
-        "each other. Without: the plant is found; where it is named, all, for several files "
-        "auto.",
+        help=f"{', '.join(CHOICES)}: for an integrator, or the formula of --plant. all: a "
+        "comparison. Default: the plant is chosen from the recording; with a named plant, "
+        "all, for several files auto.",
         show_default=False,
     ),
 ]
 Free = Annotated[
     str | None,
     typer.Option(
-        help="What is fitted, for one method: of delay, gain, lag of an integrator, "
-        "time_constant of a first-order plant, lag_1, lag_2, … and zero of one of more real "
-        "poles; for waveform also limit and start. Without: delay,gain.",
+        help="What is fitted, for one method: of delay, gain, lag of an integrator, time_constant "
+        "of a first-order plant, lag_1, lag_2, … and zero of one of more real poles; for "
+        "waveform also limit and start. Default: delay,gain.",
         show_default=False,
     ),
 ]
-Map = Annotated[OvershootMap | None, typer.Option(help="From overshoot to delay, for overshoot.")]
+Map = Annotated[
+    OvershootMap | None, typer.Option(help="Map from overshoot to delay, for the method overshoot.")
+]
 Noise_path = Annotated[
     NoisePath | None,
     typer.Option(
@@ -77,8 +79,8 @@ At_rest = Annotated[
     bool | None,
     typer.Option(
         "--at-rest/--not-at-rest",
-        help="Was the plant at rest at the first row? Not given: as it shows. For a plant that is "
-        "found.",
+        help="Was the plant at rest at the first row? Default: judged from the recording. Only if "
+        "the plant is chosen from the recording.",
         show_default=False,
     ),
 ]
@@ -86,13 +88,16 @@ Closed_loop = Annotated[
     bool | None,
     typer.Option(
         "--closed-loop/--open-loop",
-        help="Does a controller compute the command? Not given: --kp or a reference that moves "
-        "says so. For a plant that is found.",
+        help="Does a controller compute the command? Default: yes with --kp or a reference that "
+        "moves. Only if the plant is chosen from the recording.",
         show_default=False,
     ),
 ]
 Largest_delay = Annotated[
-    float | None, typer.Option(help="Largest delay that is tried, s, for a plant that is found.")
+    float | None,
+    typer.Option(
+        help="Largest delay that is tried, s. Only if the plant is chosen from the recording."
+    ),
 ]
 Check = Annotated[
     bool,

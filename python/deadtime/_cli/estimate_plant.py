@@ -136,9 +136,7 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
         _print(fit, following)
         print_grave_findings(findings)
         if has_loop:
-            print_text(
-                f"methods beside each other: {asked.again({'method': 'all'})}", wrapped=False
-            )
+            print_text(f"to compare all methods: {asked.again({'method': 'all'})}", wrapped=False)
     if fit.verdict == "none":
         raise typer.Exit(NONE)
 
@@ -149,8 +147,8 @@ def _refuse_loop(loop: NamedLoop) -> None:
     for name, value in {**given, "limit": loop.limit}.items():
         if value is not None:
             raise ValueError(
-                f"--{name.replace('_', '-')} is for a loop whose controller is named: give --kp, "
-                "or leave it"
+                f"--{name.replace('_', '-')} is for a loop with a known controller: give --kp, or "
+                "leave the option out"
             )
 
 

@@ -31,12 +31,12 @@ def command(
     out: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Look at a loop live in the browser: its map of gains, roots, margins, responses.
+    """Explore a loop in the browser: its map of gains, roots, margins, responses.
 
     Parameters
     ----------
     file
-        Table with a step of the loop: the delay and the gain of the plant come from it. Without:
+        Table with a step of the loop: the delay and the gain of the plant come from it. Default:
         the loop of the options.
     kp
         Proportional gain.

@@ -72,7 +72,7 @@ def command(
     ports: Annotated[Given, Fills(ARDrone2, " ".join(PORTS), **PORTS)],
     as_json: opt.As_json = False,
 ) -> None:
-    """Fly steps under P control, learn the delay, design PV for it, fly that; land.
+    """Fly steps under P control, estimate the delay, design PV gains, fly with them, land.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def command(
         Size of the steps, m, of yaw rad: 0.25 of z, 0.5 of x and y, 0.4 of yaw; of another axis
         than z with its name: x=1 (may be repeated).
     folder
-        Where recordings and report go. Without: flight, flight-2, …
+        Where recordings and report go. Default: flight, flight-2, …
     restore
         Fly nothing: put back the parameters that an earlier run has left changed in the vehicle at
         --link, by its file in the --folder or the working directory.
@@ -196,7 +196,7 @@ def _print_restored(said: list[str], as_json: bool) -> None:
     if as_json:
         print_json("restored", {"restored": said})
     else:
-        print_text("\n".join(said) or "no earlier run has left anything changed in the vehicle")
+        print_text("\n".join(said) or "no earlier run has left changed parameters in the vehicle")
 
 
 def _print_report(found: FlightReport) -> None:

@@ -30,11 +30,11 @@ def checked_free(text: str | None, loop: ControlLoop, method: str) -> tuple[str,
             continue
         why = f"{name!r} cannot be fitted"
         if name in FORMS:
-            why = f"this plant has no {name}, as {FORMS[name]} has"
+            why = f"this plant has no {name}, only a plant {FORMS[name]} has it"
         elif name in OF_WAVEFORM and method != "waveform":
             why = f"{name} is for --method waveform"
         elif name == "limit":
-            why = "without --limit there is none to begin with"
+            why = "the fit of a limit begins at --limit, which is not given"
         raise ValueError(f"--free {text}: {why}; {choice}")
     if "delay" not in names and loop.delay is None:
         raise ValueError(f"--free {text}: the delay is not known, so name it too; {choice}")

@@ -53,7 +53,7 @@ def command(
     Parameters
     ----------
     gain
-        Gain K of a run; again for the next. Without: 5 to 10.
+        Gain K of a run; again for the next. Default: 5 to 10.
     virtual_time
         Not over UDP but in memory, as fast as it goes.
     folder

@@ -89,7 +89,7 @@ def command(
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Show how long each loop of a vehicle takes to respond, by stage, and what that costs.
+    """Show how long each loop takes to respond, by stage, and which gains this permits.
 
     Exit codes: 0 a time, reliable or an indication; 3 none; 1 an error.
     """
@@ -204,7 +204,7 @@ def _print_json(found: list[Latency]) -> None:
 def _print_changes(one: Latency, other: Latency) -> None:
     changes = compare_latencies(one, other)
     if not changes:
-        print_text("no loop is told by both logs", "yellow")
+        print_text("no loop has a time in both logs", "yellow")
         return
     rows = [
         (

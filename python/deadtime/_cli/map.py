@@ -44,15 +44,19 @@ def command(
     filter: opt.Filter = None,  # noqa: A002
     shape: Annotated[tuple[int, int], typer.Option(help="Cells along each axis.")] = (121, 121),
     counts: Annotated[
-        bool, typer.Option("--counts", help="Count unstable roots only: a fraction of the time.")
+        bool,
+        typer.Option(
+            "--counts", help="Count unstable roots only, which takes a fraction of the time."
+        ),
     ] = False,
     decay: Annotated[
-        float, typer.Option(help="Stable: every root decays at least so fast, 1/s.")
+        float, typer.Option(help="Stable means: every root decays at least this fast, 1/s.")
     ] = 0.0,
     damping: Annotated[
         opt.Ends | None,
         typer.Option(
-            help="And: least damping ratio, of roots that decay slower than this rate, 1/s."
+            help="Stable also means: at least this damping ratio, of roots that decay slower than "
+            "this rate, 1/s."
         ),
     ] = None,
     proof: Annotated[
@@ -62,7 +66,7 @@ def command(
         Gains | None, typer.Option(help="List the crossings of the axis along this gain.")
     ] = None,
     at: Annotated[
-        float | None, typer.Option(help="The other gain there. Without: that of the best cell.")
+        float | None, typer.Option(help="Value of the other gain. Default: that of the best cell.")
     ] = None,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,

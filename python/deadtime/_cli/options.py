@@ -46,17 +46,19 @@ File = Annotated[
 Time = Annotated[
     str | None,
     typer.Option(
-        help="Column of the time stamps, s; without: one of a usual name.", show_default=False
+        help="Column of the time stamps, s. Default: one with a usual name.", show_default=False
     ),
 ]
 Reference = Annotated[
     str | None,
-    typer.Option(help="Column of the reference; without: one of a usual name.", show_default=False),
+    typer.Option(
+        help="Column of the reference. Default: one with a usual name.", show_default=False
+    ),
 ]
 Output = Annotated[
     str | None,
     typer.Option(
-        help="Column of the measured output; without: one of a usual name.", show_default=False
+        help="Column of the measured output. Default: one with a usual name.", show_default=False
     ),
 ]
 Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
@@ -74,12 +76,12 @@ Plant = Annotated[
 ]
 Lag = Annotated[float, typer.Option(help="Lag of the plant, s.")]
 Sample_time = Annotated[
-    float | None, typer.Option(help="Time between commands, s; each is held. Without: continuous.")
+    float | None, typer.Option(help="Time between commands, s; each is held. Default: continuous.")
 ]
 Limit = Annotated[float | None, typer.Option(help="Largest size of the command.")]
 Filter = Annotated[
     float | None,
-    typer.Option(help="Corner of the derivative's filter, rad/s. Without: ideal derivative."),
+    typer.Option(help="Corner of the derivative's filter, rad/s. Default: ideal derivative."),
 ]
 Plot = Annotated[
     Path | None,

@@ -51,7 +51,7 @@ def command(
     out
         Folder for the figures and the page.
     page
-        The page. Without: reproduction.html in the folder.
+        The page. Default: reproduction.html in the folder.
     pictures
         Format of the figures.
     """

@@ -1,4 +1,4 @@
-"""``deadtime tune``: gains from a recording or a log, in the form that they are typed in."""
+"""``deadtime tune``: gains from a recording or a log, in the form of the controller."""
 
 from __future__ import annotations
 
@@ -60,18 +60,18 @@ def command(
     out: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Propose gains from a recording, in the form that they are typed in, with what they will do.
+    """Propose gains from a recording, in the form of your controller, with predicted responses.
 
     Exit codes: 0 gains; 3 none, with the reason; 1 an error.
 
     Parameters
     ----------
     controller
-        Kind of controller; without: PI, of a log the kind that was flown.
+        Kind of controller. Default: PI, of a log the kind that was flown.
     form
-        How the gains are typed; without: parallel, of a log as its firmware has them.
+        How the gains are typed. Default: parallel, of a log as its firmware has them.
     loop
-        Loop of a vehicle, such as 'altitude' or 'roll rate'; without: the first that the log
+        Loop of a vehicle, such as 'altitude' or 'roll rate'. Default: the first that the log
         determines.
     firmware
         Version of the firmware, for a table.
@@ -86,14 +86,14 @@ def command(
     filter_hz
         Corner of the derivative's filter, one pole, Hz.
     weight
-        Weight of the set point in the proportional term: 1 where your controller has none. Without:
+        Weight of the set point in the proportional term: 1 where your controller has none. Default:
         the one with which a step settles first.
     plant
         Kind of plant, if it is known, such as 'two lags'.
     objective
-        What to make best; without: the response to a load.
+        Objective. Default: the response to a load.
     max_sensitivity
-        Largest Ms; without: 1.6.
+        Largest Ms. Default: 1.6.
     gain_margin
         Least gain margin, a factor.
     phase_margin
@@ -159,9 +159,9 @@ def _template(
 ) -> type[Controller] | Controller | None:
     """The kind of controller that is asked for, with its filter and weight; None where none is."""
     if corner is not None and kind not in ("PV", "PD", "PID"):
-        raise ValueError("--filter-hz is that of a derivative: give --controller PV, PD or PID")
+        raise ValueError("--filter-hz is for a derivative: give --controller PV, PD or PID")
     if weight is not None and kind not in (None, "PI", "PID"):
-        raise ValueError("--weight is that of the set point: give --controller PI or PID")
+        raise ValueError("--weight is for the set point: give --controller PI or PID")
     if corner is None and weight is None:
         return None if kind is None else CONTROLLERS[kind]
     found: Any = CONTROLLERS[kind or "PI"]
@@ -191,7 +191,7 @@ def _refuse(given: Given) -> None:
     """Refuse what a log says itself."""
     for name, value in given.items():
         if value not in (None, "", False):
-            raise ValueError(f"--{name} is for a table: a log of a vehicle says this itself")
+            raise ValueError(f"--{name} is for a table: a log of a vehicle already contains it")
 
 
 def _show(found: Proposal, path: Path, plot: Path | None, out: Path | None, as_json: bool) -> None:

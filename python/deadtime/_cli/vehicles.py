@@ -62,9 +62,11 @@ class VehicleOptions:
 
     def __post_init__(self) -> None:
         if self.host is not None and self.link is not None:
-            raise ValueError("--host is an AR.Drone, --link ArduPilot or PX4: take one")
+            raise ValueError(
+                "--host is for an AR.Drone, --link for ArduPilot or PX4: give only one of them"
+            )
         if self.key is not None and self.link is None:
-            raise ValueError("--key signs a --link: give one")
+            raise ValueError("--key signs the messages of a link: give --link")
 
     @property
     def elsewhere(self) -> str | None:
@@ -92,12 +94,15 @@ class VehicleOptions:
         """The delay of the emulator, if it moves."""
         if self.virtual_time and (self.host is not None or self.link is not None):
             raise ValueError(
-                "--virtual-time is for the emulator, others are in real time: take one"
+                "--virtual-time is for the emulator only, a vehicle flies in real time: leave "
+                "one option out"
             )
         if self.moving_delay is None:
             return None
         if not self.virtual_time:
-            raise ValueError("--moving-delay is for the emulator in --virtual-time: add that")
+            raise ValueError(
+                "--moving-delay is for the emulator in virtual time: add --virtual-time"
+            )
         try:
             first, longest = (float(part) for part in self.moving_delay.split(","))
         except ValueError:
@@ -109,7 +114,7 @@ class VehicleOptions:
     def restored(self, folder: Path | None) -> list[str]:
         """Put back what earlier runs have left changed over the link; what was done."""
         if self.link is None:
-            raise ValueError("--restore is for a vehicle over --link: give one")
+            raise ValueError("--restore is for a vehicle on a link: give --link")
         with terminated_like_interrupted():
             link = MAVLinkVehicle(self.link, key=self._key(), folder=folder)
             return run_landing(link.restore())

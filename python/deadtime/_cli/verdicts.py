@@ -26,7 +26,7 @@ def verdict(loop: ControlLoop) -> str:
         return f"unstable: a chain of roots approaches Re s = {chain:.6g} 1/s"
     return (
         f"not proved stable: spectral abscissa {abscissa:.6g} 1/s, on the imaginary axis or too "
-        "close to it to tell"
+        "close to it to decide"
     )
 
 

@@ -54,9 +54,9 @@ def command(
     command
         Column of the command.
     lags
-        The lag is between these, s. Without: it is --lag.
+        The lag is between these, s. Default: it is --lag.
     noise
-        Deviation of the sensor's white noise. Without: noise and air are learned from the first
+        Deviation of the sensor's white noise. Default: noise and wind are estimated from the first
         seconds.
     follow
         The file grows: wait for further lines.
@@ -66,7 +66,7 @@ def command(
         File with the signing key of the link: 32 bytes, or 64 hexadecimal digits. What is not
         signed is refused then.
     system
-        MAVLink system of the vehicle on a link. Without: that of the first heartbeat of an
+        MAVLink system of the vehicle on a link. Default: that of the first heartbeat of an
         autopilot. What others send is ignored.
     silence
         End after so many seconds without a line or message.
@@ -106,7 +106,7 @@ def command(
         if found:  # an error loses no row that was printed
             _print_summary(source, found, rows, as_json)
     if not found:
-        raise RecordingError(f"{source}: no row has come")
+        raise RecordingError(f"{source}: no row has arrived")
 
 
 def _print_summary(source: str, found: list[OnlineEstimate], rows: int, as_json: bool) -> None:
@@ -114,7 +114,7 @@ def _print_summary(source: str, found: list[OnlineEstimate], rows: int, as_json:
     if as_json:
         print_json("watch", {"source": source, **track.to_dict()})
     else:
-        print_text(f"{rows} rows; of those that are printed above:")
+        print_text(f"{rows} rows; summary of the rows that are printed above:")
         print_text(track.summary())
 
 
@@ -133,7 +133,7 @@ def _events(
     if key is not None:
         raise ValueError(f"--key signs a link, and {source} is a file")
     if system is not None:
-        raise ValueError(f"--system is on a link, and {source} is a file")
+        raise ValueError(f"--system selects a vehicle on a link, and {source} is a file")
     if follow:
         return growing_rows(Path(source), columns, silence)
     return recorded_rows(Path(source), columns)

@@ -272,13 +272,17 @@ def estimate_delay(
     }
     if loop is None:
         if method != "auto" or free is not FREE:
-            raise ValueError("method and free are for a loop: give the loop, or leave them out")
+            raise ValueError(
+                "method and free are for an estimate with a loop: give the loop, or leave both out"
+            )
         return estimate_by_evidence(
             recording, window=window, between=between, progress=progress, **known
         )
     given = [name for name, value in known.items() if value is not None]
     if given:
-        raise ValueError(f"{given[0]} is for a recording without a loop: leave it or the loop out")
+        raise ValueError(
+            f"{given[0]} is for an estimate without a loop: leave out {given[0]} or the loop"
+        )
     runs = [checked_run(run) for run in paired_runs(recording, loop, window)]
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:

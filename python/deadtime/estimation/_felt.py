@@ -177,7 +177,10 @@ class Felt:
         if bad.size:
             raise ValueError(f"omega={bad[0]:g} rad/s is not above zero")
         if not self.loop.plant.is_linear:
-            raise ValueError("the plant limits rates: it has no gain and phase")
+            raise ValueError(
+                "the plant limits the rate of its command, so it is not linear: it has no gain "
+                "and phase"
+            )
         turned = _integrators(self.loop.plant) * 0.5 * np.pi
 
         def seen(loop: ControlLoop) -> Array:

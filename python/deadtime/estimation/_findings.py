@@ -37,8 +37,8 @@ def command_on_its_row(run: Run) -> Run:
     if not rows:
         return run
     said = (
-        f"the command was logged one row {'late' if rows > 0 else 'early'}, as the law of the "
-        f"controller shows, and was moved by {shown(run.check.row_time, math.nan, 's')}"
+        f"the command was logged one row {'late' if rows > 0 else 'early'}, as the equation of "
+        f"the controller shows, and was shifted by {shown(run.check.row_time, math.nan, 's')}"
     )
     recording = on_its_row(run.recording, run.loop, run.check)
     check = recording.check(run.loop, run.window)

@@ -224,7 +224,9 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
             raise ValueError(f"no interval: {self.uncalibrated}")
         if name in FELT:
             if not math.isfinite(self.crossover):
-                raise ValueError(f"no interval of {name}: no proportional gain is the largest")
+                raise ValueError(
+                    f"no interval of {name}: no proportional gain makes the loop unstable"
+                )
             return self._felt_interval(level, name)
         if name not in self.stderr:
             raise ValueError(

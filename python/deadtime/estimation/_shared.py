@@ -199,4 +199,4 @@ def _end(excess: Callable[[float], float], start: float, step: float, floor: flo
         if far == floor:
             return floor
         near, step = far, 1.5 * step
-    raise ValueError(f"no end of the interval is found on the way from {start:.6g} to {near:.6g}")
+    raise ValueError(f"no end of the interval was found from {start:.6g} to {near:.6g}")

@@ -43,7 +43,7 @@ def check_reads_samples(loop: ControlLoop) -> None:
     else:
         return
     raise ValueError(
-        f"{why} acts on the effect of the air between the samples, where it is not computed: "
+        f"{why} acts on the effect of wind (air) between the samples, which is not computed: "
         f"{advice}, or leave air and trim out of the noise"
     )
 

@@ -224,7 +224,7 @@ def _check_axes(vehicle: Vehicle, axes: Sequence[str]) -> None:
     missing = [axis for axis in axes if axis not in vehicle.axes]
     if missing:
         raise ValueError(
-            f"the vehicle has no axis {', '.join(missing)} that speeds can be commanded on, only "
+            f"the vehicle has no axis {', '.join(missing)} that takes speed commands, only "
             f"{', '.join(vehicle.axes)}"
         )
 

@@ -106,7 +106,7 @@ class LogLoop(ReadOnlyArrays):
             raise ValueError(f"command={command!r} is not one of 'setpoint', 'actuator'")
         if command not in self.signals:
             raise RecordingError(
-                f"the log does not hold what the controller of {self.name} commands"
+                f"the log does not contain the command of the controller of {self.name}"
             )
         if start is None and stop is None:
             if not self.segments:

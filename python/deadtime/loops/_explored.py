@@ -41,7 +41,7 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
     controller, plant = loop.controller, _simplest(loop.plant)
     if not plant.is_rational or not plant.is_linear:
         raise ValueError(
-            f"{type(plant).__name__}: the explorer shows plants that are linear, and rational but "
+            f"{type(plant).__name__}: the explorer shows linear plants that are rational except "
             "for one delay in series; make a loop around such a plant first"
         )
     refuse_discretised(controller, loop.sample_time, "the explorer")

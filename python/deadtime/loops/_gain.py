@@ -147,8 +147,9 @@ class LoopGain:
         if of in ("output", "command"):
             if self.specification.sample_time is not None:
                 raise ValueError(
-                    f"of={of!r}: between the samples a loop answers one frequency with many; ask "
-                    "for 'sensitivity' or 'complementary', or the continuous() loop"
+                    f"of={of!r}: between the samples, the response of a loop to one frequency "
+                    "contains many; ask for 'sensitivity' or 'complementary', or the "
+                    "continuous() loop"
                 )
             return self.specification.transfer(of).hinf_norm()
         found = self._margin(delay_margin=False)

@@ -127,7 +127,7 @@ def asked(
     if not loop.plant.is_rational:
         raise ValueError(
             "a plant with delays inside has no load response here: give a plant that is rational "
-            "but for one delay in series"
+            "except for one delay in series"
         )
     _ = loop.known_delay
     height = finite("size", size)

@@ -235,10 +235,10 @@ class LoopPoles:
         if found is None:
             near = self.rightmost()
             raise ValueError(
-                f"a pole at {near[0]:.6g} 1/s, known to {near.radii[0]:.1e}, is as near to the "
-                "imaginary axis as rounding: whether this loop is stable is beyond double "
-                "precision; change a gain, or take a sample_time nearer to the time constants of "
-                "the loop"
+                f"a pole at {near[0]:.6g} 1/s, known to {near.radii[0]:.1e}, is closer to the "
+                "imaginary axis than rounding errors: double precision cannot decide whether "
+                "this loop is stable; change a gain, or take a sample_time nearer to the time "
+                "constants of the loop"
             )
         return found
 
@@ -321,7 +321,7 @@ class LoopPoles:
         values = loop.parameters
         if name not in values or name in MOVES_NO_POLE:
             raise ValueError(
-                f"{name!r} is not a number whose range can be sought: choose one of "
+                f"{name!r} is not a number with a stable range: choose one of "
                 f"{', '.join(known for known in values if known not in MOVES_NO_POLE)}"
             )
         if not self.is_stable():
@@ -366,7 +366,7 @@ class LoopPoles:
         """Characteristic function with the numbers `names` as its parameters."""
         loop = self.specification
         loop.refuse_hold(
-            "has no characteristic function to prove anything of, its poles are eigenvalues: judge "
+            "has no characteristic function for a proof, because its poles are eigenvalues: use "
             "loop.continuous() for the loop without its hold, or look at single cells with "
             "dtm.stability_map"
         )

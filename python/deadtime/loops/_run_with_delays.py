@@ -32,7 +32,7 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
         if is_given:
             raise ValueError(
                 f"{name}: a loop whose plant has delays inside takes no such argument; it needs a "
-                "plant that is rational but for one delay in series"
+                "plant that is rational except for one delay in series"
             )
     if callable(given.reference):
         raise ValueError(

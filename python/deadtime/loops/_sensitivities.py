@@ -33,14 +33,14 @@ def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...
             )
         if name.startswith("lag") and known[name] == 0.0:
             raise ValueError(
-                f"sensitivities: at {name}=0 the plant changes its order and has no slope with "
-                "respect to the lag; give the plant a small lag, or take the slope with respect "
-                "to the delay, which acts like it"
+                f"sensitivities: at {name}=0 the plant changes its order, so there is no "
+                "derivative with respect to the lag; give the plant a small lag, or take the "
+                "derivative with respect to the delay, which has a similar effect"
             )
         if name == "delay" and known[name] == 0.0 and loop.sample_time is None:
             raise ValueError(
-                "sensitivities: at delay=0 a continuous loop has no slope with respect to the "
-                "delay that could be computed without one; give it a small delay"
+                "sensitivities: at delay=0 the derivative of a continuous loop with respect to "
+                "the delay is not computed; give the loop a small delay"
             )
     return tuple(dict.fromkeys(names))
 

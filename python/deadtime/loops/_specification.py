@@ -80,8 +80,8 @@ class LoopSpecification(PickledByFields):
             value = getattr(self, name)
             if value is not None:
                 raise ValueError(
-                    f"{name}={value}: a hold or a limit needs a plant that is rational but for one "
-                    f"delay in series, and this one has delays inside; leave {name} out"
+                    f"{name}={value}: a hold or a limit needs a plant that is rational except for "
+                    f"one delay in series, and this one has delays inside; leave {name} out"
                 )
 
     @property

@@ -214,7 +214,8 @@ def _no_such_hold(told: str, soon: float, sample_time: float) -> Finding:
         "refused",
         f"{told}, but {100.0 * soon:.0f} % of the changes of the command come sooner than that "
         "after the last one: check sample_time, or leave it out",
-        f"a hold that is not there counts as {seconds(0.5 * sample_time)} of delay",
+        "the model would contain a hold that is not in the loop, which counts as "
+        f"{seconds(0.5 * sample_time)} of delay",
     )
 
 

@@ -192,15 +192,15 @@ def command_findings(
             "the command of each row is the one computed from the row "
             f"{'before' if late else 'after'} it: command and output were logged one row, "
             f"{seconds(rows.row_time)}, apart",
-            f"taken as it stands, the delay after the command comes out up to one row too "
+            "without a correction, the estimated delay after the command is up to one row too "
             f"{'short' if late else 'long'}",
         )
     elif command.law == "approximate":
         yield Finding(
             "command_approximate",
             "note",
-            "the command is that of the controller but for small differences: the controller saw "
-            "another output than the recorded one, or noise was added to the recording",
+            "the command is that of the controller except for small differences: the controller "
+            "saw another output than the recorded one, or noise was added to the recording",
             "none on a fit to the logged command; for a fit of the loop the noise is that of the "
             "recording: Waveform(noise='recording')",
         )
@@ -304,7 +304,8 @@ def _limit_findings(columns: Columns, command: Command, loop: ControlLoop) -> It
             "refused",
             f"the command reaches {largest:.6g}, beyond limit={loop.limit:g}: give the limit of "
             "the controller, or the command after its limit",
-            "the loop would be slowed by a limit that was not there, and the delay come out short",
+            "the model would contain a limit that was not there, and the estimated delay would "
+            "be too short",
         )
     elif seen is not None and (loop.limit is None or seen < (1.0 - 1e-3) * loop.limit - step):
         told = "no limit was given" if loop.limit is None else f"limit={loop.limit:g} was given"

@@ -79,7 +79,7 @@ def no_excitation(reference: Array, output: Array, *, in_motion: bool) -> Findin
         "refused",
         f"the reference is {reference[0]:g} throughout the window: it does not excite the loop; "
         "choose a window with a step",
-        "noise and wind alone would decide the delay",
+        "only noise and wind would determine the estimated delay",
     )
 
 

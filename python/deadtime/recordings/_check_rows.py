@@ -211,9 +211,9 @@ def _stamp_findings(columns: Columns, rows: Rows) -> Iterator[Finding]:
             "warning" if rows.jitter > MUCH_JITTER * rows.row_time else "note",
             f"the time between rows, {seconds(rows.row_time)}, varies with a standard deviation of "
             f"{seconds(rows.jitter, 2)}",
-            "a fit that takes even samples errs by as much in the time of each command. Errors "
-            f"in the stamps act like noise of {rate * rows.jitter:.2g} where the output moves at "
-            f"{rate:.2g} per second",
+            "a fit that assumes even samples has an error of this size in the time of each "
+            f"command. Errors in the stamps act like noise of {rate * rows.jitter:.2g} where the "
+            f"output moves at {rate:.2g} per second",
         )
 
 

@@ -68,8 +68,8 @@ def expanded_and_exact(
     if states > LARGEST:
         raise NotExpandedError(
             f"the determinant of {states} states is not expanded, only up to {LARGEST}: its "
-            "coefficients would no longer say where its roots are; poles(), rightmost(), "
-            "is_stable() and frequency_response() work for any number"
+            "coefficients would no longer determine its roots; poles(), rightmost(), is_stable() "
+            "and frequency_response() work for any number"
         )
     # One power of two makes integers of all entries.
     shift = max(

@@ -125,7 +125,7 @@ class RootSet(ReadOnlyArrays, Pictured):
         for index in range(min(len(self), _SHOWN)):
             line = f"  {_written(self.roots[index])}  within {self.radii[index]:.1e}"
             if self.multiplicities[index] > 1:
-                line += f", {self.multiplicities[index]} roots not told apart"
+                line += f", {self.multiplicities[index]} roots not resolved"
             lines.append(line)
         if len(self) > _SHOWN:
             lines.append(f"  and {len(self) - _SHOWN} more")

@@ -151,7 +151,7 @@ def _singular(rank: int, size: int, is_neutral: bool) -> str:
     if is_neutral:
         text += (
             "; with N, derivatives of the past would determine the state itself (an advanced "
-            "equation), and every break would come back rougher than before"
+            "equation), and every jump would return less smooth than before"
         )
     return text + ". Eliminate the states that have no derivative"
 

@@ -91,8 +91,8 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     if not model.has_states and before.any():
         if model.rest is None:
             raise ValueError(
-                f"input_before={before[0]}: {system!r} has a pole at zero and no rest but under an "
-                "input of zero; give a DelaySystem with its history"
+                f"input_before={before[0]}: {system!r} has a pole at zero, so it rests only under "
+                "an input of zero; give a DelaySystem with its history"
             )
         state = model.rest * before
         past = signals.constant(state)

@@ -426,7 +426,7 @@ def feedback(G: Any, H: Any = 1.0, sign: int = -1) -> TransferFunction:
     p, q = cast(TransferFunction, back)._num, cast(TransferFunction, back)._den
     closed = d * q - float(sign) * (n * p)
     if not closed.coefficients.any():
-        raise ValueError("the loop has no solution: what comes back is exactly what goes in")
+        raise ValueError("the loop has no solution: sign times G times H is 1 for every s")
     return TransferFunction(n * q, closed)
 
 

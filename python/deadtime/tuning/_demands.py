@@ -75,7 +75,7 @@ def white_to(loop: ControlLoop, bandwidth: float | None = None) -> float:
         if bandwidth is not None and bandwidth > half:
             raise ValueError(
                 f"bandwidth={bandwidth}: noise beyond {half:.4g} rad/s, half the sampling rate, is "
-                "folded into what lies below; give it as the samples see it"
+                "aliased to lower frequencies; give the noise as it is in the samples"
             )
         return half if bandwidth is None else bandwidth
     if bandwidth is not None:

@@ -264,7 +264,9 @@ def _corners(problem: Problem, omegas: ArrayLike | None) -> Array:
     late = problem.intervals["delay"][1] + numbers.get("lag", 0.0)
     late += 0.5 * numbers.get("sample_time", 0.0)
     if late == 0.0:
-        raise ValueError("the loop has no delay, lag or sample time to measure by: give omegas=")
+        raise ValueError(
+            "the loop has no delay, lag or sample time that sets a scale: give omegas="
+        )
     return np.geomspace(_SLOWEST / late, _FASTEST / late, _CORNERS)
 
 

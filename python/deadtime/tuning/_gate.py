@@ -283,7 +283,7 @@ class _Judge:
             try:
                 found = loop._margin(delay_margin=False)
             except ValueError as error:
-                self.reasons.append(f"no margins are known of {_told(loop)}: {error}")
+                self.reasons.append(f"the margins are not known for {_told(loop)}: {error}")
                 return
             if not found.stable:
                 self.reasons.append(f"the loop is not stable with {_told(loop)}")
@@ -315,8 +315,8 @@ class _Judge:
             if off <= _SAME * max(abs(pole), 1e-9 * scale) and pole.real > -slow:
                 kind = "unstable" if pole.real >= 0.0 else "slow"
                 self.reasons.append(
-                    f"a zero hides the {kind} pole at {pole:.4g} 1/s from the loop, which a load "
-                    "still moves"
+                    f"a zero cancels the {kind} pole at {pole:.4g} 1/s in the loop, but a load "
+                    "still excites this pole"
                 )
                 return
 

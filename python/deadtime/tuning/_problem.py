@@ -77,8 +77,8 @@ class Problem(PickledByFields):
             return (self.given,)
         if not self.loop.plant.is_rational:
             raise ValueError(
-                "ranges: where to look for gains is known for plants that are rational but for one "
-                "delay in series; give ranges= for this one"
+                "ranges: the search range of gains follows from plants that are rational except "
+                "for one delay in series; give ranges= for this plant"
             )
         return candidate_ranges(self.loop, self.free)
 

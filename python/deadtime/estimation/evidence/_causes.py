@@ -14,14 +14,14 @@ REACH = 1.96
 #: What each cause of the kernel is called, and what it says of size and time.
 WORDS = {
     "load": "a load of {size} in units of the command begins at {time}",
-    "output step": "the output jumps by {size} at {time}, and the plant does not move",
+    "output step": "the output jumps by {size} at {time} although the plant does not move",
     "delay change": "the delay changes by {size} s at {time}",
-    "dead zone": "commands within ±{size} do nothing",
+    "dead zone": "commands within ±{size} have no effect",
     "play": "the actuator has a play of {size}",
     "stiction": "the actuator sticks until the command is {size} away from it",
-    "upper limit": "the command does nothing more above {size}",
-    "lower limit": "the command does nothing more below -{size}",
-    "rate limit": "what reaches the plant changes by at most {size} in a second",
+    "upper limit": "the command has no further effect above {size}",
+    "lower limit": "the command has no further effect below -{size}",
+    "rate limit": "the input of the plant changes by at most {size} in a second",
     "slope limit": "the plant's response changes by at most {size} of the command in a second",
     "drag": "a force of {size} times the square of the speed slows the motion",
     "gain ramp": "the gain changes by {share} over the recording",
@@ -32,17 +32,18 @@ WORDS = {
 #: What to do about each.
 REMEDIES = {
     "load": "if you know the load, record without it",
-    "output step": "look at the sensor, or at the estimator behind it, at that time",
+    "output step": "check the sensor, or the estimator behind it, at that time",
     "delay change": "estimate before and after it by a window",
-    "dead zone": "add it to the command in the controller, or command more than it",
-    "play": "remove the play, or command moves that are large against it",
-    "stiction": "free the actuator, or command moves that are large against it",
+    "dead zone": "compensate the dead zone in the controller, or use larger commands",
+    "play": "remove the play, or use changes of the command that are large compared with it",
+    "stiction": "free the actuator, or use changes of the command that are large compared with the "
+    "sticking",
     "upper limit": "give the controller this limit",
     "lower limit": "give the controller this limit",
     "rate limit": "give the loop this limit of the command's rate",
     "slope limit": "keep commands small enough not to reach it, or give the plant this limit",
     "drag": "the gain holds for speeds as in this recording",
-    "gain ramp": "look what changes, such as a battery or a temperature",
+    "gain ramp": "find what changes, such as a battery or a temperature",
     "gain by level": "record around the level at which the loop is to work",
     "jitter": "log the times at which commands are sent, or send them by a steady clock",
 }
@@ -53,8 +54,8 @@ NAMES = {"upper limit": "unequal limits", "lower limit": "unequal limits"}
 SENSOR_WORDS = {
     "frozen": "the sensor is frozen for {rows} rows from {start:.4g} to {stop:.4g} s",
     "repeated": "the sensor repeats its reading in {rows} rows, {size:.3g} s old in the mean",
-    "glitch": "the sensor leaves and comes back in {rows} rows",
-    "smoothed": "the readings are a moving mean of {size:.3g} rows around each",
+    "glitch": "the sensor has glitches in {rows} rows",
+    "smoothed": "the readings are a centred moving mean of {size:.3g} rows",
 }
 
 

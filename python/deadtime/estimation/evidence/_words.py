@@ -131,7 +131,7 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float
         NOT_WHITE: "what the plant leaves unexplained is more than sensor noise: there "
         "is a disturbance, or the plant is of another kind",
         "command shifted": f"the command fits better one row later or earlier (by {size:.3g} in "
-        "2 ln L), so it was moved",
+        "2 ln L), so it was shifted",
         "delay at its limit": f"the dead time, {size:.4g} s, is at the limit of what is tried",
         "lag at its limit": f"a time constant, {size:.4g} s, is at the limit of what is tried, far "
         "longer than the recording",
@@ -200,7 +200,7 @@ def _seen(fit: FoundPlant) -> list[str]:
     view = fit.at(fit.excited)
     return [
         f"at {omega:.4g} rad/s: gain {_ends(gain)}, equivalent delay {_ends(delay, 's')} (95 %), "
-        f"or that and half periods of {rough(math.pi / omega, 's')}"
+        f"or this plus multiples of the half period of {rough(math.pi / omega, 's')}"
         for omega, gain, delay in zip(
             fit.excited.tolist(), view.gain_ci.T, view.delay_ci.T, strict=True
         )
@@ -222,7 +222,7 @@ def _beside(fit: FoundPlant) -> list[str]:
     if fit.shift:
         lines.append(
             f"the command is {abs(fit.shift)} row {'early' if fit.shift > 0 else 'late'} in the "
-            "recording, and was moved"
+            "recording, and was shifted"
         )
     lines += [f"found: {cause.in_words()}: {cause.remedy}" for cause in fit.causes]
     for fault in fit.sensor_faults:
@@ -247,14 +247,16 @@ def advice_on(fit: FoundPlant) -> Advice:
 def _advice_on(fit: FoundPlant) -> Advice:
     if fit.verdict == "reliable":
         if fit.best.name == "delay":
-            return Advice("nothing: the output is the command, later")
+            return Advice("nothing: the output is the delayed command")
         kind = "P" if fit.best.integrates else "PI"
         return Advice(
             f"design a {kind} controller for the whole interval of the dead time", controller=kind
         )
     if fit._better is not None:
         return Advice(
-            "leave the plant out: another is likelier", {"plant": None}, fit._question.options()
+            "leave out the plant: another plant is likelier",
+            {"plant": None},
+            fit._question.options(),
         )
     if fit._code == TAKEN_AT_REST or fit.reason == TOO_EARLY:
         words = "if the plant was at rest at the first row, say so"
@@ -276,16 +278,18 @@ def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
     if fit.reason.startswith("the sensor reads in steps"):
         return Advice("let the command move further, or read the sensor in finer steps")
     if fit._code == "no response":
-        return Advice("look whether these are the right columns", draw=True)
+        return Advice("check that these are the right columns", draw=True)
     window = None if fit.others else _reliable_part(fit._question)
     if window is not None:
         ends = " to ".join(f"{end:g}" for end in window)
-        words = f"from {ends} s the recording is explained: use that part"
+        words = f"the plant explains the recording from {ends} s: use this part"
         return Advice(words, {"window": window}, given)
     if fit._code == "delay at its limit":
         larger = float(f"{2.0 * fit.delay:.3g}")
         return Advice("allow a larger dead time", {"largest_delay": larger}, given)
-    return Advice("look where the residuals are large, and leave that out by a window", draw=True)
+    return Advice(
+        "find where the residuals are large, and leave this part out with a window", draw=True
+    )
 
 
 def _reliable_part(question: Question) -> OpenRange | None:

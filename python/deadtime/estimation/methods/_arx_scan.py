@@ -58,7 +58,7 @@ class ARXScan(OfOne):
     name: ClassVar[str] = "arx_scan"
     limits: ClassVar[str] = (
         "The delay is a whole number of samples, and noise of the sensor biases the coefficients "
-        "of the ARX models, under feedback more so."
+        "of the ARX models, especially under feedback."
     )
 
     def __post_init__(self) -> None:

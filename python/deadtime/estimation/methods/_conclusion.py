@@ -264,8 +264,8 @@ class OfOne(Method):
         """The numbers that are asked for; the others are taken as given."""
         if "delay" not in free:
             raise ValueError(
-                f"the {self.name} method determines the delay alone, and free={tuple(free)!r} does "
-                "not ask for it"
+                f"the {self.name} method determines the delay alone, and free={tuple(free)!r} "
+                "does not contain it"
             )
         return ("delay",)
 

@@ -60,8 +60,8 @@ class GCC(OfOne):
 
     name: ClassVar[str] = "gcc"
     limits: ClassVar[str] = (
-        "Under feedback the command contains the noise of the output, which moves the peak of the "
-        "correlation, the more the weaker the excitation."
+        "Under feedback the command contains the noise of the output, which moves the peak of "
+        "the correlation. The weaker the excitation, the larger is this error."
     )
 
     def __post_init__(self) -> None:

@@ -253,7 +253,7 @@ class _Begun:
             text += ", which was not logged but computed from reference and output"
         elif lost := sum(one.commands.lost for one in self.models):
             gaps = f"gap{'s' * (lost > 1)}"
-            text += f", with commands taken for lost in {lost} {gaps} of their log"
+            text += f", where commands in {lost} {gaps} of their log are assumed to be lost"
         if (known := self.assumed.output_filter) is not None:
             text += f", before the filter, in means of {known.together} rows"
         return text

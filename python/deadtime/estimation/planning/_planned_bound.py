@@ -106,7 +106,7 @@ class PlannedBound(CramerRaoBound):
         """
         for name in (one, other):
             if name not in self.free:
-                raise ValueError(f"{name!r} is not free, which are {', '.join(self.free)}")
+                raise ValueError(f"{name!r} is not free; free are {', '.join(self.free)}")
         i, j = self.free.index(one), self.free.index(other)
         return float(self.cov[i, j] / np.sqrt(self.cov[i, i] * self.cov[j, j]))
 
@@ -142,8 +142,8 @@ def from_the_command(
     num, den = loop.plant.polynomials()
     if len(num) == len(den):
         raise NotIdentifiableError(
-            f"{loop.plant!r} passes its command straight to its output, which jumps with it: there "
-            "is no derivative by the delay; give the plant a lag"
+            f"{loop.plant!r} passes its command straight to its output, which jumps with it: "
+            "there is no derivative with respect to the delay; give the plant a lag"
         )
     values, command, time = loop.parameters, recording.command, recording.time
     assert command is not None
@@ -272,7 +272,8 @@ def _feedback(loop: ControlLoop, experiment: Experiment, command: Array) -> Arra
     time, controller = experiment.time, loop.controller
     if experiment.relay_amplitude is not None:
         raise NotIdentifiableError(
-            "the air moves the switching of the relay, which has no derivative: log the command"
+            "wind (air) changes the switching times of the relay, which have no derivative: log "
+            "the command"
         )
     if not isinstance(controller, P):
         raise NotIdentifiableError(

@@ -101,11 +101,11 @@ def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, floa
     found = []
     if abs(numbers.colour) > COLOURED:
         found.append(
-            "the innovations are not white: the noise is not the given one, or the plant lacks "
-            "something"
+            "the innovations are not white: the noise is not the given one, or the plant model "
+            "is incomplete"
         )
     if numbers.unexplained > UNEXPLAINED:
-        found.append("the innovations follow the command: the plant lacks something")
+        found.append("the innovations follow the command: the plant model is incomplete")
     if numbers.highest > AT_END:
         found.append(f"the delay may be above the range, which ends at {range_[1]:.3g} s")
     if numbers.lowest > AT_END and range_[0] > 0.0:
@@ -126,7 +126,7 @@ def estimate_of(
         waits = (
             "the command has not yet changed enough"
             if numbers.started
-            else "the first command has not arrived at every delay"
+            else "with the longest delay, the first command has not arrived yet"
         )
         message = f"no estimate yet: {waits}" + (f"; {message}" if message else "")
     return OnlineEstimate(

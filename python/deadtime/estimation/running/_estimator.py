@@ -193,7 +193,7 @@ class OnlineEstimator:
         self._rows: list[tuple[float, float | None]] = []
         self._commands: list[tuple[float, float]] = []
         self._next_fit = math.inf
-        self._reason = "the noise is being learned"
+        self._reason = "the noise is being estimated"
         # The settings are checked now, not with the first row. It says what is known before one.
         self._blank = OnlineBank(self._settings)
         if noise is not None:
@@ -236,7 +236,9 @@ class OnlineEstimator:
             found._settings = found._settings._replace(layers=layers)
         found._settings = found._settings._replace(freedom=_freedom_of(fit))
         if fit.verdict != "reliable":
-            found._doubts = (f"the fit it began with was not ({fit.message})",)
+            found._doubts = (
+                f"the fit that the estimator began with was not reliable ({fit.message})",
+            )
         found._begin(fitted if noise is None else _flight_noise(noise))
         return found
 
@@ -326,7 +328,7 @@ class OnlineEstimator:
         is_restless = len(self._changes) >= RESTLESS
         if is_restless:
             count = len(self._changes)
-            reason = f"not reliable: {count} changes in a minute: the plant lacks something"
+            reason = f"not reliable: {count} changes in a minute: the plant model is incomplete"
             message = f"{found.message}; {reason}" if found.message else reason
             verdict: Verdict = "indication" if found.known else "none"
             found = replace(found, verdict=verdict, message=message)
@@ -392,7 +394,7 @@ class OnlineEstimator:
         noise = fit.noise if fit.noise is not None else FlightNoise(white=fit.rms)
         self._settings = self._settings._replace(freedom=_freedom_of(fit))
         if fit.verdict != "reliable":
-            self._doubts = (f"the first {LAST:.0f} s did not fit ({fit.message})",)
+            self._doubts = (f"the fit of the first {LAST:.0f} s was not reliable ({fit.message})",)
         self._begin(noise)
         assert self._bank is not None
         commands = iter([*self._commands, (math.inf, 0.0)])

@@ -116,7 +116,7 @@ class ARDrone2(VehicleLink):
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The height: to the sides it is commanded angles, not speeds."""
+        """The height: the horizontal commands are angles, not speeds."""
         return ("z",)
 
     @property
@@ -292,8 +292,8 @@ class ARDrone2(VehicleLink):
         """
         if north or east or turn:
             raise ValueError(
-                "an AR.Drone 2.0 follows commanded climbs only: to the sides it is commanded "
-                "angles, not speeds"
+                "an AR.Drone 2.0 takes speed commands for the climb only: its horizontal "
+                "commands are angles"
             )
         return Motion(up=self.command(up))
 

@@ -67,8 +67,8 @@ class Authority:
         """Raise for a vehicle that is armed, and not from here."""
         if reader.armed and not self.armed_here:
             raise LinkError(
-                f"{self._name}: the vehicle is armed already, and not by this link: whoever armed "
-                "it flies it"
+                f"{self._name}: the vehicle is armed already, and not by this link: somebody else "
+                "flies it"
             )
 
     def fly(self, *modes: int) -> None:
@@ -110,8 +110,9 @@ class Authority:
 
     def _was_disarmed(self, link: Connection, time: float) -> str:
         return (
-            f"{self._name}: the vehicle was disarmed, and not from here{link.said(time - REASON)}: "
-            "it is not armed again. Connect again when whoever did it agrees"
+            f"{self._name}: the vehicle was disarmed, and not from "
+            f"here{link.said(time - REASON)}: it is not armed again. Connect again when the "
+            "person who disarmed it agrees"
         )
 
     def _was_taken(self, mode: int, pilot: Autopilot, link: Connection, time: float) -> str:

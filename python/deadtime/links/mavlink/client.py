@@ -230,13 +230,12 @@ commanding it
         if self._vehicle is None and (others := link.senders.vehicles):
             raise LinkError(
                 f"several vehicles are on {self.address}: system {link.target[0]}, "
-                f"{', '.join(map(str, others))}: give `vehicle`, the system of the one to fly"
+                f"{', '.join(map(str, others))}: give `vehicle`, the system of the vehicle to fly"
             )
         if strangers := link.carriers.other_vehicles:
             raise LinkError(
                 f"another vehicle answers over {strangers[0].address} than over "
-                f"{link.carriers.current.address}: its clock is another one; give links to one "
-                "vehicle"
+                f"{link.carriers.current.address}: their clocks differ; give links to one vehicle"
             )
         self._authority.refuse_armed(self._reader)
         vehicle = VehicleId(pilot.name, link.target[0], await link.board())
@@ -244,9 +243,9 @@ commanding it
         self._parameters = Parameters(link, pilot.integers_as_bits, changed)
         if self._simulated and not await self._is_simulator(pilot):
             raise LinkError(
-                f"what answers at {self.address} does not say that it is a simulator: a router "
-                "there may lead to a vehicle. If nobody and nothing can be hurt by its flight, "
-                "take simulated=False, or --i-have-a-safe-area on the command line"
+                f"what answers at {self.address} does not identify itself as a simulator: a "
+                "router there may lead to a real vehicle. If nobody and nothing can be hurt by "
+                "its flight, take simulated=False, or --i-have-a-safe-area on the command line"
             )
         await ask_over_all(link, pilot)
         await link.until(lambda: self._reader.landed_state != UNKNOWN, SHOWN)

@@ -259,7 +259,7 @@ class Commanding(VehicleLink):
             raise LinkError(f"{self.address}: `await allow({kind!r})` before commanding it")
         self._check_in_air()
         if self._reader.newest is None:
-            raise LinkError(f"{self.address}: no state of the vehicle has come")
+            raise LinkError(f"{self.address}: no message with the state of the vehicle has arrived")
         return self._reader.newest
 
     def _heading(self, state: VehicleState, given: float | None) -> float:

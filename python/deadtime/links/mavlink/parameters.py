@@ -209,8 +209,8 @@ class Parameters:
                 left.save()
         except LinkError as error:
             raise LinkError(
-                f"{error}. What an earlier run has changed remains so, the vehicle had "
-                f"{left.words()}: see {left.path}"
+                f"{error}. The parameters that an earlier run changed remain changed. The vehicle "
+                f"had {left.words()}: see {left.path}"
             ) from error
         return since
 

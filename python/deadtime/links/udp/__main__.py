@@ -167,7 +167,7 @@ def _parser() -> argparse.ArgumentParser:
         "--controller", type=_address, required=True, help="the controller, or a relay"
     )
     plant.add_argument(
-        "--listen", type=_address, help="HOST:PORT. Without: where the controller can answer"
+        "--listen", type=_address, help="HOST:PORT. Default: where the controller can answer"
     )
     plant.add_argument("--gain", type=float, default=1.0, help="of the integrator")
     plant.add_argument("--lag", type=float, default=0.0, help="of the integrator, s")

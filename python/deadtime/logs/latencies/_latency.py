@@ -414,7 +414,7 @@ def _commands(loop: LogLoop) -> Iterator[Command]:
 def latency_of(log: Log, loop: LogLoop, command: Command) -> LoopLatency:
     """The time of one loop from one of its commands."""
     if not loop.segments:
-        why = "; ".join(loop.why_left_out) or "it is never followed"
+        why = "; ".join(loop.why_left_out) or "the setpoint is never followed"
         return LoopLatency(loop.name, loop.axis, loop.kind, command, "none", why)
     told = loop.signals[command]
     sampling = sampling_of(log, loop.kind, told)

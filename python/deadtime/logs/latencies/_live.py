@@ -49,8 +49,8 @@ def around_the_vehicle(estimated: Sequence[LoopLatency]) -> Around | None:
     which = "the gain that is flown" if gain is not None else "the well damped gain"
     words = (
         f"The vehicle as estimated, {one.name}, under proportional control of the {one.loop} with "
-        f"{which}: this is the loop that its largest stable gain is about, without further terms "
-        "of the controller. The interval is that of the delay, with gain and lag as estimated."
+        f"{which}: its largest stable gain refers to this loop, without further terms of the "
+        "controller. The interval is that of the delay, with gain and lag as estimated."
     )
     controller = P(one.cost.well_damped if gain is None else gain)
     widest, longest = (float(f"{_BEYOND * end:.2g}") for end in (one.cost.largest, one.time))

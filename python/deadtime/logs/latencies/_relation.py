@@ -227,7 +227,7 @@ def relation_of(
     it is fitted, `sampling` how its commands pass between rows then.
     """
     if not windows:
-        return replace(nothing, reason="it is never followed for long enough")
+        return replace(nothing, reason="the setpoint is never followed for long enough")
     windows = that_follow(windows)
     chosen = best_of(windows)
     if not chosen:
@@ -307,8 +307,8 @@ def _why_doubtful(found: LoopLatency) -> str:
     needed = MANY if _is_coloured(fit) else FEW
     if len(found.times) < needed:
         return (
-            f"{len(found.times)} windows show it by themselves: {needed} are needed to know how "
-            "far it differs over the log"
+            f"{len(found.times)} windows show the time by themselves: {needed} are needed to know "
+            "how much it varies over the log"
         )
     return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason
 
@@ -417,5 +417,5 @@ def _no_answer(found: LoopLatency) -> str:
         return fit.reason
     if not _says_something(found.time, found.stderr, fit.recording):
         value = stated(found.time, found.stderr, "s")
-        return f"the time comes out as {value}, which cannot be used"
+        return f"the time is estimated as {value}, which cannot be used"
     return ""

@@ -142,7 +142,7 @@ class _Checker:
         """
         degree = max(map(len, self.function.rows)) - 1
         if not (0 <= index < len(self.function.rows) and 0 <= radius < math.inf):
-            fail("the bound of the roots is not one")
+            fail("the bound of the roots is not valid")
         if len(self.function.rows[index]) != degree + 1:
             fail("the row that is said to dominate does not have the highest degree")
         room = abs(self.function.rows_exact[index][degree])

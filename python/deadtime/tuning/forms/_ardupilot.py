@@ -31,8 +31,8 @@ ACCELERATION = 100.0 * 0.001
 
 BOTH = "The parameters hold for north and east together."
 SMALL = (
-    "The firmware follows a square root where the error is large against its acceleration limit; "
-    "the gain is that of small errors."
+    "The firmware uses a square-root law for errors that are large compared with its "
+    "acceleration limit; the gain is that for small errors."
 )
 
 #: The first firmware with the names of 4.7.

@@ -67,7 +67,7 @@ LOOPS = ("roll rate", "pitch rate", "yaw rate")
 
 NOTES = (
     "TPA lowers the gains above tpa_breakpoint; iterm_relax holds I while the set point moves.",
-    "The lines switch off the sliders and the dynamic damping, which move the gains.",
+    "The lines switch off the sliders and the dynamic damping, which would change the gains.",
 )
 
 KEPT_F = "F is left as it is: it takes the derivative of the set point, and is no part of the loop."

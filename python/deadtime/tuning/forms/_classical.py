@@ -275,8 +275,9 @@ def write(controller: Controller, form: str, spans: tuple[float, float] | None) 
     notes = []
     if "b" in values:
         notes.append(
-            "b weights the set point in the proportional term. A controller without it overshoots "
-            "more after a step of the set point, and answers loads alike: design with weight=1."
+            "b weights the set point in the proportional term. A controller without it "
+            "overshoots more after a step of the set point, and responds to loads in the same "
+            "way: design with weight=1."
         )
     smooth = parts_of(controller)[3]
     if smooth is not None:

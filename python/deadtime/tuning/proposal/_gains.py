@@ -80,7 +80,7 @@ def wanted_gains(
     found = design(loops[0], controller=template, plants=loops[1:], **where)
     chosen, remarks = _one_step(found.loop.controller, flown)
     if fit.verdict != "reliable":
-        remarks = (f"Set aside: the estimate is an indication, {fit.reason}.", *remarks)
+        remarks = (f"Overridden: the estimate is an indication, {fit.reason}.", *remarks)
     return Gains(found, chosen, loops, remarks)
 
 

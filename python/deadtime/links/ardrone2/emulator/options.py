@@ -37,7 +37,7 @@ class EmulatorOptions:
     plant : {"kit", "paper", "real", "thrust"}
         How height answers the commanded climb.
     delay : float, optional
-        Transport delay, s. Without: the plant's.
+        Transport delay, s. Default: the plant's.
 
         That of motion commands, up to 100 s.
     jitter : float
