@@ -10,12 +10,12 @@ An estimate describes it by a dead time and two poles. Are PI gains for that est
 
 **Answer.** Yes. The verdict is *reliable*, and what a controller needs is right: the largest stable
 gain is 2.57 (95 %: 2.47 to 2.68), that of the true boiler 2.667. The dead time of 13.2 s (95 %: 6.9
-to 14.0 s) belongs to the estimated plant; the boiler has lags instead. With Kp = 0.371 and
-Ki = 0.01119 the true loop has a gain margin of 3.87.
+to 14.0 s) belongs to the estimated plant; the boiler has lags instead. With Kp = 0.372 and
+Ki = 0.01119 the true loop has a gain margin of 3.86.
 
 **Next.** Enter the gains, record a step of the set point, and check them with that record::
 
-    deadtime tune step.csv --kp 0.371 --ki 0.01119
+    deadtime tune step.csv --kp 0.372 --ki 0.01119
 """
 
 import deadtime as dtm

@@ -10,7 +10,7 @@ and which PI gains are safe?
 
 **Answer.** The verdict is an *indication*, so no interval is claimed. Two lags and a dead time of
 about 0.25 s explain the record best. But one step does not exclude a single lag with a dead time of
-about 11.4 s. The gains Kp = 9.34 %/°C and Ki = 0.129 %/(°C s) suit both plants: the gain margin is
+about 11.4 s. The gains Kp = 9.51 %/°C and Ki = 0.119 %/(°C s) suit both plants: the gain margin is
 at least 3.2.
 
 **Next.** A second record decides between the two plants. Let the heater step up and down at uneven

@@ -427,13 +427,15 @@ class GainSearch:
 
 def proved_step(of: Loop, amplitude: float) -> _Pair | None: ...
 
+LOAD_SLACK: Final[float]
+
 @final
 class RobustGains:
     gains: Final[list[float]]
     value: Final[float]
     worst: Final[int]
     margins: Final[list[Margins]]
-    neighbours: Final[list[tuple[list[float], list[float], float]]]
+    weight: Final[float | None]
 
 def robust_gains(
     loops: list[Loop],
@@ -444,8 +446,8 @@ def robust_gains(
     bounds: list[_Pair] | None = None,
     threads: int | None = None,
     *,
-    shape: list[float] | None = None,
-    slack: float = 0.0,
+    slack: float | None = None,
+    weight: float | None = None,
 ) -> RobustGains: ...
 def noise_gain(of: Loop, bandwidth: float) -> float: ...
 def lasting_load(of: Loop) -> float: ...

@@ -234,8 +234,7 @@ def test_ctrl_c_ends_a_command_with_one_line(tmp_path):
     time.sleep(0.2)  # in any state: importing, reading options or counting
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert said.splitlines() == ["deadtime: interrupted"]
+    assert (process.returncode, said.splitlines()) == (130, ["deadtime: interrupted"])
 
 
 def test_ctrl_c_during_an_import_ends_a_command_and_becomes_no_other_error(tmp_path):

@@ -14,9 +14,10 @@ from deadtime.tuning._filter_choice import filter_choice
 from deadtime.tuning._found_plants import possible_loops, refusal
 from deadtime.tuning._made import made
 from deadtime.tuning._margins import RequiredMargins
+from deadtime.tuning._native import LOAD_SLACK
 from deadtime.tuning._objectives import objective_named
 from deadtime.tuning._problem import ObjectiveName, controller_template, pose, with_filter
-from deadtime.tuning._responses import RESPONSES, SLACK, Wanted
+from deadtime.tuning._responses import RESPONSES, Wanted
 from deadtime.tuning._result import Design
 
 
@@ -239,7 +240,7 @@ def _load_slack(
 ) -> float:
     counts = objective == "load" and weight == 1.0
     if given is None:
-        return SLACK if counts and not demands.named else 0.0
+        return LOAD_SLACK if counts and not demands.named else 0.0
     if not counts or not isinstance(template, (PI, PID)):
         raise ValueError(
             f"load_slack={given}: it is for objective='load' with PI or PID control and no "

@@ -1,6 +1,7 @@
 """The native functions and classes that this package uses."""
 
 from deadtime._deadtime import (
+    LOAD_SLACK as LOAD_SLACK,
     Candidates as Candidates,
     FoundGains as FoundGains,
     GainSearch as GainSearch,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from deadtime.loops import PI, PID, ControlLoop, sweep
+from deadtime.loops import PI, PID, ControlLoop
 from deadtime.tuning._candidates import Scenario
 from deadtime.tuning._demands import Demands, white_to
 from deadtime.tuning._exchange import fine, proved
@@ -36,14 +36,6 @@ MAX_SENSITIVITY = 1.6
 
 #: A figure at most this factor from its demand limits the design.
 _ACTIVE = 1.0 + 1e-3
-
-#: Weights of the reference that are tried: more of them settle a little earlier.
-_WEIGHTS = np.linspace(0.0, 1.0, 21)
-
-#: Part of the best response to a load that is given for a step that settles earlier, where no
-#: demand is made: the response is flat along the ratios of the gains, where the settling time is
-#: not.
-SLACK = 0.1
 
 #: Relative loss that counts as none.
 _NOTHING = 1e-3
@@ -71,10 +63,13 @@ class Wanted:
         corners: int,
         demands: Demands | None = None,
         *,
-        shape: list[float] | None = None,
-        slack: float = 0.0,
+        slack: float | None = None,
+        weight: float | None = None,
     ) -> RobustGains:
-        """The best gains over these scenarios, of which the search begins with the corners."""
+        """The best gains over these scenarios, of which the search begins with the corners.
+
+        With a slack the weight of the reference is chosen with them, unless one is given.
+        """
         problem, needed = self.problem, demands or self.demands
         loops = problem.gathered.at(scenarios)
         template = problem.loop.controller
@@ -100,8 +95,8 @@ class Wanted:
             ),
             None if spans is None else [spans[name] for name in problem.free],
             problem.threads,
-            shape=shape,
             slack=slack,
+            weight=weight,
         )
 
     def design(self) -> Design:
@@ -153,69 +148,15 @@ class Wanted:
         return every[place] if place >= corners else every[0]
 
     def _found(self, every: Sequence[Scenario], corners: int) -> tuple[RobustGains, ControlLoop]:
-        """The gains, and the loop with them.
-
-        The search judges a demand on the settling time without a weight of the reference. So gains
-        that are sought without it come first: with their weight they may meet it.
-        """
-        longest = self.demands.settling_time
-        if longest is not None:
-            free = replace(self, demands=self.demands.without("settling_time"))
-            for slack in (0.0, SLACK):
-                best = free.gains(every, corners, slack=slack)
-                found, loop, settled = free._weighted(best, every, corners)
-                if settled <= longest:
-                    return found, loop
-        return self._weighted(self.gains(every, corners, slack=self.slack), every, corners)[:2]
-
-    def _weighted(
-        self, found: RobustGains, every: Sequence[Scenario], corners: int
-    ) -> tuple[RobustGains, ControlLoop, float]:
-        """The gains and the weight of the reference with which a step settles first at its worst.
-
-        And when it does, infinite where that is not known. Of the gains that lose no more than the
-        slack of the response to a load. The weight moves no margin and no such response. A weight
-        that is given stays.
-        """
-        problem = self.problem
-        loop = problem.at(found.gains)
-        controller = loop.controller
-        if not isinstance(controller, (PI, PID)) or not loop.plant.is_rational:
-            return found, loop, math.inf
-        given = controller.weight
-        weights = _WEIGHTS if given is None else np.array([given])
-        moving = loop.replace(controller=replace(controller, weight=float(weights[-1])))
-        near = [([], found.gains, found.value), *found.neighbours]
-        points = np.array([gains for _, gains, _ in near])
-        values = {"weight": weights[None, :, None]}
-        for place, name in enumerate(problem.free):
-            values[name] = points[:, place, None, None]
-        for name in problem.intervals:
-            values[name] = np.array([one[name] for one in every[:corners]])[None, None, :]
-        swept = sweep(
-            moving,
-            values,
-            amplitude=problem.amplitude,
-            metrics=("settling_time",),
-            threads=problem.threads,
-        )
-        settled = np.where(np.isnan(swept["settling_time"]), np.inf, swept["settling_time"])
-        worst = settled.max(axis=2)
-        least = worst.min()
-        if not np.isfinite(least):
-            return found, loop, math.inf
-        # Of those that are as good the best response to a load, and the largest weight.
-        good = worst <= least * (1.0 + _NOTHING)
-        value = np.array([one for _, _, one in near])
-        row = int(np.argmin(np.where(good.any(axis=1), value, np.inf)))
-        weight = float(weights[np.flatnonzero(good[row])[-1]])
-        if row:
-            found = self.gains(every, corners, shape=near[row][0])
-        loop = problem.at(found.gains)
+        """The gains, and the loop with them; the weight of the reference too unless it is given."""
+        controller = self.problem.loop.controller
+        given = getattr(controller, "weight", None)
+        found = self.gains(every, corners, slack=self.slack, weight=given)
+        loop = self.problem.at(found.gains)
         chosen = loop.controller
-        if given is None and isinstance(chosen, (PI, PID)):
-            loop = loop.replace(controller=replace(chosen, weight=weight))
-        return found, loop, float(worst[row].min())
+        if found.weight is not None and isinstance(chosen, (PI, PID)):
+            loop = loop.replace(controller=replace(chosen, weight=found.weight))
+        return found, loop
 
     def _trades(
         self, found: RobustGains, margins: LeastMargins, every: Sequence[Scenario], corners: int

@@ -138,6 +138,7 @@ mod _deadtime {
         let _ = super::reserve::ready();
         super::loading::load_numpy(module.py(), || super::special::add_ufuncs(module))?;
         super::flight::add_constants(module)?;
+        module.add("LOAD_SLACK", deadtime::tuning::SLACK)?;
         super::pointers::add_pointers(module)
     }
 }

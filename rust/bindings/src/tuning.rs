@@ -299,12 +299,14 @@ pub(crate) struct RobustGains {
     value: f64,
     worst: usize,
     margins: Vec<Py<PyMargins>>,
-    neighbours: Vec<(Vec<f64>, Vec<f64>, f64)>,
+    /// The weight of the reference, where one was chosen.
+    weight: Option<f64>,
 }
 
-/// The best of the gains in `free`, of which the search begins with the `first` loops.
+/// The best of the gains in `free`, of which the search begins with the `first` loops. With a slack for
+/// a step of the reference that settles earlier, its weight too; one that is given stays.
 #[pyfunction]
-#[pyo3(signature = (loops, first, free, wish, demands, bounds=None, threads=None, *, shape=None, slack=0.0))]
+#[pyo3(signature = (loops, first, free, wish, demands, bounds=None, threads=None, *, slack=None, weight=None))]
 #[expect(clippy::too_many_arguments, reason = "arguments of the Python call")]
 pub(crate) fn robust_gains(
     py: Python<'_>,
@@ -315,8 +317,8 @@ pub(crate) fn robust_gains(
     demands: GivenDemands,
     bounds: Option<Vec<(f64, f64)>>,
     threads: Option<usize>,
-    shape: Option<Vec<f64>>,
-    slack: f64,
+    slack: Option<f64>,
+    weight: Option<f64>,
 ) -> PyResult<RobustGains> {
     let posed = Posed {
         loops: cores(&loops),
@@ -337,21 +339,23 @@ pub(crate) fn robust_gains(
             settling_time: demands.6,
         },
         bounds,
-        shape,
-        slack,
+        shape: None,
+        slack: slack.unwrap_or(0.0),
     };
-    let found = run(py, threads, None, |task| tuning::best(&posed, task))?;
+    let (found, weight) = run(py, threads, None, |task| {
+        if slack.is_none() {
+            return tuning::best(&posed, task).map(|found| (found, None));
+        }
+        let found = tuning::settled_first(&posed, weight, task)?;
+        Ok((found.best, found.weight))
+    })?;
     let margins = found.margins.into_iter();
     let margins = margins.map(|each| Py::new(py, PyMargins::new(py, each)));
     Ok(RobustGains {
         gains: found.gains,
         value: found.value,
         worst: found.worst,
-        neighbours: found
-            .neighbours
-            .into_iter()
-            .map(|near| (near.shape, near.gains, near.value))
-            .collect(),
+        weight,
         margins: margins.collect::<PyResult<_>>()?,
     })
 }

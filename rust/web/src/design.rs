@@ -14,7 +14,8 @@ pub(crate) fn design(request: &mut Request<'_>) -> Result<Vec<f64>, Error> {
     let delays = request.list()?.iter();
     let loops = delays.map(|late| control_loop.with_number(Place::Delay, *late));
     let posed = Posed::for_loads(loops.collect(), request.number()?, request.number()?);
-    let (found, weight) = settled_first(&posed, &Task::new())?;
+    let settled = settled_first(&posed, None, &Task::new())?;
+    let (found, weight) = (settled.best, settled.weight);
     let margins = found.margins.iter();
     let worst = margins.fold(0.0_f64, |worst, one| worst.max(one.peaks.sensitivity.value));
     let mut answer = vec![worst, found.value, weight.unwrap_or(f64::NAN)];

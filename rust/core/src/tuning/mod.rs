@@ -40,7 +40,7 @@ pub use posed::{Best, Neighbour, Posed, Wish, lasting};
 pub use responses::figures;
 pub use robust::best;
 pub use rules::{Reduced, Row, reduced, rules};
-pub use settling::settled_first;
+pub use settling::{SLACK, Settled, settled_first};
 pub use steps::Step;
 pub use survey::Survey;
 pub use tail::proved_step;

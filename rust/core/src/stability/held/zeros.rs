@@ -45,7 +45,7 @@ impl Held<'_> {
                     return None;
                 }
                 zeros[place] = z - step;
-                if step.norm() > FOUND * z.norm() && z.norm() > NOTHING {
+                if step.norm().max(newton.norm()) > FOUND * z.norm() && z.norm() > NOTHING {
                     left.push(place);
                 }
             }
