@@ -52,7 +52,7 @@ def test_what_cannot_be_told_apart_is_refused_whatever_the_rounding(louder):
     choice = choose_plant(recording, FLAT, most_lags=2)
     assert choice.chosen == "2 lags"
     # With rows and commands at the same times, this holds for any output.
-    assert "delay and zero cannot be told apart" in choice.refusals["1 lag, zero"]
+    assert "delay and zero cannot be distinguished" in choice.refusals["1 lag, zero"]
 
 
 def test_a_zero_beside_a_lag_that_comes_out_at_none_is_refused():
@@ -66,7 +66,7 @@ def test_a_zero_beside_a_lag_that_comes_out_at_none_is_refused():
     output = np.where(late < 0, 0.0, told[late]) + 0.002 * random.standard_normal(time.size)
     command = told[np.searchsorted(sent, time, side="right") - 1]
     recording = dtm.Recording(time, command, output, sent=(sent, told))
-    with pytest.raises(dtm.NotIdentifiableError, match=r"the lags come out at zero|told apart"):
+    with pytest.raises(dtm.NotIdentifiableError, match=r"the lags come out at zero|distinguish"):
         dtm.estimate_delay(recording, known, free=("delay", "gain", "lag_1", "zero"))
 
 

@@ -121,7 +121,7 @@ def test_delay_and_zero_of_a_plant_that_jumps_are_refused_by_name():
     np.testing.assert_allclose(twin, output, atol=1e-12)
     recording = dtm.Recording(time, told, output, command=told)
     known = KNOWN.replace(plant=dtm.FactoredPlant([0.1], zero=0.01))
-    with pytest.raises(dtm.NotIdentifiableError, match="delay and zero cannot be told apart"):
+    with pytest.raises(dtm.NotIdentifiableError, match="delay and zero cannot be distinguished"):
         dtm.estimate_delay(recording, known, free=("delay", "gain", "lag_1", "zero"))
 
 

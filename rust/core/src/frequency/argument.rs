@@ -137,7 +137,7 @@ impl<'a> Way<'a> {
                 .rev()
                 .fold(0.0, |sum, c| sum * end + c))
             .is_finite(),
-            "omega={end:e}: its powers leave the range of doubles, and no term outweighs the \
+            "omega={end:e}: its powers leave the range of doubles, and no term dominates the \
              others up to there; ask for lower frequencies or choose another unit of time"
         );
         let mut open = vec![(self.at, end)];
@@ -152,7 +152,7 @@ impl<'a> Way<'a> {
             refuse_if!(
                 self.intervals > MOST,
                 "the phase takes more than {MOST} intervals up to {end:e} rad/s, since no term \
-                 outweighs the others near {a:e}: ask for lower frequencies"
+                 dominates the others near {a:e}: ask for lower frequencies"
             );
             match self.turned(a, b) {
                 Some(turned) => self.argument += turned,

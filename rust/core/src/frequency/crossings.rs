@@ -74,7 +74,7 @@ fn crossings_of_gain(
         .collect();
     refuse_if!(
         listed.is_empty(),
-        "for every {} from {low} to {high} the leading coefficient does not outweigh the later \
+        "for every {} from {low} to {high} the leading coefficient does not dominate the later \
          ones of the highest power of s: chains of infinitely many roots may reach the imaginary \
          axis",
         equation.name

@@ -42,7 +42,7 @@ pub(super) fn crossings_of_delay(
     let (lead, rest) = equation.leading(low, high)?;
     refuse_if!(
         lead <= rest,
-        "the equation is neutral and its leading coefficient does not outweigh the later ones: \
+        "the equation is neutral and its leading coefficient does not dominate the later ones: \
          chains of infinitely many roots may reach the imaginary axis for some {}",
         equation.name
     );
@@ -151,7 +151,7 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
     let (frequencies, searched) = gain_crossovers(b, a, task)?;
     refuse_if!(
         searched < f64::INFINITY,
-        "neither the terms with {name} nor those without outweigh the others at high \
+        "neither the terms with {name} nor those without dominate the others at high \
          frequencies: there is no end to the frequencies at which roots may cross"
     );
     let mut difference = DifferenceOfSquares::new(a, b);
@@ -165,7 +165,7 @@ fn passages(equation: &Equation<'_>, task: &Task) -> Result<Vec<Passage>, Error>
             let omega = format!("{omega:.5e}").parse().unwrap_or(omega);
             refuse!(
                 "a root stays at omega = {omega} rad/s whatever {name} is: divide the equation \
-                 by what all its terms share"
+                 by the common factor of its terms"
             );
         }
         let quotient = over(b, a, omega);

@@ -159,7 +159,7 @@ impl<'a> Search<'a> {
             }
         }
         refuse!(
-            "the loop is stable with delays up to {MOST:e} samples, and nothing beyond is ruled out"
+            "the loop is stable with delays up to {MOST:e} samples, and it is not known further on"
         )
     }
 
@@ -244,8 +244,8 @@ impl<'a> Search<'a> {
             };
             refuse_if!(
                 found.is_none(),
-                "the loop is stable with delays from {} to {stable} s, and nothing beyond is ruled \
-                 out: a pole is as near to the unit circle as rounding",
+                "the loop is stable with delays from {} to {stable} s, and it is not known \
+                 further on: a pole is closer to the unit circle than rounding errors",
                 self.held.delay()
             );
             return Ok(found);

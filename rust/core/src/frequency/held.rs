@@ -82,7 +82,7 @@ pub fn held_margins_of_stable(
 fn factors(numbers: &HeldNumbers, range: (f64, f64), task: &Task) -> Result<Vec<Crossing>, Error> {
     let Some(factors) = numbers.factors(range, task)? else {
         refuse!(
-            "the phase crossovers of this sampled loop are beyond double precision: a pole and a \
+            "double precision cannot determine the phase crossovers of this sampled loop: a pole and a \
              zero of its loop gain may cancel on the unit circle; change a number by a little"
         );
     };

@@ -40,7 +40,9 @@ pub fn held_phase(held: HeldLoop<'_>, omega: &[f64]) -> Result<Vec<f64>, Error> 
     };
     let ((poles, a), (zeros, b)) = (split(a), split(b));
     let (Some(first), Some(last)) = (a.first(), b.first()) else {
-        refuse!("the loop gain is zero at every frequency, so it has no phase: close the loop");
+        refuse!(
+            "the loop gain is zero at every frequency, so it has no phase: give gains other than zero"
+        );
     };
     let powers = zeros - poles;
     // L is −b/a.

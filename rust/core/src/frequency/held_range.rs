@@ -280,8 +280,8 @@ impl<M: Members> Search<'_, M> {
             return self.lost(value, sign);
         }
         refuse!(
-            "no loss of stability was met from {} to {value} in {STEPS} intervals, and none beyond \
-             is ruled out: look at single values with is_stable()",
+            "no loss of stability was found from {} to {value} in {STEPS} intervals, but it may \
+             occur further on: look at single values with is_stable()",
             self.start
         )
     }
@@ -334,8 +334,8 @@ impl<M: Members> Search<'_, M> {
         let found = loss_beside(&mut |value| self.loses(value), stable, (size, HIDDEN))?;
         let Some(end) = found else {
             refuse!(
-                "the loop is stable from {} to {stable}, and nothing beyond is ruled out: a pole is \
-                 as near to the unit circle as rounding, or the proof is beyond double precision",
+                "the loop is stable from {} to {stable}, and it is not known further on: a pole \
+                 is closer to the unit circle than rounding errors, or double precision does not suffice",
                 self.start
             );
         };
@@ -378,7 +378,7 @@ impl<M: Members> Search<'_, M> {
         let rests = loss <= RESTS * third || (loss <= 0.5 * before.abs() && third > 2.0 * loss);
         refuse_if!(
             !rests,
-            "the loop is stable from {} to {last}, and nothing beyond is ruled out",
+            "the loop is stable from {} to {last}, and it is not known further on",
             self.start
         );
         Ok(bound)
@@ -395,7 +395,7 @@ impl<M: Members> Search<'_, M> {
             refuse_if!(
                 !is_kept,
                 "the loop is stable from {} to {value}, with {MOST_SAMPLES} samples in the delay, and \
-                 nothing beyond is ruled out",
+                 it is not known further on",
                 self.start
             );
         }

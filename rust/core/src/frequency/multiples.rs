@@ -205,7 +205,7 @@ fn highest(parts: &[QuasiPolynomial], name: &str) -> Result<f64, Error> {
         return Ok(radius);
     }
     refuse!(
-        "the terms with {name} outweigh the leading one at high frequencies: there is no end to the \
+        "the terms with {name} dominate the leading one at high frequencies: there is no end to the \
          frequencies at which roots may cross"
     )
 }

@@ -91,7 +91,7 @@ pub(super) fn highest(
         }
     }
     refuse!(
-        "the largest gain over frequency, {:.6e} near {:.6e} rad/s, does not settle: a pole may be \
+        "the largest gain over frequency, {:.6e} near {:.6e} rad/s, does not converge: a pole may be \
          on the imaginary axis to rounding",
         best.value,
         best.omega

@@ -213,9 +213,7 @@ impl<'a> Search<'a> {
             }
             width *= GROWTH;
         }
-        refuse!(
-            "the loop is stable from {name}={value} to {reach}, and nothing beyond is ruled out"
-        )
+        refuse!("the loop is stable from {name}={value} to {reach}, and it is not known further on")
     }
 
     /// All crossings there are from the value on, where one search finds them.

@@ -121,8 +121,8 @@ impl Plant {
                 _ => refuse!("the polynomials of this plant are needed with its numbers"),
             },
             Self::Delayed(..) => refuse!(
-                "the plant has delays inside, so that no state space of it exists, which this \
-                 needs: give a plant that is rational but for one delay in series"
+                "the plant has delays inside, so it has no finite state space, which is needed \
+                 here: give a plant that is rational except for one delay in series"
             ),
         }
     }

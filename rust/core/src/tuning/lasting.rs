@@ -67,7 +67,9 @@ impl Fundamental {
         let mut rate: f64 = 0.0;
         for matrix in [&model.a, &undelayed] {
             let Some(found) = eigenvalues(matrix, n) else {
-                refuse!("the eigenvalues of the loop are not found: give it moderate units");
+                refuse!(
+                    "the eigenvalues of the loop are not found: choose units in which its numbers are moderate"
+                );
             };
             rate = found.iter().map(|value| value.norm()).fold(rate, f64::max);
         }

@@ -202,9 +202,9 @@ fn joined(mut found: Vec<Family>, usual: bool, task: &Task) -> Result<Family, Er
         ranks.then(least(a).total_cmp(&least(b)))
     });
     let mut kinds = found.into_iter();
-    let mut out = kinds
-        .next()
-        .ok_or_else(|| Error::argument("no kind of command was given"))?;
+    let mut out = kinds.next().ok_or_else(|| {
+        Error::argument("give at least one kind of command: held, straight or samples")
+    })?;
     for other in kinds {
         out.decided = least(&other) - least(&out) > EVIDENCE.likely;
         if !out.decided {

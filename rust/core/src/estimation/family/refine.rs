@@ -104,5 +104,5 @@ fn beside_one<'a>(
             best = Some(found);
         }
     }
-    best.ok_or_else(|| Error::argument("a plant has no start"))
+    best.ok_or_else(|| Error::argument("a plant has no starting values"))
 }

@@ -95,7 +95,7 @@ impl FlightProfile {
         let is_known = covariance.iter().all(|entry| entry.is_finite());
         if !is_known || !squares.iter().all(|square| *square > 0.0) {
             return Err(Error::NotIdentifiable(
-                "the recordings do not tell these numbers apart".into(),
+                "the recordings do not distinguish these numbers".into(),
             ));
         }
         let unseen = unseen_air(&fit, &common, &weights, &squares, task)?;

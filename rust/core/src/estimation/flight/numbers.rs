@@ -240,7 +240,7 @@ pub fn first_numbers(
         }
     }
     let Some((fit, values)) = best else {
-        refuse!("there is nothing to start from")
+        refuse!("the fit has no starting values")
     };
     if values.is_empty() {
         return Ok((fit, values));

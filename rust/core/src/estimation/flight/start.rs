@@ -206,9 +206,9 @@ fn nothing_told(
         let model = without.model(vec![run.rows.clone()], false)?;
         if !minima(&without, run, &model, first, task)?.is_empty() {
             return Ok(Error::NotIdentifiable(
-                "delay and zero cannot be told apart: with a zero for every lag the output jumps \
-                 with the command, and rows do not tell a later jump from a smaller one; leave one \
-                 of them out of free=, or give the plant a further lag"
+                "delay and zero cannot be distinguished: with a zero for every lag the output jumps \
+                 with the command, and a later jump looks like a smaller one; leave delay or zero \
+                 out of free=, or give the plant a further lag"
                     .into(),
             ));
         }

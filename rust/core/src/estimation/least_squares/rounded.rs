@@ -303,7 +303,7 @@ impl Rounded<'_> {
         }
         let Some(inverse) = inverse_of_positive(&whole, n, 0.0) else {
             return Err(Error::NotIdentifiable(
-                "the rounded rows do not tell these numbers apart".into(),
+                "the rounded rows do not distinguish these numbers".into(),
             ));
         };
         let entry = |place: usize| 2.0 * inverse[(place / count) * n + place % count];

@@ -86,7 +86,7 @@ pub fn refined(
     let mut places = local_minima(&scan.costs);
     let by_cost = |one: &usize, other: &usize| scan.costs[*one].total_cmp(&scan.costs[*other]);
     let Some(least) = (0..scan.costs.len()).min_by(by_cost) else {
-        refuse!("there is no delay to try")
+        refuse!("no delay was given: give at least one")
     };
     places.push(least);
     places.sort_by(by_cost);
@@ -101,7 +101,7 @@ pub fn refined(
         }
     }
     let Some(best) = best else {
-        refuse!("there is no delay to try")
+        refuse!("no delay was given: give at least one")
     };
     let best = minimise(joint, &best.point, &all, SEARCH.to_rounding, task)?;
     let Some(lag) = lag else { return Ok(best) };

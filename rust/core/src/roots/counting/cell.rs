@@ -117,7 +117,7 @@ impl Cell {
         shares: impl Iterator<Item = f64>,
         level: bool,
     ) -> Result<(Self, Self), Error> {
-        let mut refused = Err(Error::argument("no place to cut at"));
+        let mut refused = Err(Error::argument("the region cannot be divided further"));
         for share in shares {
             let cut = if level {
                 self.cut_level(walker, self.im.0 + share * self.height())

@@ -216,7 +216,7 @@ pub(crate) fn abscissa_with(
 /// The error for a rightmost root that exists but was not found.
 fn beyond_reach() -> Error {
     Error::argument(
-        "no line that could be counted has a root to its right: the numbers of this equation \
+        "the rightmost root was not found: the numbers of this equation \
          differ too much in size for double precision; leave out time constants close to zero, \
               or choose another unit of time",
     )

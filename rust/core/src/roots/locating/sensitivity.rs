@@ -93,7 +93,7 @@ fn simple_root(h: &QuasiPolynomial, near: Complex64, task: &Task) -> Result<Comp
             )
         }
         _ => refuse!(
-            "{near} is no root, or too far from one to tell which: give a root as `roots` or \
+            "{near} is no root, and too far from the nearest one to identify it: give a root as `roots` or \
              `rightmost` lists it"
         ),
     }

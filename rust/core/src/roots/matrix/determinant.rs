@@ -178,7 +178,7 @@ pub(super) fn spectral_abscissa(system: &Irreducible, task: &Task) -> Result<f64
     let abscissa = isolated.max(chain_abscissa(system, task)?.1);
     refuse_if!(
         abscissa == f64::NEG_INFINITY,
-        "no line that could be counted has a root to its right: the numbers of this system \
+        "the rightmost root was not found: the numbers of this system \
          differ too much in size for double precision; choose another unit of time"
     );
     Ok(abscissa)

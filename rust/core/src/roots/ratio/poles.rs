@@ -113,7 +113,7 @@ impl Ratio {
             None if hidden.counted > 0 && chain == f64::NEG_INFINITY => {
                 Err(Error::argument(format!(
                     "all {} roots of the denominator right of {searched:.6} are roots of the \
-                     numerator as well: no pole was found; divide out what both have in common",
+                     numerator as well: no pole was found; divide out the common factors",
                     hidden.counted
                 )))
             }

@@ -96,8 +96,8 @@ pub fn stability_radius(
     let cell = judge(&family.at(point)?, Specification::default(), false, task)?;
     refuse_if!(
         cell.unstable != 0,
-        "the member at this point is not stable, or too close to the edge of stability to \
-         tell: start from a stable one"
+        "the member at this point is not stable, or too close to the stability boundary \
+         to decide: start from a stable point"
     );
     refuse_if!(
         scales.iter().all(|scale| *scale == 0.0),
