@@ -57,7 +57,7 @@ def test_every_result_is_complete(method):
         # Four standard errors, where the profile is nearly a parabola.
         np.testing.assert_allclose(t[[0, -1]], 4.0, rtol=0.1)
     else:
-        with pytest.raises(ValueError, match=r"use method='(output_error|waveform)'"):
+        with pytest.raises(ValueError, match=r"[Uu]se method='(output_error|waveform)'"):
             fit.ci(0.95)
 
 

@@ -94,6 +94,7 @@ def test_a_plant_without_a_largest_gain_says_so(fit):
 
 
 @pytest.mark.survey
+@pytest.mark.long
 def test_intervals_hold_what_a_loop_feels_as_often_as_they_say():
     """200 flights, each quantity: 95 % with its scatter."""
     largest, crossover = limits(TRUTH)

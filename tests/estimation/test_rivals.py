@@ -88,6 +88,7 @@ def test_a_right_plant_keeps_its_verdict(seed):
 
 
 @pytest.mark.survey
+@pytest.mark.long
 def test_right_plants_keep_their_verdicts_in_any_noise():
     drawn = [verdicts(seed) for seed in range(60)]
     assert sum(alone == "reliable" for alone, _ in drawn) >= 45

@@ -43,7 +43,8 @@ def flown(folder, one_way, firmware="ardupilot", loss=0.0):
 
 
 @pytest.mark.survey
-@pytest.mark.parametrize("firmware", ["ardupilot", pytest.param("px4", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 def test_what_the_relay_adds_is_what_the_estimate_rises_by(tmp_path, firmware):
     near, _ = flown(tmp_path / "near", 0.0, firmware)
     far, trips = flown(tmp_path / "far", 0.13, firmware)

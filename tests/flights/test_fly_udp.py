@@ -16,6 +16,7 @@ PLAN = FlightPlan(gains=(2.4,), settle=3.5, hold=4.0)
 
 
 @pytest.mark.survey
+@pytest.mark.long
 def test_one_flight_with_the_paper_s_gain_and_one_with_the_designed_gains(tmp_path):
     async def fly():
         async with emulator(seed=5) as emulated:

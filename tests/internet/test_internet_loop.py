@@ -192,6 +192,7 @@ def unsteadiness(found):
 
 
 @pytest.mark.survey
+@pytest.mark.long
 def test_over_udp_in_three_processes_the_estimate_is_the_measured_delay():
     tries = []
     while len(tries) < 4 and (not tries or unsteadiness(tries[-1]) > 0.003):

@@ -53,7 +53,7 @@ def test_true_heartbeats_revise_forged_ones(forged):
 
 def test_one_heartbeat_decides_nothing():
     assert judged([ARMED] * 10 + [DISARMED]).lost is None
-    assert "disarmed, and not from here" in judged([ARMED] * 10 + [DISARMED] * 2).lost
+    assert "disarmed, but not by this link" in judged([ARMED] * 10 + [DISARMED] * 2).lost
 
 
 def test_what_many_heartbeats_agree_on_is_final():

@@ -113,6 +113,7 @@ def test_damaged_frames_are_refused():
 
 
 @pytest.mark.survey
+@pytest.mark.long
 def test_a_million_damaged_frames_are_refused():
     survives(1_000_000, 4)
 

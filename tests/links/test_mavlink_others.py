@@ -47,7 +47,7 @@ def test_what_somebody_else_disarmed_is_not_armed_again():
             await asyncio.sleep(1.5)
             vehicle.armed = False
             await asyncio.sleep(0.5)
-            with pytest.raises(LinkError, match="disarmed, and not from here"):
+            with pytest.raises(LinkError, match="disarmed, but not by this link"):
                 await link.take_off()
             assert not vehicle.armed
 

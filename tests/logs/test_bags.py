@@ -230,7 +230,9 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
     assert bag.remarks == ("not decoded, in an encoding that is not known: /strange",)
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(300, marks=pytest.mark.survey)])
+@pytest.mark.parametrize(
+    "count", [30, pytest.param(300, marks=[pytest.mark.survey, pytest.mark.long])]
+)
 @pytest.mark.parametrize("name", SMALL_BAGS)
 def test_damaged_bags_are_read_or_refused(name, count, tmp_path, capfd):
     draw = random.Random(19)

@@ -67,7 +67,9 @@ def test_the_small_logs_are_read_and_small(name, tmp_path):
     assert log.remarks == (("the logger lost data 1 times, 0.03 s in all",) * (name == "ULog"))
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(200, marks=pytest.mark.survey)])
+@pytest.mark.parametrize(
+    "count", [30, pytest.param(200, marks=[pytest.mark.survey, pytest.mark.long])]
+)
 @pytest.mark.parametrize("name", SMALL)
 def test_damaged_logs_end_in_a_log_or_a_clear_message(name, count, tmp_path, capfd, impatient):
     library, made = SMALL[name]

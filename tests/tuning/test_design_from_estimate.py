@@ -99,7 +99,7 @@ def test_margins_hold_in_the_whole_region(fit):
     delays = between(*best.region.intervals["delay"], np.nan, "s")
     assert f"worst over the joint 95 % region of the estimate (delay {delays}, gain 0." in told
     assert "the true loop has these margins with a probability of 95 %" in told
-    assert "if known to be exactly as estimated" in told
+    assert "without it (values exactly as estimated)" in told
     alone = dtm.design(
         fit.loop, controller=SMOOTH, gain_margin=3.0, shape=(31, 31), objective="abscissa"
     )

@@ -55,12 +55,12 @@ def command(
     loop: Annotated[
         list[str] | None,
         typer.Option(
-            help="This loop in full, for example 'roll rate'; may be repeated.",
+            help="Only this loop, with all details, such as 'roll rate'; repeat for more loops.",
             show_default=False,
         ),
     ] = None,
     verbose: Annotated[
-        bool, typer.Option("--verbose", help="All loops in full, below the table.")
+        bool, typer.Option("--verbose", help="Also print all loops in detail, below the table.")
     ] = False,
     out: Annotated[
         Path | None,

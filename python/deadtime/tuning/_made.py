@@ -98,11 +98,11 @@ def _trades(search: Search, found: Found, margins: LeastMargins, value: float) -
         price = lost(objective, value, without)
         *others, last = (name for name, (low, high) in problem.intervals.items() if low < high)
         names = f"{', '.join(others)} and {last}" if others else last
-        known = "in the middle of its interval"
+        known = "in the middle of their intervals"
         if problem.region is not None:
             known = "exactly as estimated"
         words = (
-            f"uncertainty of the {names}: if known to be {known}, "
+            f"uncertainty of the {names}: without it (values {known}) "
             f"{figure_in_words(objective, without)} ({_part(price)})"
         )
         made.append(Trade("interval", math.nan, math.nan, price > _NOTHING, without, words))
@@ -115,4 +115,4 @@ def _price(search: Search, value: float, without: float, what: str = "it") -> st
 
 
 def _part(lost: float) -> str:
-    return f"{100.0 * lost:.2g} % lost" if lost > _NOTHING else "nothing lost"
+    return f"it costs {100.0 * lost:.2g} %" if lost > _NOTHING else "it costs nothing"

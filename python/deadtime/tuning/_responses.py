@@ -180,13 +180,13 @@ class Wanted:
                     made.append(Trade(name, asked, had, False, without, f"{what} is met anyway"))
                     continue
                 words += f": without it {figure_in_words(self.objective, without)}"
-                words += f" ({100.0 * lost:.2g} % lost)"
+                words += f" (it costs {100.0 * lost:.2g} %)"
             made.append(Trade(name, asked, had, True, without, words))
         if len(every) > 1:
             without = self.gains(every[:1], 1).value
             lost = (found.value - without) / abs(without)
             words = (
-                "uncertainty of the plant: if known to be in the middle of its intervals, "
+                "uncertainty of the plant: without it (values in the middle of their intervals) "
                 f"{figure_in_words(self.objective, without)}"
             )
             made.append(Trade("interval", math.nan, math.nan, lost > _NOTHING, without, words))

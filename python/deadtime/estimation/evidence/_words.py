@@ -270,7 +270,7 @@ def _advice_on(fit: FoundPlant) -> Advice:
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
     if fit._code in ("too few told", "classes contradict", "crossover not told"):
         known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
-        words = "record a run in which the command steps up and down at uneven times"
+        words = "record a run in which the command steps up and down at irregular intervals"
         if known and "plant" not in given:
             words += f"; or name the plant, if you know that it is {known[0].in_words()}"
             return Advice(words, {"plant": known[0].name}, given)

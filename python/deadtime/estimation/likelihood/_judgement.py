@@ -43,8 +43,8 @@ WORDS = {
         "the fitted disturbance{where} is larger while the vehicle moves than while it rests: the "
         "plant probably lacks a lag or a zero"
     ),
-    "gains": "the recordings contradict one another: {name} {values}",
-    "totals": "the recordings contradict one another: {name} {times}",
+    "gains": "the recordings contradict one another in {name}: {values}",
+    "totals": "the recordings contradict one another in {name}: {times}",
 }
 
 

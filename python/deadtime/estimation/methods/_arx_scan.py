@@ -57,8 +57,8 @@ class ARXScan(OfOne):
 
     name: ClassVar[str] = "arx_scan"
     limits: ClassVar[str] = (
-        "The delay is a whole number of samples, and noise of the sensor biases the coefficients "
-        "of the ARX models, especially under feedback."
+        "Without fractional=True the delay is found only in whole samples. Sensor noise biases the "
+        "coefficients of the ARX models, especially in a closed loop."
     )
 
     def __post_init__(self) -> None:
@@ -106,9 +106,9 @@ class ARXScan(OfOne):
                 "s"
             ),
             uncalibrated=(
-                "an ARX scan compares losses: the delay is not a coefficient with an error, a "
-                "whole number of samples has none, and sensor noise biases the coefficients; use "
-                "method='output_error' for an interval"
+                "an ARX scan takes the delay with the smallest loss, which has no standard error. "
+                "Sensor noise also biases the coefficients. Use method='output_error' for an "
+                "interval"
             ),
             details={
                 "samples": samples,

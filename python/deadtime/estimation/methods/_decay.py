@@ -110,10 +110,10 @@ class Decay(OfOne):
                 f"a gain of {loop.parameters['gain']:g} and an output that ends at the reference"
             ),
             uncalibrated=(
-                "the decay method assumes the given gain and an exponential tail: noise "
-                f"alone makes the delay uncertain by {stderr:.2g} s. A gain that is 1 % off moves "
-                f"it by {0.01 / rate:.2g} s; other modes in the tail move it "
-                "too; use method='waveform' for an interval"
+                "the decay method assumes the given gain and an exponential tail. Noise alone "
+                f"gives the delay a standard error of {stderr:.2g} s. A gain error of 1 % shifts "
+                f"it by {0.01 / rate:.2g} s, and other modes in the tail shift it too. Use "
+                "method='waveform' for an interval"
             ),
             details={"rate": rate, "rate_error": error, "tail_samples": samples},
         )

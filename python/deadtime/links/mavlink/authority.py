@@ -64,7 +64,7 @@ class Authority:
         return self.armed_here and self.lost is None
 
     def refuse_armed(self, reader: StateReader) -> None:
-        """Raise for a vehicle that is armed, and not from here."""
+        """Raise for a vehicle that is armed, but not by this link."""
         if reader.armed and not self.armed_here:
             raise LinkError(
                 f"{self._name}: the vehicle is armed already, and not by this link: somebody else "
@@ -110,9 +110,9 @@ class Authority:
 
     def _was_disarmed(self, link: Connection, time: float) -> str:
         return (
-            f"{self._name}: the vehicle was disarmed, and not from "
-            f"here{link.said(time - REASON)}: it is not armed again. Connect again when the "
-            "person who disarmed it agrees"
+            f"{self._name}: the vehicle was disarmed, but not by this "
+            f"link{link.said(time - REASON)}. This link does not arm it again. Connect again when "
+            "the person who disarmed it agrees"
         )
 
     def _was_taken(self, mode: int, pilot: Autopilot, link: Connection, time: float) -> str:

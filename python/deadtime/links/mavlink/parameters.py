@@ -158,7 +158,7 @@ class Parameters:
         held, kept = await self.read(name), self.kept.get(name)
         if held is None or kept is None or same(held, kept):
             return None
-        return f"{name} was changed from {kept:g} to {held:g}, and not from here"
+        return f"{name} was changed from {kept:g} to {held:g}, but not by this link"
 
     async def put_back(self, may: Callable[[], bool]) -> str | None:
         """Put the changed parameters back as long as this may be done.

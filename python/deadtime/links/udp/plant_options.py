@@ -65,8 +65,8 @@ class PlantOptions:
             positive(name, getattr(self, name))
         if self.watchdog <= self.sample_time:
             raise ValueError(
-                f"watchdog={self.watchdog} s is no longer than sample_time={self.sample_time} s: "
-                "it would trip between any two commands; give a longer one"
+                f"watchdog={self.watchdog} s must be longer than sample_time={self.sample_time} s: "
+                "otherwise it trips between any two commands"
             )
         buffer = self.policy
         if isinstance(buffer, JitterBuffer) and buffer.delay > self.watchdog:

@@ -80,7 +80,10 @@ def wanted_gains(
     found = design(loops[0], controller=template, plants=loops[1:], **where)
     chosen, remarks = _one_step(found.loop.controller, flown)
     if fit.verdict != "reliable":
-        remarks = (f"Overridden: the estimate is an indication, {fit.reason}.", *remarks)
+        remarks = (
+            f"Designed although the estimate is only an indication, as you allowed: {fit.reason}.",
+            *remarks,
+        )
     return Gains(found, chosen, loops, remarks)
 
 

@@ -120,7 +120,7 @@ class EmulatorOptions:
             try:
                 ip_address(client)
             except ValueError:
-                raise ValueError(f"clients: {client!r} is no IP address") from None
+                raise ValueError(f"clients: {client!r} is not an IP address") from None
         if not self.only_here and not self.clients:
             raise ValueError(
                 f"host={self.host!r} can be reached by others: name the clients that it answers, "
