@@ -433,6 +433,7 @@ LOAD_SLACK: Final[float]
 class RobustGains:
     gains: Final[list[float]]
     value: Final[float]
+    least: Final[float]
     worst: Final[int]
     margins: Final[list[Margins]]
     weight: Final[float | None]

@@ -58,16 +58,11 @@ def test_what_is_named_is_taken_and_not_found_again(tmp_path):
 
 @pytest.mark.parametrize("signal", ["time", "output", "command"])
 def test_without_a_usual_name_the_columns_and_the_option_are_told(signal, tmp_path):
-    headers = {"time": "clock_ms,y,u", "output": "t,T1,u", "command": "t,y,Q1"}
+    headers = {"time": "tick,y,u", "output": "t,T1,u", "command": "t,y,Q1"}
     with pytest.raises(dtm.RecordingError) as caught:
         read(tmp_path, table(headers[signal]))
     for word in (*headers[signal].split(","), f"{signal}=", f"--{signal}"):
         assert word in str(caught.value)
-
-
-def test_milliseconds_are_not_taken_for_seconds(tmp_path):
-    with pytest.raises(dtm.RecordingError, match="usual name for the time"):
-        read(tmp_path, table("Time (ms),y,u"))
 
 
 def test_stamps_that_are_no_seconds_since_1970_are_refused():
@@ -132,3 +127,28 @@ def test_times_that_repeat_often_or_go_back_are_refused(tmp_path):
 def test_other_dates_are_refused_with_the_one_that_is_read(tmp_path, stamp):
     with pytest.raises(dtm.RecordingError, match="write a date as 2026-01-31 08:00:00"):
         read(tmp_path, table("Timestamp,PV,OP", lambda _: stamp))
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("time_ms", 1e3),
+        ("t_us", 1e6),
+        ("Time [ns]", 1e9),
+        ("Time (min)", 1 / 60),
+        ("t_h", 1 / 3600),
+    ],
+)
+def test_times_in_another_unit_become_seconds(tmp_path, name, count):
+    time = np.arange(ROWS) / 8
+    columns = {name: time * count, "y": np.arange(ROWS) % 7, "u": np.arange(ROWS) % 3}
+    rows = np.column_stack(list(columns.values())).tolist()
+    text = "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)])
+    for found in (
+        dtm.read_recording(columns, command="auto", window=(2.0, 5.0)),
+        read(tmp_path, text, window=(2.0, 5.0)),
+        read(tmp_path, text, window=(2.0, 5.0), time=name),
+    ):
+        assert found.time == pytest.approx(time[16:41], rel=1e-15)
+    dates = columns | {name: (1000 * time).astype("datetime64[ms]")}
+    assert dtm.read_recording(dates, command="auto").time == pytest.approx(time)

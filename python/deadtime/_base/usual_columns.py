@@ -24,5 +24,12 @@ USUAL: Mapping[str, tuple[str, ...]] = {
 #: What a name may end in besides: a unit.
 UNITS = ("s", "m", "deg", "rad", "c", "k", "pct", "v", "mps", "degps", "radps")
 
-#: Units of a time stamp that is read as it is.
-SECONDS = ("", "s", "sec", "seconds")
+#: How many of a unit of time make a second, by what a name of a column says of it.
+SECOND_IN: Mapping[str, float] = {
+    **dict.fromkeys(("", "s", "sec", "secs", "seconds"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millis", "milliseconds"), 1e3),
+    **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microseconds"), 1e6),
+    **dict.fromkeys(("ns", "nsec", "nanos", "nanoseconds"), 1e9),
+    **dict.fromkeys(("min", "mins", "minutes"), 1.0 / 60.0),
+    **dict.fromkeys(("h", "hr", "hours"), 1.0 / 3600.0),
+}

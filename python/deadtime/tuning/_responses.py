@@ -161,8 +161,15 @@ class Wanted:
     def _trades(
         self, found: RobustGains, margins: LeastMargins, every: Sequence[Scenario], corners: int
     ) -> tuple[Trade, ...]:
-        """The price of each demand, and of the intervals."""
+        """The price of each demand, of an earlier end of a step, and of the intervals."""
         made = []
+        lost = (found.value - found.least) / abs(found.least)
+        if lost > _NOTHING:
+            words = (
+                f"a step that settles earlier: without it "
+                f"{figure_in_words(self.objective, found.least)} (it costs {100.0 * lost:.2g} %)"
+            )
+            made.append(Trade("load_slack", self.slack, lost, True, found.least, words))
         for name, asked in self.demands.named.items():
             had = getattr(margins, name, math.nan)
             active = self._is_active(name, asked, had)
@@ -184,7 +191,7 @@ class Wanted:
             made.append(Trade(name, asked, had, True, without, words))
         if len(every) > 1:
             without = self.gains(every[:1], 1).value
-            lost = (found.value - without) / abs(without)
+            lost = (found.least - without) / abs(without)
             words = (
                 "uncertainty of the plant: without it (values in the middle of their intervals) "
                 f"{figure_in_words(self.objective, without)}"

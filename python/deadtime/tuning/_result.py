@@ -46,8 +46,8 @@ class Trade(ReadOnlyArrays):
     Attributes
     ----------
     requirement : str
-        The name of a demand of `design`, ``"all_margins"``, ``"interval"`` (of delay and gain) or
-        ``"filter"``.
+        The name of a demand of `design`, ``"load_slack"`` (for a step that settles earlier),
+        ``"all_margins"``, ``"interval"`` (of delay and gain) or ``"filter"``.
     required, achieved : float
         What was required and what the design has; NaN where that is no number.
     active : bool

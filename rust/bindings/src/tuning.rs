@@ -297,6 +297,8 @@ pub(crate) struct GivenDemands(f64, f64, f64, f64, f64, f64, f64);
 pub(crate) struct RobustGains {
     gains: Vec<f64>,
     value: f64,
+    /// The value without slack.
+    least: f64,
     worst: usize,
     margins: Vec<Py<PyMargins>>,
     /// The weight of the reference, where one was chosen.
@@ -342,18 +344,21 @@ pub(crate) fn robust_gains(
         shape: None,
         slack: slack.unwrap_or(0.0),
     };
-    let (found, weight) = run(py, threads, None, |task| {
+    let (found, least, weight) = run(py, threads, None, |task| {
         if slack.is_none() {
-            return tuning::best(&posed, task).map(|found| (found, None));
+            let found = tuning::best(&posed, task)?;
+            let least = found.value;
+            return Ok((found, least, None));
         }
         let found = tuning::settled_first(&posed, weight, task)?;
-        Ok((found.best, found.weight))
+        Ok((found.best, found.least, found.weight))
     })?;
     let margins = found.margins.into_iter();
     let margins = margins.map(|each| Py::new(py, PyMargins::new(py, each)));
     Ok(RobustGains {
         gains: found.gains,
         value: found.value,
+        least,
         worst: found.worst,
         weight,
         margins: margins.collect::<PyResult<_>>()?,

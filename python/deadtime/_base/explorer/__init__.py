@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from deadtime._base.page import write_page
-from deadtime._base.usual_columns import SECONDS, UNITS, USUAL
+from deadtime._base.usual_columns import SECOND_IN, UNITS, USUAL
 
 #: The scripts of the page after the one that its worker shares; a later one uses the earlier ones.
 SCRIPTS = (
@@ -65,13 +65,14 @@ class Explorer:
         from importlib.metadata import version
 
         given = json.dumps(dict(self.state), allow_nan=False).replace("<", "\\u003c")
+        seconds = [unit for unit, count in SECOND_IN.items() if count == 1.0]
         parts = {
             "title": html.escape(self.title),
             "heading": html.escape(self.title),
             "style": _theme() + _part("page.css"),
             "version": html.escape(version("deadtime")),
             "given": given,
-            "usual": json.dumps({"names": USUAL, "units": UNITS, "seconds": SECONDS}),
+            "usual": json.dumps({"names": USUAL, "units": UNITS, "seconds": seconds}),
             "kernels": _kernels(),
             "shared": _part("kernels.js"),
             "script": "\n".join(_part(f"{name}.js") for name in SCRIPTS),

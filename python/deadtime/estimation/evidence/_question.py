@@ -222,7 +222,7 @@ def question_of(
     if recording.command is None:
         raise RecordingError(
             "the recording has no command, and without a loop nothing else says what moved the "
-            "plant: name the column of the command, or give the loop"
+            "plant: name its column, as by read_recording(..., command='OP'), or give the loop"
         )
     plant, largest_delay = known.get("plant"), known.get("largest_delay")
     if (hold := known.get("hold")) and not 0.0 < hold < math.inf:

@@ -233,7 +233,8 @@ def _beside(fit: FoundPlant) -> list[str]:
         where = f" of recording {place}" if fit.others else ""
         if rows:
             lines.append(
-                f"unexplained: {run.noise_std:.3g} (standard deviation) in {rows} rows{where}"
+                f"unexplained: {run.noise_std:.3g} (standard deviation) in {rows} rows, "
+                f"{shown(run.recording.sample_time, 0.0, 's')} apart{where}"
             )
     return lines
 

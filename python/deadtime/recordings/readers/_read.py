@@ -21,8 +21,8 @@ from deadtime.recordings.readers._csv import read_csv
 from deadtime.recordings.readers._mat import mat_file
 from deadtime.recordings.readers._mat73 import mat73_file
 from deadtime.recordings.readers._tables import LABEL, table_in_memory
-from deadtime.recordings.readers._text import as_text, not_text
-from deadtime.recordings.readers._usual import chosen_columns
+from deadtime.recordings.readers._text import Text, as_text, not_text
+from deadtime.recordings.readers._usual import chosen_columns, second_in
 
 #: Latest time in s, the year 5138 if it counts from 1970: later ones are of a smaller unit.
 LATEST = 1e11
@@ -51,8 +51,9 @@ def read_recording(
         DataFrame of pandas or polars, an Arrow table, a dict of arrays, an `xarray.Dataset`, or a
         structured array.
     time, reference, output : str, optional
-        Names of the columns that hold the time stamps (s), the reference and the measurement. If
-        they are not given, they are found by usual names: time, t, Time (s), Timestamp; reference,
+        Names of the columns that hold the time stamps, the reference and the measurement. Times are
+        in seconds, unless the name ends in another unit: time_ms, t_us, Time (min). If names
+        are not given, they are found by usual names: time, t, Time (s), Timestamp; reference,
         SP, setpoint; output, PV, y; and so on. The reference may be missing where there is a
         command.
     command : str, optional
@@ -127,7 +128,7 @@ def read_recording(
         if delimiter is not None:
             raise ValueError(f"delimiter={delimiter!r}: a table in memory has none; leave it out")
         table = table_in_memory(source)
-        columns = read_table(table, choose(LABEL, table.names), ends)
+        columns = _in_seconds(read_table, table, choose(LABEL, table.names), ends)
     _refuse_other_units(label, columns["time"])
     try:
         recording = Recording(
@@ -147,6 +148,23 @@ def read_recording(
             "step; choose another column or window, or name the column of the command"
         )
     return recording
+
+
+def _in_seconds(
+    read: Callable[[Any, dict[str, str], Range], Signals],
+    table: Text | Table,
+    names: dict[str, str],
+    ends: Range,
+) -> Signals:
+    """The columns, the time in s where its name says another unit, such as `time_ms`."""
+    time = names["time"]
+    count = second_in(time)
+    if isinstance(table, Table) and np.asarray(table.take(time)).dtype.kind in "mM":
+        count = 1.0  # dates and durations know their unit
+    columns = read(table, names, (ends[0] * count, ends[1] * count))
+    if count != 1.0:
+        columns["time"] = columns["time"] / count
+    return columns
 
 
 def _refuse_other_units(label: str, time: NDArray[np.float64]) -> None:
@@ -169,14 +187,14 @@ def _from_file(
             raise not_text(path)
         if kind in (None, "text", "gzip"):
             text = as_text(path, whole(stream, head), named, delimiter)
-            return read_csv(text, choose(path, text.header), ends)
+            return _in_seconds(read_csv, text, choose(path, text.header), ends)
     if delimiter is not None:
         raise ValueError(f"delimiter={delimiter!r}: {path} is a file of {kind}, which has none")
     table = _table(path, kind, named)
     names = choose(path, table.names)
     if not named.issuperset(names.values()):
         table = _table(path, kind, set(names.values()))
-    return read_table(table, names, ends)
+    return _in_seconds(read_table, table, names, ends)
 
 
 def _table(path: Path, kind: str, wanted: set[str]) -> Table:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 from deadtime._base.errors import RecordingError
-from deadtime._base.usual_columns import SECONDS, UNITS, USUAL
+from deadtime._base.usual_columns import SECOND_IN, UNITS, USUAL
 from deadtime.recordings.readers._columns import column_index
 
 _BRACKETS = re.compile(r"\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
@@ -45,7 +45,8 @@ def chosen_columns(
         elif signal not in optional:
             shown = ", ".join(map(repr, names[:12])) + (", …" if len(names) > 12 else "")
             raise RecordingError(
-                f"{label} has no column with a usual name for the {signal}, such as "
+                f"{label} has no column with a usual name for the {signal}"
+                f"{' in s' * (signal == 'time')}, such as "
                 f"{USUAL[signal][0]!r} or {USUAL[signal][1]!r}: it has {shown}; name the column by "
                 f"{signal}=, on the command line --{signal}"
             )
@@ -56,9 +57,10 @@ def chosen_columns(
 
 def _usual(signal: str, names: Sequence[str]) -> str | None:
     """The first column of the likeliest usual name."""
-    plain = [(name, *_plain(name)) for name in names]
+    units = SECOND_IN if signal == "time" else UNITS
+    plain = [(name, *_plain(name, units)) for name in names]
     if signal == "time":
-        plain = [one for one in plain if one[2] in SECONDS]
+        plain = [one for one in plain if one[2] in SECOND_IN]
     for usual in USUAL[signal]:
         # As it is written, before other capitals: t is a time beside a temperature T.
         exact = [name for name, _, _ in plain if name == usual]
@@ -68,7 +70,12 @@ def _usual(signal: str, names: Sequence[str]) -> str | None:
     return None
 
 
-def _plain(name: str) -> tuple[str, str]:
+def second_in(name: str) -> float:
+    """How many of the unit that a column of times names make a second; 1 where it names none."""
+    return SECOND_IN.get(_plain(name, SECOND_IN)[1], 1.0)
+
+
+def _plain(name: str, units: Container[str]) -> tuple[str, str]:
     """A name in small letters without its unit, and the unit."""
     brackets = _BRACKETS.search(name)
     unit = brackets[1].lower() if brackets else ""
@@ -76,4 +83,4 @@ def _plain(name: str) -> tuple[str, str]:
         r"[\s.-]+", "_", (name[: brackets.start()] if brackets else name).strip().lower()
     )
     head, _, last = short.rpartition("_")
-    return (head, last) if head and not unit and last in UNITS else (short, unit)
+    return (head, last) if head and not unit and last in units else (short, unit)

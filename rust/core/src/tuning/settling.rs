@@ -26,6 +26,8 @@ pub struct Settled {
     pub best: Best,
     /// The weight, where one was chosen.
     pub weight: Option<f64>,
+    /// The value of the best gains, of which the slack may have cost a part.
+    pub least: f64,
     /// When a step has settled in the worst of the loops with which the search began, s; infinite where
     /// that is not known.
     pub time: f64,
@@ -55,8 +57,10 @@ pub fn settled_first(posed: &Posed, given: Option<f64>, task: &Task) -> Result<S
 
 fn weighed(posed: &Posed, given: Option<f64>, task: &Task) -> Result<Settled, Error> {
     let found = best(posed, task)?;
+    let least = found.value;
     let without = |best| Settled {
         best,
+        least,
         weight: None,
         time: f64::INFINITY,
     };
@@ -93,16 +97,16 @@ fn weighed(posed: &Posed, given: Option<f64>, task: &Task) -> Result<Settled, Er
         || (),
         |(), index| worst(index),
     )?;
-    let least = times.iter().copied().fold(f64::INFINITY, f64::min);
+    let earliest = times.iter().copied().fold(f64::INFINITY, f64::min);
     // Of those that are as good the best response to a load, and the largest weight.
-    let good = (0..times.len()).filter(|&index| times[index] <= least * (1.0 + NOTHING));
+    let good = (0..times.len()).filter(|&index| times[index] <= earliest * (1.0 + NOTHING));
     let row = |index: usize| near[index / weights.len()];
     let weight = |index: usize| weights[index % weights.len()];
     let chosen = good.min_by(|&x, &y| {
         let by_weight = weight(y).total_cmp(&weight(x));
         row(x).2.total_cmp(&row(y).2).then(by_weight)
     });
-    let Some(chosen) = chosen.filter(|_| least.is_finite()) else {
+    let Some(chosen) = chosen.filter(|_| earliest.is_finite()) else {
         return Ok(without(found));
     };
     let (weight, time) = (given.is_none().then(|| weight(chosen)), times[chosen]);
@@ -117,5 +121,10 @@ fn weighed(posed: &Posed, given: Option<f64>, task: &Task) -> Result<Settled, Er
             task,
         )?,
     };
-    Ok(Settled { best, weight, time })
+    Ok(Settled {
+        best,
+        least,
+        weight,
+        time,
+    })
 }
