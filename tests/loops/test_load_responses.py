@@ -84,6 +84,35 @@ def test_a_function_that_jumps_is_one_with_jumps():
     np.testing.assert_allclose(found.outputs, truth.outputs, atol=1e-9)
 
 
+def test_a_fast_function_late_in_a_run_is_followed():
+    """The argument of the sine is rounded by more than the fit is to be exact to."""
+    loop = dtm.ControlLoop(SLOW, dtm.PI(1.2, 0.3), delay=0.4)
+    times = np.array([0.0, *np.linspace(99.0, 100.0, 6)])
+    found = loop.simulate(times, 0.0, load=lambda t: np.sin(80.0 * t)).outputs
+    s = 80.0j
+    G, C, late = 2.0 / (5.0 * s + 1.0), 1.2 + 0.3 / s, np.exp(-0.4 * s)
+    truth = (G / (1.0 + G * C * late) * np.exp(s * times)).imag
+    np.testing.assert_allclose(found[1:], truth[1:], atol=1e-9)
+
+
+def test_a_pulse_that_the_output_times_show_is_not_missed():
+    loop = dtm.ControlLoop(PLANT, dtm.P(0.8), delay=0.2)
+    times = np.linspace(0.0, 100.0, 10_001)
+    found = loop.simulate(
+        times, 0.0, load=lambda t: np.where((t > 40.003) & (t < 40.018), 1.0, 0.0)
+    )
+    truth = loop.simulate(times, 0.0, load=([40.003, 40.018], [1.0, 0.0]))
+    np.testing.assert_allclose(found.outputs, truth.outputs, atol=1e-8)
+    assert np.abs(truth.outputs).max() > 0.01
+
+
+def test_a_function_without_end_of_its_changes_is_refused():
+    loop = dtm.ControlLoop(PLANT, dtm.P(0.8), delay=0.2)
+    draw = np.random.default_rng(1)
+    with pytest.raises(ValueError, match=r"load changes too often .* a pair \(times, values\)"):
+        loop.simulate(TIMES, 0.0, load=lambda t: draw.normal(size=t.shape))
+
+
 def test_a_sampled_loop_reads_a_function_at_its_samples():
     loop = dtm.ControlLoop(PLANT, dtm.P(0.8), delay=0.2, sample_time=0.1)
     samples = np.arange(61) * 0.1

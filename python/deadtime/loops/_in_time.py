@@ -71,7 +71,8 @@ class LoopInTime:
         load : float, array_like of shape (n,), (times, values), or callable, optional
             Added to the command where it reaches the plant, after its limit. A number: a step to it
             at the start. An array: values that hold from each element of `time` on. A pair: values
-            that hold from these times on, zero before. A function of an array of times in s.
+            that hold from these times on, zero before. A function of an array of times in s; a
+            pulse that is shorter than 1/1000 of the run and between two output times may be missed.
         output_disturbance : as `load`, optional
             Added to the output of the plant.
         noise : float, array_like, (times, values), callable, or noise model, optional

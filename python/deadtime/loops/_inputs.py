@@ -31,6 +31,12 @@ _PIECES = 64
 #: Halvings of a piece after which a jump is taken to lie in it: more locate it better.
 _HALVINGS = 36
 
+#: Relative errors of the time that a function is allowed: products and sums of it are rounded.
+_TIME_ROUNDING = 8.0 * float(np.finfo(float).eps)
+
+#: Most pieces of a function: each of them comes back after every delay.
+_MOST_PIECES = 50_000
+
 #: Places within a piece, from -1 to 1, at which its fit is compared with the function.
 _PROBES = np.cos(np.linspace(0.03, np.pi - 0.04, 11))
 
@@ -150,7 +156,7 @@ _TITLES = {
 
 def _pieces(name: str, given: Any, times: Array) -> _Pieces:
     if callable(given):
-        return _fitted(name, given, (float(times[0]), float(times[-1])))
+        return _fitted(name, given, times)
     if isinstance(given, tuple):
         if len(given) != 2:
             raise ValueError(
@@ -205,8 +211,12 @@ def _moved(derivatives: Array, length: float) -> Array:
     return np.array([np.dot(derivatives[row:], terms[: size - row]) for row in range(size)])
 
 
-def _fitted(name: str, function: Callable[[Any], Any], span: tuple[float, float]) -> _Pieces:
-    """A function as polynomials, each as good as rounding but where it jumps."""
+def _fitted(name: str, function: Callable[[Any], Any], times: Array) -> _Pieces:
+    """A function as polynomials, each as good as rounding but where it jumps.
+
+    Each is compared with the function at the output times too: what these show is not missed.
+    """
+    span = (float(times[0]), float(times[-1]))
 
     def values(when: Array) -> Array:
         found = real_array(f"the value of {name}", function(when))
@@ -225,28 +235,46 @@ def _fitted(name: str, function: Callable[[Any], Any], span: tuple[float, float]
     to_series = np.linalg.inv(chebyshev.chebvander(nodes, _DEGREE))
     powers = np.arange(nodes.size, dtype=float)
     factorials = np.array([math.factorial(power) for power in range(nodes.size)])
+    units = (chebyshev.cheb2poly(row) for row in np.eye(nodes.size))
+    taylor = (np.pad(row, (0, nodes.size - row.size)) * factorials for row in units)
+    to_taylor = np.array([_moved(row, -1.0) for row in taylor])
     at_probes = chebyshev.chebvander(_PROBES, _DEGREE)
+    shown = values(times)
     edges = np.linspace(*span, _PIECES + 1)
     low, high = edges[:-1], edges[1:]
     shortest = (span[1] - span[0]) * 0.5**_HALVINGS
-    size, starts, rows = 0.0, [], []
+    size, count, starts, rows = 0.0, 0, [], []
     while low.size:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         found = values((middle[:, None] + half[:, None] * places).ravel()).reshape(low.size, -1)
         size = max(size, float(np.abs(found).max()))
         series = found[:, : nodes.size] @ to_series.T
         error = np.abs(series @ at_probes.T - found[:, nodes.size :]).max(axis=1)
-        done = (error <= _ERROR * size) | (half < shortest)
-        for start, length, row in zip(low[done], half[done], series[done], strict=True):
-            taylor = chebyshev.cheb2poly(row)
-            taylor = np.pad(taylor, (0, nodes.size - taylor.size)) * factorials
-            starts.append(start)
-            # Where a jump lies within, what follows sets the value after it.
-            is_jump = length < shortest
-            rows.append(
-                _moved(taylor, -1.0) * length**-powers * np.where(is_jump, powers == 0.0, 1.0)
+        order = np.argsort(low)
+        piece = order[np.searchsorted(low[order], times, side="right") - 1]
+        within = (times > low[piece]) & (times < high[piece])
+        piece = piece[within]
+        there = chebyshev.chebvander((times[within] - middle[piece]) / half[piece], _DEGREE)
+        apart = np.abs((there * series[piece]).sum(axis=1) - shown[within])
+        np.maximum.at(error, piece, apart)
+        # Rounding of the time moves a function as far as its slope says.
+        slope = np.abs(series) @ powers**2 / half
+        late = np.maximum(np.abs(low), np.abs(high))
+        allowed = _ERROR * size + _TIME_ROUNDING * late * slope
+        done = (error <= allowed) | (half < shortest)
+        count += int(np.count_nonzero(done))
+        if count + 2 * np.count_nonzero(~done) > _MOST_PIECES:
+            raise ValueError(
+                f"{name} changes too often to be followed: {_MOST_PIECES} pieces between jumps are "
+                "not enough; give a shorter run, or values at times, as a pair (times, values)"
             )
+        lengths = half[done, None]
+        # Where a jump lies within, what follows sets the value after it.
+        smooth = np.where(lengths < shortest, powers == 0.0, 1.0)
+        starts.append(low[done])
+        rows.append(series[done] @ to_taylor * lengths**-powers * smooth)
         low, high, middle = low[~done], high[~done], middle[~done]
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-    order = np.argsort(starts)
-    return _Pieces(np.array(starts)[order], np.array(rows)[order])
+    every = np.concatenate(starts)
+    order = np.argsort(every)
+    return _Pieces(every[order], np.concatenate(rows)[order])
