@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use std::f64::consts::PI;
 
 use super::norms::Peaks;
-use super::peaks::{CLOSE, Modulus, Peak, highest};
+use super::peaks::{CLOSE, Modulus, Peak, Sought, highest};
 use super::zeros::{ORDER, RealFunction, Taylor, zeros_between};
 use crate::elementary::sin_cos;
 use crate::quasipoly::modulus;
@@ -87,7 +87,7 @@ fn largest(
     let octaves = (0..OCTAVES).map(|k| libm::ldexp(top, -k));
     let start = [0.0].into_iter().chain(octaves);
     let mut start: Vec<f64> = start.chain(places.iter().copied()).collect();
-    highest(&of, Peak::NONE, &mut start, CLOSE, task)
+    highest(&of, Peak::NONE, &mut start, Sought::Value(CLOSE), task)
 }
 
 impl OnCircle<'_> {

@@ -50,7 +50,7 @@ pub use held_range::{Members, Number, held_range};
 pub use margins::{Margins, margins, margins_of_ratio, margins_of_stable};
 pub use norms::{Peaks, hinf_norm, peak, peak_to, peaks};
 pub use passage::Crossing;
-pub use peaks::Peak;
+pub use peaks::{Peak, Sought};
 pub(crate) use polynomial::roots as small_roots;
 pub use ranges::{corner_range, damping_range, gain_range};
 pub use ratio::{first_term, ratio};

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::bounds::{fujiwara, highest_corner};
 use super::chains::Lead;
-use super::peaks::{CLOSE, Modulus, Peak, highest};
+use super::peaks::{CLOSE, Modulus, Peak, Sought, highest};
 use super::ratio::ratio_at;
 use super::squares::{DifferenceOfSquares, alike};
 use super::two_sided::TwoSided;
@@ -136,11 +136,11 @@ pub fn peak(
     places: &[f64],
     task: &Task,
 ) -> Result<Peak, Error> {
-    peak_to(n, d, places, CLOSE, task)
+    peak_to(n, d, places, Sought::Value(CLOSE), task)
 }
 
-/// The same, known but for the part `close` of the value: where it is that of high frequencies, the work
-/// grows without bound as `close` falls.
+/// The same, as well as it is sought: where the value is that of high frequencies, the work grows without
+/// bound as `close` falls.
 ///
 /// # Errors
 /// As [`peak`].
@@ -148,7 +148,7 @@ pub fn peak_to(
     n: &QuasiPolynomial,
     d: &QuasiPolynomial,
     places: &[f64],
-    close: f64,
+    sought: Sought,
     task: &Task,
 ) -> Result<Peak, Error> {
     if n.is_zero() {
@@ -165,8 +165,20 @@ pub fn peak_to(
         value: of.far.most,
         omega: f64::INFINITY,
     };
-    highest(&of, known, &mut start, close, task)
+    if let Sought::Above(level) = sought
+        && of.far.most * FAR > level
+    {
+        return Ok(Peak {
+            value: f64::INFINITY,
+            ..known
+        });
+    }
+    highest(&of, known, &mut start, sought, task)
 }
+
+/// The limit at high frequencies times this counts as above a level. Closer ones: the frequencies that
+/// have to be looked at grow without bound.
+const FAR: f64 = 1.0 + 1e-3;
 
 /// What is known of n/d at high frequencies.
 #[derive(Debug, Clone, Copy)]

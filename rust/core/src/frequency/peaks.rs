@@ -20,6 +20,15 @@ const LEVELS: usize = 60;
 const EVALUATIONS: usize = 60;
 const PLACE_KNOWN: f64 = 1e-9;
 
+/// What is asked of a largest value.
+#[derive(Debug, Clone, Copy)]
+pub enum Sought {
+    /// The value, but for this part of it.
+    Value(f64),
+    /// Whether it is above a level: what is found is above if it is, and some value below if it is not.
+    Above(f64),
+}
+
 /// A largest value and where it is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
@@ -58,8 +67,8 @@ pub(super) trait Modulus {
     fn reaching(&self, level: f64, task: &Task) -> Result<(Vec<f64>, f64), Error>;
 }
 
-/// The largest value, but for the part `close` of it. `known` is one that is taken, `places` are
-/// frequencies to look at first.
+/// The largest value, as well as it is sought. `known` is one that is taken, `places` are frequencies to
+/// look at first.
 ///
 /// # Errors
 /// As [`Modulus::reaching`]; [`Error::Argument`] where levels do not come to an end.
@@ -67,7 +76,7 @@ pub(super) fn highest(
     of: &impl Modulus,
     known: Peak,
     places: &mut [f64],
-    close: f64,
+    sought: Sought,
     task: &Task,
 ) -> Result<Peak, Error> {
     let mut best = first(of, known, places)?;
@@ -75,7 +84,11 @@ pub(super) fn highest(
         return Ok(best);
     }
     for _ in 0..LEVELS {
-        let level = best.value * (1.0 + close);
+        let level = match sought {
+            Sought::Value(close) => best.value * (1.0 + close),
+            Sought::Above(level) if best.value > level => return Ok(best),
+            Sought::Above(level) => level,
+        };
         let (zeros, top) = of.reaching(level, task)?;
         let places: Vec<f64> = [0.0].into_iter().chain(zeros).chain([top]).collect();
         let before = best;

@@ -6,8 +6,8 @@ use super::responses::settling_time;
 use crate::dde::LinearLoop;
 use crate::elementary::exp;
 use crate::frequency::{
-    Margins, Peak, held_gain, held_margins, held_margins_of_stable, held_sensitivity, margins,
-    margins_of_stable, peak, peak_to, ratio,
+    Margins, Peak, Sought, held_gain, held_margins, held_margins_of_stable, held_sensitivity,
+    margins, margins_of_stable, peak, peak_to, ratio,
 };
 use crate::loops::{ControlLoop, Input};
 use crate::quasipoly::{QuasiPolynomial, modulus};
@@ -139,10 +139,10 @@ pub(super) fn sensitivity_of(of: &ControlLoop, task: &Task) -> Result<Option<Pea
     sensitivity_to(of, None, task)
 }
 
-/// The same, of a continuous loop but for a part of it.
+/// The same, of a continuous loop as well as it is sought.
 pub(super) fn sensitivity_to(
     of: &ControlLoop,
-    close: Option<f64>,
+    sought: Option<Sought>,
     task: &Task,
 ) -> Result<Option<Peak>, Error> {
     if is_sampled(of) {
@@ -154,8 +154,8 @@ pub(super) fn sensitivity_to(
     if !is_stable(&closed, true, task)? {
         return Ok(None);
     }
-    match close {
-        Some(close) => peak_to(&d, &closed, &[], close, task).map(Some),
+    match sought {
+        Some(sought) => peak_to(&d, &closed, &[], sought, task).map(Some),
         None => peak(&d, &closed, &[], task).map(Some),
     }
 }

@@ -6,6 +6,7 @@ use super::demands::{is_stable_loop, sensitivity_to};
 use super::open::{Gap, Open, Scale, gaps};
 use super::posed::{Posed, Ray, lasting};
 use super::responses::figures;
+use crate::frequency::Sought;
 use crate::loops::Drive;
 use crate::{Error, Task};
 
@@ -145,7 +146,8 @@ impl<'a> Search<'a> {
         if from <= 0.0 {
             // Small gains of two integrators have their peak below all frequencies that are seen.
             let of = self.posed.at(0, &ray.at(end));
-            let found = match sensitivity_to(&of, Some(NEARLY - 1.0), self.task) {
+            let asked = Sought::Above(most * NEARLY);
+            let found = match sensitivity_to(&of, Some(asked), self.task) {
                 Err(error) if error.ends_all() => return Err(error),
                 found => found.ok().flatten(),
             };
@@ -158,11 +160,12 @@ impl<'a> Search<'a> {
         let holds = |k: f64| -> Result<bool, Error> {
             for (place, _) in &self.seen {
                 let of = self.posed.at(*place, &ray.at(k));
-                let found = match sensitivity_to(&of, Some(0.5 * AIMED), self.task) {
+                let level = most / (1.0 + 0.5 * AIMED);
+                let found = match sensitivity_to(&of, Some(Sought::Above(level)), self.task) {
                     Err(error) if error.ends_all() => return Err(error),
                     found => found.ok().flatten(),
                 };
-                if !found.is_some_and(|peak| peak.value * (1.0 + 0.5 * AIMED) <= most) {
+                if !found.is_some_and(|peak| peak.value <= level) {
                     return Ok(false);
                 }
             }
