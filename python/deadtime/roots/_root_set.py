@@ -166,3 +166,9 @@ def rightmost_set(found: native.RootSet, n: int, chain: Callable[[], float]) -> 
     if roots.multiplicities[roots.roots.imag >= 0.0].sum() >= n:
         return roots
     return replace(roots, chain_abscissa=chain())
+
+
+def proves_instability(rightmost: RootSet) -> bool:
+    """Whether one of the rightmost roots, or a chain, is proved to be right of the axis."""
+    right = np.any(rightmost.roots.real > rightmost.radii)
+    return bool(right) or rightmost.chain_abscissa > 0.0
