@@ -60,7 +60,13 @@ REFUSED = [
     (["bare.bin", "--loop", "roll rate"], "holds no gain of this loop"),
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
     (["flown.bin", "--kp", 1], "--kp is for a table"),
-    (["bump.csv", "--form", "ardupilot"], "the loops of ardupilot"),
+    (
+        ["bump.csv", "--form", "ardupilot"],
+        "--loop is missing: the loops of ardupilot are roll rate",
+    ),
+    (["bump.csv", "--form", "px4", "--loop", "rol"], "--loop rol: the loops of px4 are roll rate"),
+    (["bump.csv", "--loop", "roll"], "--loop is for a vehicle, and the form parallel is not"),
+    (["bump.csv", "--firmware", "4.5"], "--firmware is for a vehicle"),
     (["bump.csv", "--filter-hz", 2], "--filter-hz is for a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]
