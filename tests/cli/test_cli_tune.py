@@ -57,7 +57,7 @@ def test_a_log_gives_the_parameters_of_its_firmware(folder):
 
 
 REFUSED = [
-    (["bare.bin", "--loop", "roll rate"], "holds no gain of this loop"),
+    (["bare.bin", "--loop", "roll rate"], "by controller=, on the command line --controller"),
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
     (["flown.bin", "--kp", 1], "--kp is for a table"),
     (
@@ -78,3 +78,9 @@ def test_what_makes_no_sense_is_refused(folder, options, why):
     assert done.returncode == 1
     one_clear_line(done)
     assert why in done.stderr
+
+
+def test_what_refuses_each_loop_of_a_log_names_it_once(folder):
+    done = run("tune", "bare.bin", cwd=folder)
+    assert done.returncode == 3
+    assert "can be tuned: roll rate: the log holds no gain of this loop" in done.stderr
