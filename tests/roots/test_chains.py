@@ -134,6 +134,7 @@ def test_rightmost_roots_right_of_the_chains_do_not_name_them():
     assert h.rightmost().chain_abscissa == -math.inf
     assert "chains" not in repr(h.rightmost())
     assert (s + 1).rightmost(3).chain_abscissa == -math.inf
+    assert repr((s + 1).rightmost(3)).startswith("RootSet: 1 root in ")
 
 
 def test_a_double_chain_is_listed_once_with_its_multiplicity():

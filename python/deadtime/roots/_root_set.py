@@ -126,7 +126,8 @@ class RootSet(ReadOnlyArrays, Pictured):
 
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region
-        lines = [f"RootSet: {self.counted} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g})"]
+        number = f"{self.counted} root{'' if self.counted == 1 else 's'}"
+        lines = [f"RootSet: {number} in re=({a:g}, {b:g}), im=({c:g}, {d:g})"]
         for index in range(min(len(self), _SHOWN)):
             line = f"  {_written(self.roots[index])}  within {self.radii[index]:.1e}"
             if self.multiplicities[index] > 1:
