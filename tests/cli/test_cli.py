@@ -187,7 +187,9 @@ def test_a_design(tmp_path):
     assert picture.stat().st_size > 5000
     chosen = found("design", "--delay", 0.36, "--fix", "Kp=2", "--choose-filter")
     assert 100 < chosen["filter"] < 200
-    assert "least margins: gain" in run("design", "--delay", 0.36, "--controller", "P").stdout
+    alone = run("design", "--delay", 0.36, "--controller", "P").stdout
+    assert "least margins: gain" in alone
+    assert "(1 scenario checked; proved: stable)" in alone
 
 
 def test_a_simulation_and_its_file(tmp_path):

@@ -96,6 +96,26 @@ def test_a_design_for_a_plant_adds_its_delay():
     assert out["gains"]["Kp"] == pytest.approx(own["gains"]["Kp"], rel=1e-5)
 
 
+@pytest.mark.parametrize("plant", ["1.8*delay(12)/(40*s+1)", "1/(s+0.5*delay(1))"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["roots", "--kp", 0.2],
+        ["simulate", "--kp", 0.2],
+        ["map", "--shape", 3, 3],
+        ["design", "--controller", "P", "--objective", "abscissa", "--kp", 0.1, 1],
+    ],
+    ids=lambda command: command[0],
+)
+def test_beside_the_delay_of_a_plant_the_default_is_zero(command, plant):
+    assert found(*command, "--plant", plant) == found(*command, "--plant", plant, "--delay", 0)
+
+
+def test_a_delay_is_asked_for_where_there_is_none():
+    for plant in ([], ["--plant", "1/(s+1)"]):
+        assert "--delay is missing" in one_clear_line(run("roots", "--kp", 1, *plant))
+
+
 def test_delays_inside_the_plant():
     inside = ["--kp", 0.5, "--delay", 0.2, "--plant", "1/(s+0.5*delay(1))"]
     assert found("roots", *inside)["stable"] is True

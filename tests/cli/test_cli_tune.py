@@ -57,10 +57,16 @@ def test_a_log_gives_the_parameters_of_its_firmware(folder):
 
 
 REFUSED = [
-    (["bare.bin", "--loop", "roll rate"], "holds no gain of this loop"),
+    (["bare.bin", "--loop", "roll rate"], "by controller=, on the command line --controller"),
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
     (["flown.bin", "--kp", 1], "--kp is for a table"),
-    (["bump.csv", "--form", "ardupilot"], "the loops of ardupilot"),
+    (
+        ["bump.csv", "--form", "ardupilot"],
+        "--loop is missing: the loops of ardupilot are roll rate",
+    ),
+    (["bump.csv", "--form", "px4", "--loop", "rol"], "--loop rol: the loops of px4 are roll rate"),
+    (["bump.csv", "--loop", "roll"], "--loop is for a vehicle, and the form parallel is not"),
+    (["bump.csv", "--firmware", "4.5"], "--firmware is for a vehicle"),
     (["bump.csv", "--filter-hz", 2], "--filter-hz is for a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]
@@ -72,3 +78,9 @@ def test_what_makes_no_sense_is_refused(folder, options, why):
     assert done.returncode == 1
     one_clear_line(done)
     assert why in done.stderr
+
+
+def test_what_refuses_each_loop_of_a_log_names_it_once(folder):
+    done = run("tune", "bare.bin", cwd=folder)
+    assert done.returncode == 3
+    assert "can be tuned: roll rate: the log holds no gain of this loop" in done.stderr

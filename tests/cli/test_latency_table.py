@@ -75,6 +75,19 @@ def test_loops_that_share_a_reason_have_one_line():
     assert lines_of(loop("yaw", "none", why)) == [f"none: yaw: {mode}"]
 
 
+def test_a_plain_number_that_contradicts_the_fit_has_a_line_of_its_own():
+    few = "too few windows determine the time by themselves, 3 where 8 are needed"
+    by = "by moves the log gives 12 ms and the fit 6 ms"
+    doubted = loop("yaw", "indication", f"{few}; {by}")
+    assert lines_of(doubted) == [f"indication: yaw: {few}", f"indication: yaw: {by}"]
+
+
+def test_loops_without_a_time_that_were_fitted_come_first():
+    asked = [loop(f"loop {k}", "none", f"reason {'abc'[k]}", time=NAN) for k in range(3)]
+    asked[2] = replace(asked[2], windows=((0.0, 4.0),))
+    assert lines_of(*asked)[0] == "none: loop 2: reason c"
+
+
 def test_lines_are_few_and_fit_a_screen_where_their_parts_do():
     reasons = [f"reason {'abcdefghi'[k]}, which is long: {'words ' * 20}" for k in range(9)]
     loops = [loop(f"loop {k}", "none", reasons[k], time=NAN) for k in range(9)]

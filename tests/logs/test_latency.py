@@ -288,3 +288,18 @@ def test_a_response_that_hardly_moves_shows_no_time():
     found = dtm.latency(flight_path("ardupilot_sitl_guided_heights.bin"), loops=("yaw",))
     assert not found.estimated
     assert all(one.reason for one in found.loops)
+
+
+def test_a_bump_test_is_sent_to_the_commands_for_a_process():
+    time = np.arange(600.0)
+    heater = np.where(time < 50.0, 40.0, 45.0)
+    warmth = 9.0 * -np.expm1(-np.maximum(time - 62.0, 0.0) / 40.0)
+    warmth += np.random.default_rng(1).normal(0.0, 0.05, time.size)
+    found = dtm.latency(dtm.Recording(time, None, warmth, heater, source="bump.csv"))
+    (one,) = found.loops
+    assert one.verdict == "none"
+    assert one.reason == "the actuator moves in 1 of 8 parts, and a time needs 4"
+    (further,) = found.advice
+    assert "deadtime estimate" in further.text
+    assert "deadtime tune" in further.text
+    assert further.text in found.below()[-1]

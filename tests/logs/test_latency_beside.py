@@ -1,5 +1,6 @@
 """A fit beside the plain numbers of the same log: the right one agrees, a wrong one is doubted."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -73,6 +74,17 @@ def test_a_wrong_fit_is_doubted(loop, late):
     assert "by cross-correlation the log gives " in found.reason
     (correlated,) = (one for one in found.differences if one.name == "cross-correlation")
     assert correlated.modelled - correlated.measured == pytest.approx(late, abs=2e-3)
+
+
+def test_a_response_that_precedes_its_setpoint_has_no_time(loop):
+    early = replace(loop.response, time=loop.response.time - 0.2)
+    found = beside_plain_numbers(fitted(SAMPLING), replace(loop, response=early), SAMPLING)
+    assert found.verdict == "none"
+    assert np.isnan(found.time)
+    assert found.estimate is None
+    assert found.plain.correlation.interval[1] < 0.0
+    why = r"by cross-correlation the response precedes its setpoint by 1\d\d\.\d+ ms \(95 %: 1"
+    assert re.match(why, found.reason)
 
 
 def test_a_fit_that_is_known_as_badly_is_not(loop):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 
 import deadtime as dtm
@@ -184,6 +185,18 @@ def test_wrong_types_are_refused():
         dtm.PV(1.0, 0.1, filter=38.0)
     with pytest.raises(TypeError, match="Kp="):
         dtm.P("much")
+
+
+def test_a_controller_says_what_it_takes_in_place_of_another_name():
+    with pytest.raises(TypeError, match=r"PI has no 'kp': it takes Kp, Ki, weight, "):
+        dtm.PI(kp=0.75)
+    with pytest.raises(TypeError, match=r"PI has no 'Ti': it takes .*; Ki = Kp/Ti$"):
+        dtm.PI(Kp=0.75, Ti=37.5)
+    with pytest.raises(TypeError, match=r"PD has no 'Td': .*; Kd = Kp Td$"):
+        dtm.PD(Kp=0.75, Td=3.0)
+    with pytest.raises(TypeError, match=r"P has no 'Ti': it takes Kp, feed_forward$"):
+        dtm.P(Kp=0.75, Ti=37.5)
+    assert list(inspect.signature(dtm.PI).parameters)[:2] == ["Kp", "Ki"]
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,41 @@ def test_info_of_a_first_order_loop():
     }
 
 
+GROWING = dtm.ControlLoop(dtm.FirstOrder(1.8, 40.0), dtm.PI(7.5, 0.2), delay=12.0)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        GROWING,
+        GROWING.replace(sample_time=1.0),
+        dtm.feedback(GROWING.open_loop()),
+        dtm.DelaySystem({0.0: [[-1.0]]}, N={0.5: [[1.1]]}, B=[[1.0]], C=[[1.0]]),
+    ],
+    ids=["loop", "sampled", "transfer function", "neutral"],
+)
+def test_an_unstable_system_has_a_peak_alone(system):
+    response = system.step_response()
+    info = response.info()
+    assert {name for name, value in info.items() if not np.isnan(value)} == {"peak", "peak_time"}
+    # Against a steady state that is given, they are those of the output.
+    largest = np.max(response.outputs)
+    assert response.info(steady_state=1.0)["overshoot"] >= 100.0 * (largest - 1.0)
+
+
+def test_what_a_limit_bounds_keeps_its_figures():
+    bounded = GROWING.replace(limit=3.0).step_response(np.linspace(0.0, 2000.0, 4001)).info()
+    assert np.isnan(bounded["settling_time"])
+    assert 100.0 < bounded["overshoot"] < 200.0
+
+
+def test_a_stable_loop_that_has_not_settled_keeps_its_figures():
+    info = GROWING.replace(Kp=1.0, Ki=0.02).step_response(np.linspace(0.0, 15.0, 31)).info()
+    assert np.isnan(info["settling_time"])
+    assert info["steady_state"] == 1.0
+    assert info["overshoot"] == 0.0
+
+
 def test_info_of_a_step_down_is_that_of_a_step_up():
     loop = dtm.ControlLoop(INTEGRATOR, dtm.P(2.4), delay=0.36)
     up = loop.simulate(np.linspace(0.0, 8.0, 161)).info()

@@ -2,6 +2,7 @@
 
 import csv
 import gzip
+import re
 import tempfile
 from pathlib import Path
 
@@ -61,6 +62,23 @@ def test_names_in_latin_1_and_utf_8_are_found(tmp_path):
     for encoding in ("latin-1", "utf-8"):
         table = as_csv().replace("height_m", "höhe_m").encode(encoding)
         assert_is_the_table(read(tmp_path, table, output="höhe_m"))
+
+
+@pytest.mark.parametrize(
+    "first", ["0.0,55.0,-55.31,+3e-2", "0,5;1,0;nan", "2026-01-05 08:00:00,54.88,,40.", "1 2 3"]
+)
+def test_a_table_without_names_is_told_where_they_have_to_be(first, tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text(f"# a comment\n{first}\n{first}\n")
+    words = f"the first line holds numbers, {first!r}: add a line with the names of the columns"
+    for names in ({}, NAMES):
+        with pytest.raises(dtm.RecordingError, match=re.escape(words)):
+            dtm.read_recording(path, **names)
+
+
+def test_numbers_are_names_where_they_are_asked_for(tmp_path):
+    numbered = "0,1,2,3\n" + as_csv().partition("\n")[2]
+    read(tmp_path, numbered, time="0", reference="1", output="2")
 
 
 def test_the_separator_is_the_one_that_finds_the_names(tmp_path):

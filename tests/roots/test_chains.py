@@ -117,6 +117,26 @@ def test_the_neutral_chain_runs_along_its_line():
     assert np.abs(chain.real_part(0.0) - chain.offset) == 0
 
 
+@pytest.mark.parametrize("system", ["matrices", "characteristic", "transfer function"])
+def test_rightmost_roots_name_the_chains_that_leave_none(system):
+    # exp(-0.5 v) = -1/1.1
+    D = dtm.DelaySystem({0.0: [[-1]]}, N={0.5: [[1.1]]})
+    h = D.characteristic()
+    asked = {"matrices": D, "characteristic": h, "transfer function": 1 / h}[system]
+    found = asked.rightmost()
+    assert len(found) == 0
+    assert found.chain_abscissa == pytest.approx(math.log(1.1) / 0.5)
+    assert repr(found).endswith("\n  further left, chains of roots can come to re=0.19062")
+
+
+def test_rightmost_roots_right_of_the_chains_do_not_name_them():
+    h = s + (2.0 + 0.7 * s) * delay(0.36)
+    assert h.rightmost().chain_abscissa == -math.inf
+    assert "chains" not in repr(h.rightmost())
+    assert (s + 1).rightmost(3).chain_abscissa == -math.inf
+    assert repr((s + 1).rightmost(3)).startswith("RootSet: 1 root in ")
+
+
 def test_a_double_chain_is_listed_once_with_its_multiplicity():
     chains = ((s + delay(1.0)) ** 2).chains()
     assert [chain.multiplicity for chain in chains] == [2]

@@ -28,9 +28,9 @@ CONTROLLERS: dict[str, type[Controller]] = {"P": P, "PV": PV, "PD": PD, "PI": PI
 
 
 def command(
-    delay: opt.Delay,
+    delay: opt.Delay = None,
     delay_to: Annotated[
-        float | None, typer.Option(help="Upper end of the delay, if it is an interval, s.")
+        float | None, typer.Option(help="Upper end of --delay, if it is an interval, s.")
     ] = None,
     controller: Annotated[Kind, typer.Option(help="Kind of controller.")] = "PV",
     kp: Annotated[opt.Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
@@ -76,6 +76,7 @@ def command(
     """Find the gains that are best in the worst case, within margins."""
     if choose_filter and filter is not None:
         raise ValueError("--filter gives the corner and --choose-filter asks for it: take one")
+    delay = opt.delay_beside(plant, delay)
     # The gains are varied: any that are not zero will do.
     loop = opt.described_loop(
         1.0, 0.1, delay, gain, lag, sample_time=sample_time, limit=limit, corner=filter, plant=plant

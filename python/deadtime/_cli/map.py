@@ -34,7 +34,7 @@ SHOWN_CURVES = 4
 
 
 def command(
-    delay: opt.Delay,
+    delay: opt.Delay = None,
     kp: Annotated[opt.Ends, typer.Option(help="Range of the proportional gain.")] = (0.0, 6.0),
     kv: Annotated[opt.Ends, typer.Option(help="Range of the velocity gain.")] = (-1.0, 1.0),
     plant: opt.Plant = None,
@@ -72,6 +72,7 @@ def command(
     as_json: opt.As_json = False,
 ) -> None:
     """Map which gains of a PV controller are stable, with the boundary and the best of them."""
+    delay = opt.delay_beside(plant, delay)
     # The gains are varied: any that are not zero will do.
     loop = opt.described_loop(
         1.0, 0.1, delay, gain, lag, sample_time=sample_time, corner=filter, plant=plant

@@ -65,7 +65,13 @@ Command = Annotated[str | None, typer.Option(help="Column of the command, if it 
 Window = Annotated[Ends | None, typer.Option(help="Use the samples between these times, s.")]
 Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]
 Kv = Annotated[float, typer.Option(help="Velocity gain.")]
-Delay = Annotated[float, typer.Option(help="Delay of the loop, s.", show_default=False)]
+Delay = Annotated[
+    float | None,
+    typer.Option(
+        help="Delay of the loop, s, added to that of --plant. Default: 0 if --plant has one.",
+        show_default=False,
+    ),
+]
 Gain = Annotated[float, typer.Option(help="Gain of the integrating plant, a factor on --plant.")]
 Plant = Annotated[
     str | None,
@@ -133,6 +139,19 @@ def described_loop(
         limit=limit,
     )
     return loop if plant is None else loop.replace(gain=gain)
+
+
+def delay_beside(plant: Plant, delay: Delay) -> float:
+    """The delay besides that of `plant`; zero if it is not given and `plant` has one."""
+    if delay is not None:
+        return delay
+    G = None if plant is None else plant_from(plant)
+    if G is None or not (G.num.delays.any() or G.den.delays.any()):
+        raise ValueError(
+            "--delay is missing: give the delay of the loop in s, or write it as delay(T) into "
+            "--plant"
+        )
+    return 0.0
 
 
 #: The numbers of a loop that have no special help in a command.

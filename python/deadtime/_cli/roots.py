@@ -22,7 +22,7 @@ HEADS = ("Re s / (1/s)", "Im s / (rad/s)", "multiplicity", "disc radius")
 def command(
     *,
     kp: opt.Kp,
-    delay: opt.Delay,
+    delay: opt.Delay = None,
     kv: opt.Kv = 0.0,
     numbers: Annotated[Given, Fills(opt.described_loop, "plant gain lag sample_time")],
     filter: opt.Filter = None,  # noqa: A002
@@ -46,6 +46,7 @@ def command(
     certificate
         File the proof of their number as JSON; with --plot, draw it, too.
     """
+    delay = opt.delay_beside(numbers["plant"], delay)
     loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
     if (re is None) != (im is None):
         raise ValueError("a region needs both --re and --im")

@@ -26,7 +26,7 @@ HEADS = ("time_s", "reference", "output", "command")
 def command(
     *,
     kp: opt.Kp,
-    delay: opt.Delay,
+    delay: opt.Delay = None,
     kv: opt.Kv = 0.0,
     numbers: Annotated[Given, opt.LOOP],
     filter: opt.Filter = None,  # noqa: A002
@@ -50,6 +50,7 @@ def command(
     out
         Write time, reference, output, command.
     """
+    delay = opt.delay_beside(numbers["plant"], delay)
     loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
     opt.check_duration(loop, duration)
     time = np.linspace(0.0, duration, points)

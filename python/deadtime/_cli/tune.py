@@ -20,7 +20,14 @@ from deadtime._cli.windows import files_and_windows
 from deadtime.logs import open_log, tune_loop
 from deadtime.loops import PV, Controller
 from deadtime.recordings import is_table, read_recording
-from deadtime.tuning import Form, ParallelForm, Proposal, one_pole_filter, tune
+from deadtime.tuning import (
+    LOOPS_OF_FORMS,
+    Form,
+    ParallelForm,
+    Proposal,
+    one_pole_filter,
+    tune,
+)
 
 
 @filled
@@ -135,6 +142,7 @@ def command(
         else:
             if flight is not None:
                 raise ValueError("--flight is for the log of a vehicle: a table has no flights")
+            _check_form(form or "parallel", loop, firmware)
             columns["command"] = columns["command"] or "auto"
             found = tune(
                 read_recording(path, **columns),
@@ -173,6 +181,21 @@ def _template(
         parts["weight"] = weight
     made: Controller = found(**parts)
     return made
+
+
+def _check_form(form: Form, loop: str | None, firmware: str) -> None:
+    """Refuse a loop of a vehicle without a form for it, and the reverse."""
+    loops = LOOPS_OF_FORMS.get(form)
+    if loops is None and (loop or firmware):
+        option = "--loop" if loop else "--firmware"
+        raise ValueError(
+            f"{option} is for a vehicle, and the form {form} is not: leave it out, or give --form "
+            f"{', '.join(LOOPS_OF_FORMS)}"
+        )
+    if loops is not None and loop not in loops:
+        raise ValueError(
+            f"--loop {loop or 'is missing'}: the loops of {form} are {', '.join(loops)}"
+        )
 
 
 def _flown(

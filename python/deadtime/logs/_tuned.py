@@ -86,7 +86,7 @@ def tune_loop(
         try:
             found = _tuned(log, one, firmware, controller, form, allow_indication, demands)
         except (ValueError, NotIdentifiableError) as error:
-            refused.append(f"{one.name}: {error}")
+            refused.append(f"{one.name}: {str(error).removeprefix(f'{one.name}: ')}")
             continue
         if found.verdict != "none":
             return found
@@ -118,7 +118,7 @@ def _tuned(
     if flown is None and controller is None:
         raise ValueError(
             f"{loop.name}: the log holds no gain of this loop, so that its controller is not "
-            "known: name one by controller="
+            "known: name one by controller=, on the command line --controller"
         )
     own = form is None or form == firmware
     return tune(

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cache
-from typing import Any, NamedTuple
+from functools import cache, wraps
+from typing import Any, NamedTuple, TypeVar
 
 from deadtime._base.validation import finite, positive
 from deadtime.loops._derivative_filter import DerivativeFilter, Discretisation
@@ -26,6 +26,9 @@ _EXTRAS = ("weight", "derivative_weight", "feed_forward")
 _OTHERS = frozenset((*_EXTRAS, "filter", "anti_windup"))
 
 
+C = TypeVar("C", bound="Controller")
+
+
 class ControllerForm(NamedTuple):
     """The form of a controller as the kernel takes it."""
 
@@ -37,6 +40,10 @@ class ControllerForm(NamedTuple):
     extras: tuple[str, ...] = ()
     #: Whether the integral stops while it would drive the command further out of its bounds.
     stops: bool = False
+
+
+#: What a gain is of a time that other forms have.
+_OF_TIMES = {"Ti": ("Ki", "Ki = Kp/Ti"), "Td": ("Kd", "Kd = Kp Td")}
 
 
 @dataclass(frozen=True)
@@ -230,6 +237,26 @@ class Controller:
         return ControllerForm(kind, smooth is not None, rule, tuple(self._extras), stops)
 
 
+def _explains_names(kind: type[C]) -> type[C]:
+    """The kind of controller, which says what it takes where it is given another name."""
+    make = kind.__init__
+    names = [part.name for part in fields(kind)]
+    takes = f"it takes {', '.join(names)}"
+
+    @wraps(make)
+    def checked(self: C, *values: Any, **given: Any) -> None:
+        for name in given:
+            if name not in names:
+                gain, words = _OF_TIMES.get(name, ("", ""))
+                hint = f"; {words}" if gain in names else ""
+                raise TypeError(f"{kind.__name__} has no {name!r}: {takes}{hint}")
+        make(self, *values, **given)
+
+    setattr(kind, "__init__", checked)  # noqa: B010
+    return kind
+
+
+@_explains_names
 @dataclass(frozen=True, repr=False)
 class P(Controller):
     """Proportional controller, u = Kp (r - y).
@@ -257,6 +284,7 @@ class P(Controller):
     feed_forward: float | None = None
 
 
+@_explains_names
 @dataclass(frozen=True, repr=False)
 class PV(Controller):
     """Proportional and velocity controller, u = Kp (r - y) - Kv H y.
@@ -291,6 +319,7 @@ class PV(Controller):
     feed_forward: float | None = None
 
 
+@_explains_names
 @dataclass(frozen=True, repr=False)
 class PD(Controller):
     """Proportional and derivative controller, u = Kp e + Kd H e with e = r - y.
@@ -331,6 +360,7 @@ class PD(Controller):
     feed_forward: float | None = None
 
 
+@_explains_names
 @dataclass(frozen=True, repr=False)
 class PI(Controller):
     """Proportional and integral controller, u = Kp e + Ki ∫ e dt with e = r - y.
@@ -367,6 +397,7 @@ class PI(Controller):
     anti_windup: BackCalculation | ConditionalIntegration | float | None = None
 
 
+@_explains_names
 @dataclass(frozen=True, repr=False)
 class PID(Controller):
     """Proportional, integral and derivative controller, u = Kp e + Ki ∫ e dt + Kd H e, e = r - y.

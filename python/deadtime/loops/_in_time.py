@@ -24,6 +24,7 @@ from deadtime.loops._load_response import (
     shown_times,
 )
 from deadtime.loops._native import LoopResponse, driven_loop, on_samples
+from deadtime.loops._poles import is_unstable
 from deadtime.loops._run_with_delays import settled_step_with_delays, simulate_with_delays
 from deadtime.loops._runs import LoopRun, RunArguments, reference_jumps
 from deadtime.loops._sensitivities import output_and_input_slopes, slope_names
@@ -436,6 +437,12 @@ class _Again:
         command = self._rest()[1]
         rest = np.nan if command is None else command
         return self.loop.kernel.stays_settled(time - time[0], inputs, rest, settled)
+
+    def grows(self) -> bool:
+        """Whether no limit acts in a loop that is proved to be unstable."""
+        loop = self.loop
+        is_free = loop.limit is None and loop.rate_limit is None and loop.plant.is_linear
+        return is_free and is_unstable(loop)
 
     def _rest(self) -> tuple[float | None, float | None]:
         """Output and command at rest under the last reference and inputs, limits left out."""

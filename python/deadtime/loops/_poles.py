@@ -16,6 +16,7 @@ from deadtime.roots import (
     QuasiPolynomial,
     RootSet,
     crossings,
+    proves_instability,
     root_set,
 )
 from deadtime.roots.certificate import Certificate
@@ -371,3 +372,10 @@ class LoopPoles:
             "dtm.stability_map"
         )
         return loop.family_of(tuple(names))
+
+
+def is_unstable(loop: LoopSpecification) -> bool:
+    """Whether the loop is proved to be unstable, its limit left out."""
+    if loop.sample_time is None:
+        return proves_instability(QuasiPolynomial._wrap(loop.kernel.characteristic()).rightmost())
+    return proves_instability(root_set(loop.native.rightmost(1)))

@@ -234,13 +234,15 @@ def sweep(
     grid of times: no peak is missed, and the interval for ``settling_min`` and ``settling_max``
     begins exactly where the rise ends. A set that diverges has NaN for all metrics and its status
     in `Sweep.status`; other NaN mean the same as in `Response.info`: the settling or rise time was
-    not reached. A settling time is given only if the output was in the band for three of the
-    slowest time constants 1/abs(abscissa) of the closed loop before the end, or if it had decayed
-    to a twentieth of the band and neither plant nor controller has a slow pole or zero; and if the
-    command was within its limit in all this time, since at the limit the output may pass through
-    the band while the integral unwinds. A loop whose reference needs the whole limit or more rests
-    with its command there: the time constants are then those of plant and controller. This is
-    evidence, not a proof; `design` proves the stability of its result.
+    not reached. An unstable loop that is cut off before it diverges is unsettled, and its metrics
+    are against the steady state; `Response.info` has the peak alone of it. A settling time is given
+    only if the output was in the band for three of the slowest time constants 1/abs(abscissa) of
+    the closed loop before the end, or if it had decayed to a twentieth of the band and neither
+    plant nor controller has a slow pole or zero; and if the command was within its limit in all
+    this time, since at the limit the output may pass through the band while the integral unwinds. A
+    loop whose reference needs the whole limit or more rests with its command there: the time
+    constants are then those of plant and controller. This is evidence, not a proof; `design` proves
+    the stability of its result.
 
     Integrals are those to infinity where no time is given: infinite where an offset remains, NaN
     where the output does not come to rest. The status is that of the step of the reference if one

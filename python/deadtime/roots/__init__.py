@@ -36,7 +36,11 @@ from deadtime.roots._parametric import Parameter, ParametricQuasiPolynomial, par
 from deadtime.roots._plots import plot_root_set as plot_root_set
 from deadtime.roots._quasipolynomial import QuasiPolynomial, delay, is_number as is_number, s
 from deadtime.roots._ratio import Ratio as Ratio
-from deadtime.roots._root_set import RootSet, root_set as root_set
+from deadtime.roots._root_set import (
+    RootSet,
+    proves_instability as proves_instability,
+    root_set as root_set,
+)
 from deadtime.roots._scalar_delay import dde_roots, rightmost_branches
 from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots._text import latex as latex

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import deadtime.roots._native as native
 from deadtime._base.validation import OpenRange, open_interval, whole_number
 from deadtime.roots._chains import Chain, chains_of
-from deadtime.roots._root_set import RootSet, root_set
+from deadtime.roots._root_set import RootSet, rightmost_set, root_set
 from deadtime.roots._sensitivity import RootSensitivity
 from deadtime.roots.certificate._certificate import Certificate
 from deadtime.roots.certificate._proof import proved
@@ -155,8 +155,8 @@ class Characteristic:
         RootSet
             More than `n` if the real parts of the next ones cannot be told apart. Fewer if there
             are no more, or no more right of the last line that could be counted, for a neutral
-            equation mostly next to its chains of roots (see `chain_abscissa`). ``region`` is the
-            half plane in which these are all.
+            equation mostly next to its chains of roots, which ``chain_abscissa`` of the set names.
+            ``region`` is the half plane in which these are all.
 
         Raises
         ------
@@ -173,7 +173,8 @@ class Characteristic:
         >>> [complex(round(root.real, 3), round(root.imag, 3)) for root in h.rightmost()]
         [(-0.926+7.713j), (-0.926-7.713j)]
         """
-        return root_set(self._native.rightmost(whole_number("n", n)))
+        n = whole_number("n", n)
+        return rightmost_set(self._native.rightmost(n), n, self.chain_abscissa)
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a root, or `chain_abscissa` if that is larger.

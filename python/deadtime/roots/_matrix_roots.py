@@ -17,7 +17,7 @@ from deadtime._base.errors import ContourError, CountMismatchError
 from deadtime._base.validation import OpenRange, open_interval, whole_number
 from deadtime.roots._characteristic import Edge
 from deadtime.roots._quasipolynomial import QuasiPolynomial
-from deadtime.roots._root_set import RootSet, root_set
+from deadtime.roots._root_set import RootSet, rightmost_set, root_set
 
 #: Least half-width of the square in which a root is counted again, relative to its modulus. Larger:
 #: other roots may be inside; smaller: roots that rounding has moved may be outside.
@@ -56,7 +56,8 @@ class MatrixDeterminant:
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost roots, right of the chains of a neutral system."""
-        return root_set(self._native.rightmost(whole_number("n", n)))
+        n = whole_number("n", n)
+        return rightmost_set(self._native.rightmost(n), n, self.chain_abscissa)
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a root, or that of the chains."""

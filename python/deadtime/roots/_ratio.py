@@ -11,7 +11,7 @@ import deadtime.roots._native as native
 from deadtime._base.validation import OpenRange, open_interval, whole_number
 from deadtime.roots._characteristic import Edge
 from deadtime.roots._quasipolynomial import QuasiPolynomial
-from deadtime.roots._root_set import RootSet, root_set
+from deadtime.roots._root_set import RootSet, rightmost_set, root_set
 
 
 class Ratio:
@@ -41,7 +41,8 @@ class Ratio:
 
     def rightmost(self, n: int = 1) -> RootSet:
         """Locate the rightmost poles, and the hidden roots of d among them."""
-        return root_set(self._native.rightmost(whole_number("n", n)))
+        n = whole_number("n", n)
+        return rightmost_set(self._native.rightmost(n), n, self.chain_abscissa)
 
     def spectral_abscissa(self, strong: bool = True) -> float:
         """Give the largest real part of a pole, or that of the chains; -inf without either."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -50,6 +51,9 @@ class RootSet(ReadOnlyArrays, Pictured):
     hidden : ndarray of complex
         Of the poles of a `TransferFunction`: roots of its denominator in `region` that are roots of
         the numerator as well, each as often as it is one. They are not among `roots`.
+    chain_abscissa : float
+        Of `rightmost` where the chains of a neutral system leave fewer roots than were asked for:
+        the real part that these can come to, in 1/s. Otherwise -inf.
 
     Examples
     --------
@@ -68,6 +72,7 @@ class RootSet(ReadOnlyArrays, Pictured):
     counted: int
     region: tuple[tuple[float, float], tuple[float, float]]
     hidden: NDArray[np.complex128] = field(default_factory=lambda: np.empty(0, np.complex128))
+    chain_abscissa: float = -math.inf
 
     def __len__(self) -> int:
         return len(self.roots)
@@ -121,7 +126,8 @@ class RootSet(ReadOnlyArrays, Pictured):
 
     def __repr__(self) -> str:
         (a, b), (c, d) = self.region
-        lines = [f"RootSet: {self.counted} roots in re=({a:g}, {b:g}), im=({c:g}, {d:g})"]
+        number = f"{self.counted} root{'' if self.counted == 1 else 's'}"
+        lines = [f"RootSet: {number} in re=({a:g}, {b:g}), im=({c:g}, {d:g})"]
         for index in range(min(len(self), _SHOWN)):
             line = f"  {_written(self.roots[index])}  within {self.radii[index]:.1e}"
             if self.multiplicities[index] > 1:
@@ -129,6 +135,8 @@ class RootSet(ReadOnlyArrays, Pictured):
             lines.append(line)
         if len(self) > _SHOWN:
             lines.append(f"  and {len(self) - _SHOWN} more")
+        if math.isfinite(self.chain_abscissa):
+            lines.append(f"  further left, chains of roots can come to re={self.chain_abscissa:g}")
         if len(self.hidden):
             listed = ", ".join(map(_written, self.hidden[:_SHOWN]))
             more = " and more" if len(self.hidden) > _SHOWN else ""
@@ -151,3 +159,17 @@ def root_set(found: native.RootSet) -> RootSet:
         region=found.region,
         hidden=found.hidden,
     )
+
+
+def rightmost_set(found: native.RootSet, n: int, chain: Callable[[], float]) -> RootSet:
+    """The rightmost roots, with the chains where they leave fewer than `n`."""
+    roots = root_set(found)
+    if roots.multiplicities[roots.roots.imag >= 0.0].sum() >= n:
+        return roots
+    return replace(roots, chain_abscissa=chain())
+
+
+def proves_instability(rightmost: RootSet) -> bool:
+    """Whether one of the rightmost roots, or a chain, is proved to be right of the axis."""
+    right = np.any(rightmost.roots.real > rightmost.radii)
+    return bool(right) or rightmost.chain_abscissa > 0.0

@@ -12,6 +12,7 @@ import numpy as np
 
 from deadtime._base.arrays import Array
 from deadtime._base.drawing import Axes, shown_axes
+from deadtime._base.errors import DeadtimeError
 from deadtime._base.frozen import FrozenDict, ReadOnlyArrays
 from deadtime._base.notebook import Pictured
 from deadtime._base.validation import finite, positive, real_array
@@ -28,6 +29,9 @@ _LOST = 20.0
 
 #: The sensitivities of a response for which none were requested.
 NONE = FrozenDict()
+
+#: Figures that an unstable system has too.
+_PEAK = ("peak", "peak_time")
 
 _new = object.__new__
 
@@ -149,6 +153,9 @@ class Response(ReadOnlyArrays, Pictured):
         the slowest time constants of the closed loop: at the limit the output may pass through
         the band.
 
+        An unstable system does not come to its steady state. Unless `steady_state` is given, all
+        figures but the peak are NaN where instability is proved and no limit acts.
+
         Parameters
         ----------
         output : int, default 0
@@ -191,6 +198,7 @@ class Response(ReadOnlyArrays, Pictured):
             raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
         if steady_state is not None:
             steady_state = finite("steady_state", steady_state)
+        is_given = steady_state is not None
         signals = np.atleast_2d(self.outputs)
         index = operator.index(output)
         if not 0 <= index < len(signals):
@@ -207,6 +215,8 @@ class Response(ReadOnlyArrays, Pictured):
         judge = getattr(dense, "stays_settled", None)
         if judge is not None and not judge(self.time, self.inputs, found["settling_time"]):
             found["settling_time"] = float("nan")
+        if not is_given and np.isnan(found["settling_time"]) and _grows(dense):
+            found = {name: found[name] if name in _PEAK else float("nan") for name in found}
         return found
 
     def plot(self, ax: Axes | None = None, *, inputs: bool = False, **style: Any) -> Axes:
@@ -267,6 +277,15 @@ for _name in PARTS:
 for _name in ("sensitivities", "input_sensitivities"):
     setattr(Response, _name, _Later(_name, lambda run: NONE))
 setattr(Response, "steady_state", _Later("steady_state", methodcaller("steady_state")))  # noqa: B010
+
+
+def _grows(dense: Callable[[Array], Array] | None) -> bool:
+    """Whether a run is proved to grow beyond all bounds."""
+    grows = getattr(dense, "grows", None)
+    try:
+        return grows is not None and grows()
+    except (DeadtimeError, ValueError):  # the poles are not known
+        return False
 
 
 def response_of(run: KeptRun) -> Response:

@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike
 import deadtime.systems._signals as signals
 from deadtime._base.arrays import Array
 from deadtime._base.validation import finite, increasing, positive, real_array
+from deadtime.roots import proves_instability
 from deadtime.systems._native import Signal
+from deadtime.systems._poles import HasPoles
 from deadtime.systems._realisation import Differentiable, Realisable, Realisation
 from deadtime.systems._response import Response, until_settled
 
@@ -58,6 +60,10 @@ class _Run:
         response = respond(self.system, np.concatenate([[self.start], inner]), self.drive)
         outputs = np.atleast_2d(response.outputs)
         return outputs if len(inner) < len(times) else outputs[:, 1:]
+
+    def grows(self) -> bool:
+        """Whether the system is proved to be unstable."""
+        return isinstance(self.system, HasPoles) and proves_instability(self.system.rightmost())
 
 
 def _rest(system: Realisable, inputs: Array | None) -> Array | None:

@@ -266,7 +266,7 @@ class Design(ReadOnlyArrays, Pictured):
             f"least margins: gain {least.gain_margin:.4g}, phase "
             f"{least.phase_margin:.4g}°, delay {least.delay_margin:.4g} s; Ms at most "
             f"{least.max_sensitivity:.4g} "
-            f"({self.checked} scenarios checked{proof})",
+            f"({self.checked} scenario{'' if self.checked == 1 else 's'} checked{proof})",
             f"step of {self.amplitude:g}: {step}",
         ]
         if self.region is not None:

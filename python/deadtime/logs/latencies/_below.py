@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from deadtime._base.digits import stated
 from deadtime._base.verdicts import Verdict
 from deadtime.logs.latencies._advice import Advice
+from deadtime.logs.latencies._beside import CONTRADICTED
 from deadtime.logs.latencies._relation import LoopLatency
 from deadtime.logs.latencies._table import ROWS, SCREEN, about
 
@@ -39,7 +41,7 @@ def below(
     `others` is where there is more on loops that have no line.
     """
     lines = [_left_out(loops, others), _spread(loops)]
-    lines += [*_groups(loops, "indication")[:1], *_without(loops, others)]
+    lines += [*_groups(loops, "indication")[:1], _contradicted(loops), *_without(loops, others)]
     lines = [line for line in lines if line][: LINES - min(ADVICE, len(advice))]
     more = [shortened("next: ", one.text) for one in advice]
     return [*lines, *more[: LINES - len(lines)]]
@@ -107,12 +109,23 @@ def _groups(loops: Sequence[LoopLatency], verdict: Verdict) -> list[str]:
     return lines
 
 
+def _contradicted(loops: Sequence[LoopLatency]) -> str:
+    """Where a plain number contradicts the fit, unless that is the first reason of its loop."""
+    found = []
+    for one in loops:
+        reasons = [each for each in one.reason.split("; ") if CONTRADICTED in each]
+        if one.verdict == "indication" and reasons and reasons[0] != first_reason(one):
+            found.append(replace(one, reason=reasons[0]))
+    return next(iter(_groups(found, "indication")), "")
+
+
 def _without(loops: Sequence[LoopLatency], others: str) -> list[str]:
-    """The lines on loops without a time, those first that were tried."""
+    """The lines on loops without a time, those first that were fitted, then those tried."""
     none = [one for one in loops if one.verdict == "none"]
-    tried = [one for one in none if one.sampling is not None]
-    rest = [one for one in none if one.sampling is None]
-    lines = [*_groups(tried, "none"), *_groups(rest, "none")]
+    fitted = [one for one in none if one.windows]
+    tried = [one for one in none if not one.windows and one.sampling is not None]
+    rest = [one for one in none if not one.windows and one.sampling is None]
+    lines = [line for some in (fitted, tried, rest) for line in _groups(some, "none")]
     if len(lines) > NONES:
         lines = [*lines[: NONES - 1], f"{lines[NONES - 1]}; for others: {others}"]
     return lines

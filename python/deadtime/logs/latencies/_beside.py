@@ -11,18 +11,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from deadtime._base.digits import shown
+from deadtime._base.digits import between as ends_of, shown
 from deadtime.logs._log import LogLoop
 from deadtime.logs.latencies._between import refined
 from deadtime.logs.latencies._commands import Sampling
 from deadtime.logs.latencies._modelled import modelled
-from deadtime.logs.latencies._plain import Difference, differences, plain_times
+from deadtime.logs.latencies._plain import (
+    Difference,
+    PlainTime,
+    PlainTimes,
+    differences,
+    plain_times,
+)
 from deadtime.logs.latencies._relation import LoopLatency
 from deadtime.logs.latencies._windows import LENGTHS, LONGEST
 
+#: What a reason says after the plain number that contradicts the fit.
+CONTRADICTED = "the log gives"
+
 
 def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) -> LoopLatency:
-    """The time of a loop from its setpoint with the plain numbers, doubted where they differ."""
+    """The time of a loop from its setpoint with the plain numbers, doubted where they differ.
+
+    There is no time where the response precedes its setpoint by the interval of a plain number.
+    """
     fit = found.estimate
     if fit is None and not found.windows:
         return found
@@ -32,6 +44,8 @@ def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) 
     own = plain_times(*both, loop.segments, longest=longest, between=between)
     if fit is None or fit.plant is None:
         return replace(found, plain=own)
+    if ahead := [one for one in own.all if one.interval[1] < 0.0]:
+        return _without_time(found, own, _why_ahead(ahead[0]))
     asked, late = loop.setpoint, 0.0
     if between == "straight":
         # As the fit takes it; each command holds for a while from its row on.
@@ -52,6 +66,24 @@ def beside_plain_numbers(found: LoopLatency, loop: LogLoop, sampling: Sampling) 
     return found
 
 
+def _without_time(found: LoopLatency, own: PlainTimes, why: str) -> LoopLatency:
+    """The loop without its time, for this reason, with the plain numbers."""
+    return LoopLatency(
+        found.loop, found.axis, found.kind, found.command, "none", why,
+        windows=found.windows, times=found.times, sampling=found.sampling, plain=own,
+    )  # fmt: skip
+
+
+def _why_ahead(one: PlainTime) -> str:
+    """How far the response precedes its setpoint by a plain number."""
+    low, high = one.interval
+    error = 0.25 * (high - low)
+    return (
+        f"by {one.name} the response precedes its setpoint by {shown(-one.value, error, 's')} "
+        f"(95 %: {ends_of(-high, -low, error, 's')})"
+    )
+
+
 def _why_apart(one: Difference, half: float) -> str:
     """How far a plain number is from that of the fit; empty where it may be the same.
 
@@ -63,6 +95,6 @@ def _why_apart(one: Difference, half: float) -> str:
         return ""
     error = 0.25 * (high - low)
     return (
-        f"by {one.name} the log gives {shown(one.measured, error, 's')} and the fit "
+        f"by {one.name} {CONTRADICTED} {shown(one.measured, error, 's')} and the fit "
         f"{shown(one.modelled, error, 's')}"
     )

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -28,14 +28,25 @@ from deadtime.logs.latencies._contradictions import ALIKE, doubted_by_others
 from deadtime.logs.latencies._filters import FilterDelay, filters_of
 from deadtime.logs.latencies._live import around_the_vehicle
 from deadtime.logs.latencies._moves import Moves
-from deadtime.logs.latencies._relation import LoopLatency, relation_of
+from deadtime.logs.latencies._relation import FEW, LoopLatency, relation_of
 from deadtime.logs.latencies._table import HEADS, LatencyTable, cells_of
-from deadtime.logs.latencies._windows import parts_of, prepared, together_of, windows_of
+from deadtime.logs.latencies._windows import (
+    moving_of,
+    parts_of,
+    prepared,
+    together_of,
+    windows_of,
+)
 from deadtime.logs.latencies._words import in_full
 from deadtime.recordings import Recording
 
 #: Standard error as a share of a time above which it is no headline while there is a better one.
 WIDE = 0.5
+
+#: Where a recording of few moves belongs.
+OF_A_PROCESS = Advice(
+    "of a bump test, deadtime estimate finds the dead time, and deadtime tune gains", ""
+)
 
 #: A function that is called with the time of each loop, or whether to print them.
 Found: TypeAlias = bool | Callable[[LoopLatency], object]
@@ -452,11 +463,16 @@ def _of_recording(recording: Recording) -> Latency:
         )  # fmt: skip
     whole, parts = parts_of(told)
     one = relation_of(LoopLatency(name, "", "", command, "none", ""), parts, whole.window)
+    further: tuple[Advice, ...] = ()
+    count = len(moving_of(parts))
+    if one.verdict == "none" and count < min(FEW, len(parts)):
+        why = f"the {command} moves in {count} of {len(parts)} parts, and a time needs {FEW}"
+        one, further = replace(one, reason=why), (OF_A_PROCESS,)
     if recording.sent is not None and one.verdict != "none":
         clocks = (("the commands", recording.sent.time), ("the rows", recording.time))
         if why := why_two_clocks(one, *clocks):
             one = one.doubted(why)
-    return Latency(name, _vehicle_of(recording), (one,))
+    return Latency(name, _vehicle_of(recording), (one,), advice=further)
 
 
 def _name_of(recording: Recording) -> str:

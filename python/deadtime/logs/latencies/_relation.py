@@ -307,8 +307,8 @@ def _why_doubtful(found: LoopLatency) -> str:
     needed = MANY if _is_coloured(fit) else FEW
     if len(found.times) < needed:
         return (
-            f"{len(found.times)} windows show the time by themselves: {needed} are needed to know "
-            "how much it varies over the log"
+            f"too few windows determine the time by themselves, {len(found.times)} where {needed} "
+            "are needed"
         )
     return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason
 

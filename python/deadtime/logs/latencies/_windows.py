@@ -221,6 +221,12 @@ def best_of(windows: Sequence[Window]) -> Windows:
     return sorted(chosen)
 
 
+def moving_of(windows: Sequence[Window]) -> list[Window]:
+    """The windows in which the command moves."""
+    least = STILL * max((one.movement for one in windows), default=0.0)
+    return [one for one in windows if one.movement > least]
+
+
 def grouped(windows: Sequence[Window], most: int) -> list[list[Window]]:
     """About so many groups of neighbouring windows that move, in order, as far as rows allow."""
     least = STILL * max((one.movement for one in windows), default=0.0)

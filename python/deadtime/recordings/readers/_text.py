@@ -21,6 +21,12 @@ DELIMITERS = (",", ";", "\t", " ")
 #: Marks at the begin of a text in UTF-16.
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
+#: Most characters of a line that a message shows.
+SHOWN = 40
+
+#: A cell that is a number, a date or empty, and so no name of a column.
+_VALUE = re.compile(r"([-+]?[\d.,]*\d[.,]?(e[-+]?\d+)?|nan|\d{4}-\d\d-\d\d[T \d:.,+Z-]*)?", re.I)
+
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -137,7 +143,10 @@ def _unpacked(path: object, raw: bytes) -> bytes:
 def header_of(
     path: object, line: str, wanted: Collection[str], delimiter: str | None
 ) -> tuple[list[str], str]:
-    """Names of the columns, and the separator: where none is given, one that finds most of them."""
+    """Names of the columns, and the separator: where none is given, one that finds most of them.
+
+    Numbers are names only where one of them is wanted.
+    """
     headers, wrong = {}, None
     for one in delimiter or DELIMITERS:
         try:
@@ -147,7 +156,17 @@ def header_of(
     if not headers:
         raise RecordingError(f"{path} is not a CSV file: {wrong}")
     best = max(headers, key=lambda one: (len({*wanted} & {*headers[one]}), len(headers[one]) > 1))
+    if {*wanted}.isdisjoint(headers[best]) and any(map(_are_values, headers.values())):
+        raise RecordingError(
+            f"{path}: the first line holds numbers, {line.strip()[:SHOWN]!r}: add a line with the "
+            "names of the columns above it, such as time,reference,output,command"
+        )
     return headers[best], best
+
+
+def _are_values(row: list[str]) -> bool:
+    """Whether cells are those of a sample, and no names."""
+    return any(row) and all(_VALUE.fullmatch(cell) for cell in row)
 
 
 def cells(line: str, delimiter: str) -> list[str]:
