@@ -190,6 +190,22 @@ def test_names_follow_the_version():
     assert "set d_max_roll = 0" in line
 
 
+@pytest.mark.parametrize(
+    ("loop", "version", "named"),
+    [
+        ("yaw rate", "4.5", "ATC_RAT_YAW_FLTE"),
+        ("vertical speed", "4.5", "PSC_VELZ_FLTE"),
+        ("vertical speed", "4.7", "PSC_D_VEL_FLTE"),
+        ("north velocity", "4.5", "PSC_VELXY_FLTE"),
+        ("roll rate", "4.5", ""),
+    ],
+)
+def test_a_filter_of_the_error_that_is_on_by_default_is_named(loop, version, named):
+    notes = " ".join(settings_of(dtm.PI(0.05, 0.1), "ardupilot", loop=loop, version=version).notes)
+    assert named in notes
+    assert ("filters the error" in notes) == bool(named)
+
+
 def test_files_of_ground_stations_are_read():
     text = "# written by\n1\t1\tMC_ROLLRATE_K\t2.0\t9\n1\t1\tMC_ROLLRATE_P\t0.1\t9\n"
     assert controller_of(text, "px4", loop="roll rate") == dtm.P(0.2)

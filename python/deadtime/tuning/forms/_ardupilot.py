@@ -1,7 +1,8 @@
 """Parameters of ArduPilot's Copter.
 
 The rate loops (`ATC_RAT_*`) are an `AC_PID`: on the error in rad/s, to the motors' full torque,
--1 to 1; its derivative is that of the error, behind FLTD of one pole. The angle loops
+-1 to 1; its derivative is that of the error, behind FLTD of one pole. FLTE, another pole on the
+error, is 0 by default but for yaw, velocities and the vertical acceleration. The angle loops
 (`ATC_ANG_*_P`) and position loops (`PSC_POSXY_P`, `PSC_POSZ_P`) are proportional, in 1/s, while
 the error is small against the limits of acceleration. The velocity loops (`PSC_VEL*`) give an
 acceleration; the vertical acceleration loop (`PSC_ACCZ_*`) works in cm/s² and gives thousandths of
@@ -35,15 +36,17 @@ SMALL = (
     "acceleration limit; the gain is that for small errors."
 )
 
+FILTERED = (
+    "The firmware filters the error too, at {name}_FLTE. The design does not include this filter: "
+    "set it to 0, or to at least ten times the crossover frequency."
+)
+
 #: The first firmware with the names of 4.7.
 RENAMED = (4, 7)
 
 
-def _rate(axis: str) -> FirmwareLoop:
-    name = f"ATC_RAT_{axis}"
-    return FirmwareLoop(
-        f"{name}_P", f"{name}_I", f"{name}_D", f"{name}_FLTD", units="rad/s to torque, -1 to 1"
-    )
+def _rate(axis: str, note: str = "") -> FirmwareLoop:
+    return _pid(f"ATC_RAT_{axis}", 1.0, "rad/s to torque, -1 to 1", note)
 
 
 def _angle(axis: str) -> FirmwareLoop:
@@ -51,6 +54,11 @@ def _angle(axis: str) -> FirmwareLoop:
 
 
 def _cascade(name: str, scale: float = 1.0, units: str = "", note: str = "") -> FirmwareLoop:
+    return _pid(name, scale, units, f"{note} {FILTERED}".strip())
+
+
+def _pid(name: str, scale: float, units: str, note: str) -> FirmwareLoop:
+    note = note.format(name=name)
     return FirmwareLoop(
         f"{name}_P", f"{name}_I", f"{name}_D", f"{name}_FLTD", scale=scale, units=units, note=note
     )
@@ -62,7 +70,7 @@ VELOCITY = _cascade("PSC_VELXY", units="m/s to m/s²", note=BOTH)
 LOOPS = {
     "roll rate": _rate("RLL"),
     "pitch rate": _rate("PIT"),
-    "yaw rate": _rate("YAW"),
+    "yaw rate": _rate("YAW", FILTERED),
     "roll": _angle("RLL"),
     "pitch": _angle("PIT"),
     "yaw": _angle("YAW"),
@@ -101,6 +109,7 @@ def _renamed(found: FirmwareLoop) -> FirmwareLoop:
                 integral=found.integral.replace(old, new),
                 derivative=found.derivative.replace(old, new),
                 corner=found.corner.replace(old, new),
+                note=found.note.replace(old, new),
                 scale=1.0,
             )
     return found
