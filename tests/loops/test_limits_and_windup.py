@@ -326,3 +326,10 @@ def test_a_sweep_over_guarded_loops_is_that_of_each():
         info = one.step_response(np.linspace(0.0, 60.0, 6001)).info()
         assert measured["overshoot"][i] == pytest.approx(info["overshoot"], abs=1e-3)
         assert measured["settling_time"][i] == pytest.approx(info["settling_time"], abs=1e-3)
+
+
+def test_an_array_of_two_bounds_is_a_limit():
+    loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0), delay=0.3, limit=np.array([-1.0, 2.0]))
+    assert loop.specification.bounds == (-1.0, 2.0)
+    with pytest.raises(ValueError, match="the least and the greatest command"):
+        loop.replace(limit=np.array([1.0, 2.0, 3.0]))

@@ -319,7 +319,7 @@ def _limit(limit: Any) -> Any:
     """Check the limit of a command; one number where both bounds are alike."""
     if isinstance(limit, UnequalLimits):
         return limit
-    if not isinstance(limit, (tuple, list)):
+    if not (isinstance(limit, (tuple, list)) or np.ndim(limit) == 1):
         return positive("limit", limit)
     if len(limit) != 2:
         raise ValueError(f"limit={limit!r}: give a number, or the least and the greatest command")
