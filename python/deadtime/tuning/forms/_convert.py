@@ -72,7 +72,7 @@ def settings_of(
         raise ValueError(f"spans={spans}: a proportional band is for ideal, series and parallel")
     if form == "betaflight":
         return _betaflight.write(controller, loop, _numbers(version))
-    where = _ardupilot if form == "ardupilot" else _px4
+    where = _FIRMWARES[form]
     found = _loop_of(form, loop, version)
     return _firmware.written(controller, found, form, loop, where.WRITTEN, where.SOURCE)
 
@@ -87,8 +87,8 @@ def check_form(controller: Controller, form: Form, loop: str, version: str = "")
 
 
 def _loop_of(form: Form, loop: str, version: str) -> _firmware.FirmwareLoop:
-    loops = _ardupilot.loops(_numbers(version)) if form == "ardupilot" else _px4.LOOPS
-    return loops[loop]
+    found: _firmware.FirmwareLoop = _FIRMWARES[form].loops(_numbers(version))[loop]
+    return found
 
 
 def controller_of(
@@ -130,10 +130,12 @@ def controller_of(
         return _classical.read(settings, form)
     if form == "betaflight":
         return _betaflight.read(settings, loop)
-    pattern = _ardupilot.LINE if form == "ardupilot" else _px4.LINE
     found = _loop_of(form, loop, version)
-    return _firmware.controller_of(numbers_from(settings, form, pattern), found)
+    return _firmware.controller_of(numbers_from(settings, form, _FIRMWARES[form].LINE), found)
 
+
+#: Firmwares whose loops are a table of parameters.
+_FIRMWARES = {"ardupilot": _ardupilot, "px4": _px4}
 
 #: The loops of each firmware.
 LOOPS_OF_FORMS: dict[str, tuple[str, ...]] = {

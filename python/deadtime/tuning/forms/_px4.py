@@ -64,3 +64,9 @@ LOOPS = {
     "vertical speed": _velocity("MPC_Z_VEL", (2.0, 15.0)),
     "altitude": FirmwareLoop("MPC_Z_P", units="m to m/s", span=(0.0, 1.5)),
 }
+
+
+def loops(version: tuple[int, ...] | None) -> dict[str, FirmwareLoop]:
+    """The loops by name; no version has other names."""
+    del version
+    return LOOPS
