@@ -133,7 +133,9 @@ def test_a_real_flight_by_both_methods():
     said = " ".join(out["explanation"])
     assert "differ" in said
     assert "gain is not 1" in said
-    assert "The fit without a further lag is an indication: the residuals are not white" in said
+    assert (
+        "The fit without a further lag is only an indication: the residuals are not white" in said
+    )
 
 
 def test_a_real_flight_without_overshoot():

@@ -65,9 +65,12 @@ REFUSED = [
         "--loop is missing: the loops of ardupilot are roll rate",
     ),
     (["bump.csv", "--form", "px4", "--loop", "rol"], "--loop rol: the loops of px4 are roll rate"),
-    (["bump.csv", "--loop", "roll"], "--loop is for a vehicle, and the form parallel is not"),
-    (["bump.csv", "--firmware", "4.5"], "--firmware is for a vehicle"),
-    (["bump.csv", "--filter-hz", 2], "--filter-hz is for a derivative"),
+    (
+        ["bump.csv", "--loop", "roll"],
+        "--loop needs the form of a vehicle, and the form parallel is not",
+    ),
+    (["bump.csv", "--firmware", "4.5"], "--firmware needs the form of a vehicle"),
+    (["bump.csv", "--filter-hz", 2], "--filter-hz is the filter of a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]
 

@@ -94,7 +94,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--gains", "fast"), "numbers with commas"),
         (("--gains", ""), "no gains to fly"),
         (("--max-height", "1.2"), "outside 0.2 to 1.2 m"),
-        (("--host", "127.0.0.1", "--virtual-time"), "leave one option out"),
+        (("--host", "127.0.0.1", "--virtual-time"), "leave one of the two options out"),
         (("--max-climb", "nan"), "max_climb"),
         (("--axes", "z,w"), "give some of z, x, y, yaw"),
         (("--gains", "x=1"), "the axis x is not flown"),

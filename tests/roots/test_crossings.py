@@ -212,7 +212,7 @@ def test_results_do_not_change_and_survive_pickling():
 REFUSED = [
     (s + K * delay(1.0), {"Kp": (0, 1)}, None, "Kp: no such parameter"),
     (s + K * delay(T), {"K": (0, 1)}, None, "no value for T"),
-    (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "has a range and the value"),
+    (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "has both a range and the value"),
     (s + K * delay(1.0), {"K": (1, 1)}, None, "below its high end"),
     (s + K * delay(1.0), {}, None, "crossings are those of one"),
     (s + T * delay(T), {"T": (0, 1)}, None, "both a factor and a delay"),

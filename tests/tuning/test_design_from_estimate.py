@@ -120,7 +120,9 @@ def test_a_filter_is_chosen_for_a_region(fit):
 def test_an_indication_is_refused_by_name():
     fit = estimate("delay", "gain")
     assert fit.verdict != "reliable"
-    with pytest.raises(ValueError, match=r"indication.*the plant lacks it.*allow_indication=True"):
+    with pytest.raises(
+        ValueError, match=r"indication.*the plant lacks a lag.*allow_indication=True"
+    ):
         dtm.design(fit, controller=dtm.P, objective="abscissa")
     best = dtm.design(
         fit, controller=dtm.P, gain_margin=2.5, allow_indication=True, objective="abscissa"

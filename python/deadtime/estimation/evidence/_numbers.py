@@ -202,7 +202,7 @@ class FoundPlant(ReadOnlyArrays):
             raise ValueError(f"no interval: {self.reason}")
         if name not in self.intervals:
             names = ", ".join(self.intervals)
-            raise ValueError(f"{name!r} has no interval, there are those of {names}")
+            raise ValueError(f"{name!r} has no interval; there are intervals only for {names}")
 
     def value(self, name: str) -> float:
         """The number that an interval belongs to.
