@@ -207,7 +207,7 @@ def test_a_simulation_and_its_file(tmp_path):
 @pytest.mark.parametrize("command", ["estimate", "report"])
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "no file"), (b"", "is empty"), (bytes(range(256)) * 4, "not a text file")],
+    [(None, "no file"), (b"", "is empty"), (bytes(range(256)) * 4, "neither a text file")],
 )
 def test_files_that_cannot_be_read(tmp_path, command, content, words):
     file = tmp_path / "flight.csv"
@@ -239,7 +239,7 @@ BAD_NUMBERS = [
     (["design", "--delay", "0.1", "--fix", "2"], "Kp=2"),
     (["design", "--delay", "0.1", "--fix", "Ki=2"], "Ki"),
     (["design", "--delay", "0.1", "--gain-margin", "0.5"], "gain_margin"),
-    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "take one"),
+    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "give only one of them"),
     (["simulate", "--kp", "2", "--delay", "-1"], "delay"),
     (["simulate", "--kp", "0", "--delay", "1"], "Kp"),
     (["simulate", "--kp", "nan", "--delay", "1"], "nan"),

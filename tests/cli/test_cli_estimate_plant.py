@@ -128,7 +128,7 @@ def test_a_named_plant_is_fitted_and_a_better_one_is_told(files):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--ki", 1], "--ki is for a loop with a known controller"),
+        (["--ki", 1], "--ki needs a known controller"),
         (["--method", "gcc"], "--method: this option needs a known controller"),
         (["--check"], "--check: this option needs a known controller"),
         (["--plant", "1/(s+1)"], "--plant 1/(s+1): without --kp, give one of 'delay', 'lag'"),

@@ -115,7 +115,7 @@ def test_an_error_lists_what_exists(table, log, tmp_path):
     said = one_clear_line(run("latency", bag))
     assert "/cmd_vel:linear.x" in said
     assert "--time" in one_clear_line(run("latency", log, "--time", "t"))
-    assert "has one loop" in one_clear_line(
+    assert "has only one loop" in one_clear_line(
         run("latency", table, "--time", "hours", "--command", "inflow", "--output", "level_now",
             "--axis", "roll")
     )  # fmt: skip

@@ -86,4 +86,4 @@ def test_what_makes_no_sense_is_refused(folder, options, why):
 def test_what_refuses_each_loop_of_a_log_names_it_once(folder):
     done = run("tune", "bare.bin", cwd=folder)
     assert done.returncode == 3
-    assert "can be tuned: roll rate: the log holds no gain of this loop" in done.stderr
+    assert "can be tuned: roll rate: the log has no gain of this loop" in done.stderr

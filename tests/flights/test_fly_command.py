@@ -98,7 +98,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--max-climb", "nan"), "max_climb"),
         (("--axes", "z,w"), "give some of z, x, y, yaw"),
         (("--gains", "x=1"), "the axis x is not flown"),
-        (("--axes", "x", "--virtual-time"), "no axis x that takes speed commands, only z"),
+        (("--axes", "x", "--virtual-time"), "takes no speed commands on the axis x, only on z"),
         (("--step", "-0.2"), "step"),
         (("--step", "1e-5"), "within the noise"),
         (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),

@@ -167,7 +167,7 @@ def test_what_is_no_bag_is_refused(tmp_path):
     path = tmp_path / "a.mcap"
     for data, message in (
         (b"time,x\n0,1\n", "is a text"),
-        (b"\x07\x03\x01\x02", "is no bag"),
+        (b"\x07\x03\x01\x02", "is not a bag"),
         (b"\x89MCAP0\r\n", "without a message that can be read"),
     ):
         path.write_bytes(data)
@@ -227,7 +227,7 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
         log.finish()
     bag = open_bag(path)
     assert list(bag.topics) == ["/known"]
-    assert bag.remarks == ("not decoded, in an encoding that is not known: /strange",)
+    assert bag.remarks == ("not decoded, because the encoding is not known: /strange",)
 
 
 @pytest.mark.parametrize(

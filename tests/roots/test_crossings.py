@@ -214,7 +214,7 @@ REFUSED = [
     (s + K * delay(T), {"K": (0, 1)}, None, "no value for T"),
     (s + K * delay(T), {"K": (0, 1)}, {"K": 1.0, "T": 1.0}, "has both a range and the value"),
     (s + K * delay(1.0), {"K": (1, 1)}, None, "below its high end"),
-    (s + K * delay(1.0), {}, None, "crossings are those of one"),
+    (s + K * delay(1.0), {}, None, "crossings need exactly one"),
     (s + T * delay(T), {"T": (0, 1)}, None, "both a factor and a delay"),
     (s + K**2 * delay(1.0), {"K": (0, 1)}, None, "only as a factor"),
     (s + delay(T) + delay(7 * T), {"T": (0, 1)}, None, "several delays"),
@@ -292,7 +292,7 @@ def test_an_unstable_loop_has_no_delay_margin():
             dtm.delay_margin(loop, at=at)
     with pytest.raises(ValueError, match="parameters are delays"):
         dtm.delay_margin(s + K, at={"K": 1.0})
-    with pytest.raises(TypeError, match="has its numbers"):
+    with pytest.raises(TypeError, match="already has its parameters"):
         dtm.delay_margin(unstable, at={"Kp": 1.0})
     with pytest.raises(TypeError, match="loop of type float"):
         dtm.delay_margin(1.0)

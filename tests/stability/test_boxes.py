@@ -414,7 +414,7 @@ def test_robust_map_includes_delays_between_the_ends():
 
 def test_robust_map_refuses_what_makes_no_sense():
     ranges = {"Kp": (0, 6), "Kv": (-1, 1)}
-    with pytest.raises(ValueError, match="axis and has an interval"):
+    with pytest.raises(ValueError, match="an axis and an interval"):
         dtm.robust_map(VELOCITY, ranges, {"Kp": (0, 1)})
     with pytest.raises(ValueError, match="one to three"):
         dtm.robust_map(VELOCITY, ranges, {})

@@ -227,7 +227,7 @@ UNREADABLE = [
     ("nothing", "px4", "roll rate", "no line of the text"),
     ("set p_roll = 45\nset d_roll = 40\nset d_min_roll = 30", "betaflight", "roll rate", "moves"),
     ("set p_roll = many", "betaflight", "roll rate", "give a number"),
-    ("Kc = 1\nTx = 3", "ideal", "", "no number of the form"),
+    ("Kc = 1\nTx = 3", "ideal", "", "not a parameter of the form"),
     ("Kc = 1.2\nTi = 40,5", "ideal", "", "Ti = 40,5: give one number a line"),
     ("Kc = 1.2\nTi = 2 min", "ideal", "", "times in seconds"),
     ("Kc=2 Ti=10", "series", "", "one number a line"),

@@ -31,7 +31,8 @@ COMMANDS = {
     "design": "Find the gains with the best worst case, within given margins.",
     "tune": "Propose gains from a recording, in the form of your controller, with predicted "
     "responses.",
-    "reproduce": "Reproduce the paper on delays in quadrotor control, and compare each printed number.",
+    "reproduce": "Reproduce the paper on delays in quadrotor control, and compare each "
+    "printed number.",
     "fly": "Fly steps under P control, estimate the delay, design PV gains, fly with them, land.",
     "watch": "Follow the delay of a running loop row by row, with its interval.",
     "internet-loop": "Control an integrator over UDP, estimate its delay, and measure the delay.",

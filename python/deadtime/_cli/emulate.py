@@ -117,7 +117,8 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
     options = emulator.options
     warning = (
         f"{options.host} can be reached by other computers. Only {', '.join(options.clients)} is "
-        "answered, but addresses can be forged, and there is no authentication. Use a closed network."
+        "answered, but addresses can be forged, and there is no authentication. Use a closed "
+        "network."
     )
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)

@@ -303,7 +303,8 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
     found = past(start)
     if found is None:
         raise TypeError(
-            f"history at t={start} returned None: end it with a return statement that gives the values"
+            f"history at t={start} returned None: end it with a return statement that gives "
+            "the values"
         )
     value = np.atleast_1d(real_array(f"history at t={start}", found))
     if value.ndim != 1:
