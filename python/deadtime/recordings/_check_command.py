@@ -242,7 +242,7 @@ def _is_relay(command: Array | None) -> bool:
 def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
     """A command that is not that of the controller: another sign, unit or gain, or unrelated."""
     loose = (
-        "a fit of the loop would attribute the difference to the delay, but a fit of the "
+        "a fit of the loop would attribute the difference to the delay; a fit of the "
         "response to the logged command (method='output_error') does not depend on it"
     )
     if line is None or line.explained < EXPLAINED:

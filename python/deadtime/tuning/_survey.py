@@ -80,7 +80,7 @@ def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
     )
     late = " or ".join(f"{delay:g}" for delay in problem.delays)
     raise ValueError(
-        f"of the gains of {'x'.join(map(str, counts))} that were tried in {tried}, none is "
+        f"of {'x'.join(map(str, counts))} gains that were tried in {tried}, none is "
         f"stable for a delay of {late} s. Other gains may be stable: give other ranges="
     )
 
