@@ -302,9 +302,9 @@ def test_what_cannot_be_fitted_is_refused_always(files, more, words):
     ("more", "words"),
     [
         (["--kp", 2, "--method", "guess"], "not one of all, auto, output_error"),
-        (["--kp", 2, "--kp", 3], "1 file and 2 of --kp"),
-        (["--kp", 2, "--noise", "loop"], "--noise is for one method"),
-        (["--kp", 2, "--initial-output", 0], "--initial-output is for one method"),
+        (["--kp", 2, "--kp", 3], "1 file and 2 values of --kp"),
+        (["--kp", 2, "--noise", "loop"], "--noise applies to one method only"),
+        (["--kp", 2, "--initial-output", 0], "--initial-output applies to one method only"),
         (
             ["--kp", 2, "--method", "gcc", "--noise", "loop"],
             "--noise is not an option of --method gcc",
@@ -317,7 +317,7 @@ def test_what_cannot_be_fitted_is_refused_always(files, more, words):
         (["--kp", 2, "--method", "gcc", "--free", "delay,gain"], "gcc does not fit gain, only"),
         (["--kp", 2, "--filter", 20], "--filter is the filter of the derivative"),
         (["--kp", 2, "--kv", 0.1, "--ki", 0.1], "give --kv, or the others"),
-        (["--kp", 2, "--kd", 0.1, "--kd", 0.2], "1 file and 2 of --kd"),
+        (["--kp", 2, "--kd", 0.1, "--kd", 0.2], "1 file and 2 values of --kd"),
         (["--kp", "nan"], "--kp is nan"),
         (["--kp", 2, "--method", "cta"], "continuous loops"),
         (["--kp", 2, "--method", "relay"], "no limit cycle"),

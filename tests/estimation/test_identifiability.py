@@ -403,7 +403,7 @@ def flat(value=0.0):
     ("loop", "experiment", "options", "match"),
     [
         (held_loop(lag=0.1), flat(), {}, "does not excite"),
-        (held_loop(lag=0.1), flat(1e3), {}, "1 throughout, at its limit"),
+        (held_loop(lag=0.1), flat(1e3), {}, "at its limit throughout, 1"),
         (
             held_loop(delay=3.0),
             dtm.Experiment.step(2.0, 0.5),
@@ -414,7 +414,7 @@ def flat(value=0.0):
             held_loop(),
             dtm.Experiment.step(),
             {"free": ("delay", "gain", "lag")},
-            "assume a lag",
+            "Assume a lag",
         ),
         (
             dtm.ControlLoop(
@@ -422,7 +422,7 @@ def flat(value=0.0):
             ),
             dtm.Experiment.step(),
             {"free": ("delay",)},
-            "straight to its output",
+            "direct feedthrough",
         ),
     ],
 )
@@ -437,7 +437,7 @@ def test_what_an_experiment_cannot_identify_is_refused_with_the_reason(
     ("change", "match"),
     [
         ({"noise": 0.0}, "noise"),
-        ({"free": ("delay", "offset")}, "choose from"),
+        ({"free": ("delay", "offset")}, "choose one or more of"),
         ({"initial_output": 1.0}, "rest at zero"),
         ({"flights": -1}, "flights"),
         ({"loop": held_loop().replace(delay=None), "free": ("delay",)}, "delay"),

@@ -211,7 +211,7 @@ def test_what_is_wrong_is_said():
         OnlineEstimator(LOOP.replace(plant=dtm.Integrator()), lags=(0.1, 0.2))
     with pytest.raises(ValueError, match="noise=0"):
         OnlineEstimator(LOOP, noise=0.0)
-    with pytest.raises(ValueError, match="follows"):
+    with pytest.raises(ValueError, match="comes after"):
         list(OnlineEstimator(LOOP).run([(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]))
     time, output, _ = flown(5.0)
     with pytest.raises(dtm.RecordingError, match="has no command"):

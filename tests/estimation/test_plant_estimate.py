@@ -213,7 +213,7 @@ def test_the_height_servo_is_found_without_being_named(name):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"limit": 1.0}, "limit=1.0 is that of a controller"),
+        ({"limit": 1.0}, "limit=1.0 is the limit of a controller"),
         ({"controller": dtm.PI(1.0, 0.1)}, "only for a P controller"),
         ({"plant": "two poles"}, "plant='two poles' is not one of 'delay', 'lag'"),
         ({"largest_delay": 0.0}, "largest_delay"),

@@ -168,7 +168,7 @@ def test_a_growing_error_ends_the_flight(tmp_path):
 def test_a_base_far_from_the_hover_height_is_reported_before_it_is_commanded(tmp_path):
     vehicle = SimulatedVehicle()
     plan = FlightPlan(base=2.0)
-    with pytest.raises(FlightAbortedError, match=r"hovers at 0\.75 m: .* 2 m, .* Begin closer"):
+    with pytest.raises(FlightAbortedError, match=r"hovers at 0\.75 m\. .* 2 m, .* Begin closer"):
         fly_experiment(lambda: vehicle, plan, tmp_path, run=run)
     assert vehicle.log == ["connected", "took off", "landed", "closed"]
 

@@ -97,7 +97,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--host", "127.0.0.1", "--virtual-time"), "leave one of the two options out"),
         (("--max-climb", "nan"), "max_climb"),
         (("--axes", "z,w"), "give some of z, x, y, yaw"),
-        (("--gains", "x=1"), "the axis x is not flown"),
+        (("--gains", "x=1"), "the axis x is not among those of --axes"),
         (("--axes", "x", "--virtual-time"), "takes no speed commands on the axis x, only on z"),
         (("--step", "-0.2"), "step"),
         (("--step", "1e-5"), "within the noise"),

@@ -178,7 +178,7 @@ def test_what_is_no_bag_is_refused(tmp_path):
     named = tmp_path / "bag.dat"
     bags.ros1(tmp_path / "a.bag")
     (tmp_path / "a.bag").rename(named)
-    with pytest.raises(dtm.RecordingError, match=r"let its name end in \.bag"):
+    with pytest.raises(dtm.RecordingError, match=r"its name ends in \.bag"):
         open_bag(named)
     with pytest.raises(dtm.RecordingError, match=r"open it with deadtime\.logs\.open_bag"):
         dtm.open_log(named)
