@@ -332,7 +332,7 @@ def test_invalid_combinations_of_options(files, more, words):
     ("more", "words"),
     [
         (["--method", "all"], "by --method output_error or waveform"),
-        (["--method", "overshoot"], "takes one recording, not 2"),
+        (["--method", "overshoot"], "takes one recording, but 2"),
         (["--kp", 1, "--kp", 3], "2 files and 3 of --kp"),
     ],
 )

@@ -437,7 +437,7 @@ def test_what_an_experiment_cannot_identify_is_refused_with_the_reason(
     ("change", "match"),
     [
         ({"noise": 0.0}, "noise"),
-        ({"free": ("delay", "offset")}, "choose one or more of"),
+        ({"free": ("delay", "offset")}, "choose from"),
         ({"initial_output": 1.0}, "rest at zero"),
         ({"flights": -1}, "flights"),
         ({"loop": held_loop().replace(delay=None), "free": ("delay",)}, "delay"),

@@ -240,7 +240,7 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
     with pytest.raises(ValueError, match="no recording was given"):
         dtm.estimate_delay([])
-    with pytest.raises(ValueError, match="omega=-1 rad/s is not above zero"):
+    with pytest.raises(ValueError, match="omega=-1 rad/s: give a frequency above zero"):
         fit.at([-1.0])
     with pytest.raises(ValueError, match="'zeros' has no interval"):
         fit.ci(0.95, "zeros")

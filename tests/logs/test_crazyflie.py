@@ -119,7 +119,7 @@ def test_damage_to_the_end_is_named():
     contents = read_crazyflie(log, "log00")
     assert_fixed(contents, fixed(20))
     place = len(fixed_log(20))
-    assert f"The part from byte {place} of {place + 100} is damaged" in contents.remarks[1]
+    assert f"The part from byte {place} of {place + 100} on is damaged" in contents.remarks[1]
 
 
 def named(text):

@@ -48,7 +48,7 @@ def checked_names(
         free = (free,)
     unknown = [name for name in free if name not in known]
     if unknown or not free:
-        raise ValueError(f"free={tuple(free)!r}: choose one or more of {known}")
+        raise ValueError(f"free={tuple(free)!r}: choose from {known}")
     given = {"delay", "start"}
     missing = [name for name in free if name not in given and name not in loop.parameters]
     if missing:
