@@ -56,7 +56,7 @@ def test_the_demo_is_a_paragraph_that_names_the_truth_once(demo):
     assert "inf" not in printed
     assert "paper" not in printed
     last = printed.rstrip().splitlines()[-2:]
-    assert last == ["open demo/report.html", "your own file: deadtime estimate FILE"]
+    assert last == ["open demo/report.html", "to use your own file: deadtime estimate FILE"]
 
 
 def test_all_methods_of_the_demo_are_shown_where_asked_for(all_of_demo):

@@ -48,7 +48,7 @@ def checked_names(
         free = (free,)
     unknown = [name for name in free if name not in known]
     if unknown or not free:
-        raise ValueError(f"free={tuple(free)!r}: choose from {known}")
+        raise ValueError(f"free={tuple(free)!r}: choose from {known}, at least one")
     given = {"delay", "start"}
     missing = [name for name in free if name not in given and name not in loop.parameters]
     if missing:
