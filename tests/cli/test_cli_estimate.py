@@ -333,7 +333,7 @@ def test_invalid_combinations_of_options(files, more, words):
     [
         (["--method", "all"], "by --method output_error or waveform"),
         (["--method", "overshoot"], "takes one recording, but 2"),
-        (["--kp", 1, "--kp", 3], "2 files and 3 of --kp"),
+        (["--kp", 1, "--kp", 3], "2 files and 3 values of --kp"),
     ],
 )
 def test_invalid_combinations_of_options_for_several_files(files, more, words):

@@ -139,7 +139,7 @@ def test_jumps_of_the_solution_return_after_the_delay():
         ({"t_eval": [2.0]}, "t_span"),
         ({"fun": lambda t, y, z: [1.0, 2.0]}, r"shape \(2,\) at t=0"),
         ({"fun": lambda t, y, z: np.zeros((1, 3)), "vectorized": True}, r"\(1, 3\) for"),
-        ({"fun": lambda t, y, z: np.full(1, np.nan)}, r"not finite from t=0"),
+        ({"fun": lambda t, y, z: np.full(1, np.nan)}, r"not finite at t=0"),
         ({"events": lambda t, y: [1.0, 2.0]}, "event 0 returned shape"),
         ({"events": lambda t, y: np.nan}, "event 0 is nan"),
         ({"jumps": [(0.5, lambda t, y: [1.0, 2.0])]}, "change at t=0.5"),

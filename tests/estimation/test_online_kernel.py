@@ -193,7 +193,7 @@ def test_what_is_wrong_is_said_with_its_value():
         bank.row(2.0, math.inf)
     for changed, words in (
         ({"delays": [0.1, 0.2]}, "2 delays"),
-        ({"delays": [0.3, 0.2, 0.1]}, "comes after 0.3"),
+        ({"delays": [0.3, 0.2, 0.1]}, "follows 0.3"),
         ({"white": 0.0}, "white noise of 0"),
         ({"level": 1.0}, "a level of 1"),
         ({"layers": [([-0.1], 0.0, [0.0] * 5)]}, "the lag -0.1 s"),

@@ -366,7 +366,7 @@ GOOD = {"Kp": (0.0, 6.0), "Kv": (-1.0, 1.0)}
     [
         ({"Kp": (0, 1)}, "a map has two"),
         ({"Kp": (0, 1), "Kv": (0, 1), "T": (0, 1)}, "a map has two"),
-        ({"Kp": (0, 1), "Kd": (0, 1)}, r"Kd is not a parameter.*Kp, Kv"),
+        ({"Kp": (0, 1), "Kd": (0, 1)}, r"Kd: no such parameter.*Kp, Kv"),
         ({"Kp": (1, 1), "Kv": (0, 1)}, "low end"),
         ({"Kp": (1, 0), "Kv": (0, 1)}, "low end"),
         ({"Kp": (0, np.inf), "Kv": (0, 1)}, "finite"),

@@ -159,7 +159,7 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         unknown = [name for name in names if name not in self._names]
         if unknown:
             raise ValueError(
-                f"{', '.join(unknown)} is not a parameter of this expression; there "
+                f"{', '.join(unknown)}: no such parameter, there "
                 + (f"is {', '.join(self._names)}" if self._names else "is none")
             )
 

@@ -233,7 +233,7 @@ class FoundPlant(ReadOnlyArrays):
         given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
         bad = given[~(given > 0.0)]
         if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s is not above zero")
+            raise ValueError(f"omega={bad[0]:g} rad/s: give a frequency above zero")
         found = self._answer().at(given.tolist())
         values = {name: np.array(found[name][0]) for name in ("gain", "phase", "delay")}
         ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}
