@@ -202,7 +202,7 @@ REFUSED = [
     (dtm.PV(0.1, 0.003, SMOOTH), "ardupilot", "roll rate", "takes the derivative of the error"),
     (dtm.PI(0.1, 0.1, weight=0.5), "px4", "roll rate", "no weight of the set point"),
     (dtm.PI(82.0, 900.0, weight=0.5), "betaflight", "roll rate", "no weight of P"),
-    (dtm.PI(1.0, 0.1, feed_forward=1.0), "ideal", "", "without one"),
+    (dtm.PI(1.0, 0.1, feed_forward=1.0), "ideal", "", "without feed-forward"),
     (dtm.PD(0.1, 0.003, dtm.DerivativeFilter(200.0)), "ardupilot", "roll rate", "has one pole"),
     (dtm.PD(0.1, 0.003, dtm.DerivativeFilter(200.0)), "px4", "roll rate", "has one pole"),
     (dtm.PD(82.0, 0.9, dtm.DerivativeFilter(200.0, 0.5)), "betaflight", "roll rate", "PT1"),

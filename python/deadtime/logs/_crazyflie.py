@@ -75,7 +75,7 @@ def read_crazyflie(data: bytes, source: str) -> LogContents:
     """
     if data[:1] != bytes([MARK]):
         raise RecordingError(
-            f"{source} is not a log of a Crazyflie, which would start with the byte 0xbc"
+            f"{source}: not a log of a Crazyflie, which would start with the byte 0xbc"
         )
     try:
         version, events, start = _definitions(data)

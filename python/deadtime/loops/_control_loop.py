@@ -192,7 +192,7 @@ class ControlLoop(LoopInTime, LoopPoles, LoopGain, Pictured):
                     parts[part] = parts[part]._replace(numbers)
         if changes:
             raise ValueError(
-                f"{', '.join(changes)} is not a number of this loop, which has "
+                f"{', '.join(changes)}: no such number in this loop, which has "
                 f"{', '.join(self.parameters)}"
             )
         return ControlLoop(**parts)

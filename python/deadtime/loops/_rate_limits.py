@@ -67,7 +67,7 @@ class RateLimited(Plant):
     >>> loop = dtm.ControlLoop(plant, dtm.P(Kp=1.0), delay=0.3)
     >>> loop.is_stable()
     Traceback (most recent call last):
-    ValueError: the plant limits the rate of its command, so it is not linear: ask ...
+    ValueError: the plant limits the rate of its command, so it is not linear. Use ...
     >>> loop.replace(plant=plant.for_small_commands()).is_stable()
     True
     """
