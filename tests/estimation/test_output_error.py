@@ -246,7 +246,10 @@ def refused(**change):
             },
             "no lag to fit",
         ),
-        ({"command": None, "loop": dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1))}, "log the"),
+        (
+            {"command": None, "loop": dtm.ControlLoop(dtm.Integrator(), dtm.PV(1.0, 0.1))},
+            "[Ll]og the",
+        ),
     ],
 )
 def test_what_cannot_be_estimated_is_refused_with_the_reason(change, match):

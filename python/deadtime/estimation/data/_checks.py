@@ -59,7 +59,7 @@ def checked_names(
         )
     if "delay" not in free and loop.delay is None:
         raise ValueError(
-            "the delay of the loop is not known, so it must be fitted: add 'delay' to `free`"
+            "the delay of the loop is unknown, so it must be fitted: add 'delay' to `free`"
         )
     return tuple(name for name in known if name in free)
 
