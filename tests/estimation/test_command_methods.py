@@ -189,7 +189,7 @@ def test_recordings_without_a_response_to_the_command_are_refused(method):
     uneven = recording.time + 0.02 * np.sin(np.arange(len(recording)))
     with pytest.raises(dtm.NotIdentifiableError, match="even"):
         estimate(replace_signals(recording, time=uneven))
-    with pytest.raises(dtm.NotIdentifiableError, match="[Ll]og the command"):
+    with pytest.raises(dtm.NotIdentifiableError, match=r"[Ll]og the command"):
         estimate(
             replace_signals(recording, command=None), known.replace(controller=dtm.PV(1.0, 0.1))
         )
