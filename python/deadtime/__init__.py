@@ -129,7 +129,9 @@ _ELSEWHERE = {
     "margin": "G.margin(), with the loop gain G, or loop.margin() of a ControlLoop",
     "nyquist": "G.nyquist()",
     "nyquist_plot": "G.nyquist()",
-    "pade": "G.to_control(pade=n) or G.to_scipy(pade=n); here delays are never approximated",
+    "pade": (
+        "G.to_control(pade=n) or G.to_scipy(pade=n); deadtime itself never approximates a delay"
+    ),
     "poles": "G.rightmost(n), or G.poles(re, im) for a region",
     "root_locus": "crossings(family, ranges), or loop.explore()",
     "ss": "DelaySystem(A, B, C, D)",

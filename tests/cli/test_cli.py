@@ -56,7 +56,7 @@ def test_the_demo_is_a_paragraph_that_names_the_truth_once(demo):
     assert "inf" not in printed
     assert "paper" not in printed
     last = printed.rstrip().splitlines()[-2:]
-    assert last == ["open demo/report.html", "your own file: deadtime estimate FILE"]
+    assert last == ["open demo/report.html", "to use your own file: deadtime estimate FILE"]
 
 
 def test_all_methods_of_the_demo_are_shown_where_asked_for(all_of_demo):
@@ -133,7 +133,9 @@ def test_a_real_flight_by_both_methods():
     said = " ".join(out["explanation"])
     assert "differ" in said
     assert "gain is not 1" in said
-    assert "The fit without a further lag is an indication: the residuals are not white" in said
+    assert (
+        "The fit without a further lag is only an indication: the residuals are not white" in said
+    )
 
 
 def test_a_real_flight_without_overshoot():
@@ -205,7 +207,7 @@ def test_a_simulation_and_its_file(tmp_path):
 @pytest.mark.parametrize("command", ["estimate", "report"])
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "no file"), (b"", "is empty"), (bytes(range(256)) * 4, "not a text file")],
+    [(None, "no file"), (b"", "is empty"), (bytes(range(256)) * 4, "neither a text file")],
 )
 def test_files_that_cannot_be_read(tmp_path, command, content, words):
     file = tmp_path / "flight.csv"
@@ -237,7 +239,7 @@ BAD_NUMBERS = [
     (["design", "--delay", "0.1", "--fix", "2"], "Kp=2"),
     (["design", "--delay", "0.1", "--fix", "Ki=2"], "Ki"),
     (["design", "--delay", "0.1", "--gain-margin", "0.5"], "gain_margin"),
-    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "take one"),
+    (["design", "--delay", "0.1", "--filter", "38", "--choose-filter"], "give only one of them"),
     (["simulate", "--kp", "2", "--delay", "-1"], "delay"),
     (["simulate", "--kp", "0", "--delay", "1"], "Kp"),
     (["simulate", "--kp", "nan", "--delay", "1"], "nan"),

@@ -196,7 +196,7 @@ def test_an_indication_says_why_and_what_to_do(files):
     wrong = ["estimate", files["lagging"], "--kp", 1.2, *FLOWN, *LOGGED]
     said = " ".join(run(*wrong, "--method", "output_error").stdout.split())
     assert re.match(r"indication: delay about [\d.]+ m?s, not claimed to hold; a further lag", said)
-    assert "makes the recording likelier: the plant lacks it" in said
+    assert "makes the recording likelier, so the plant lacks a lag" in said
     assert "next: try --free delay,gain,lag" in said
     assert "±" not in said
     right = [*wrong, "--method", "output_error", "--free", "delay,gain,lag"]
@@ -279,11 +279,11 @@ def test_a_file_may_have_a_window_of_its_own(files, tmp_path):
         (["--free", "delay,mass"], "'mass' cannot be fitted; choose from delay, gain, lag"),
         (["--free", "delay,Kp"], "'Kp' cannot be fitted"),
         (["--free", ","], "names nothing to fit: choose from delay, gain, lag"),
-        (["--free", "gain"], "the delay is not known, so name it too"),
-        (["--free", "delay,start"], "start is for --method waveform"),
+        (["--free", "gain"], "the delay is not known, so add delay to --free"),
+        (["--free", "delay,start"], "start can be fitted only by --method waveform"),
         (
             ["--free", "delay,time_constant"],
-            "this plant has no time_constant, only a plant gain/(time_",
+            "this plant has no time_constant; only a plant gain/(time_",
         ),
         (["--plant", "1/s**2", "--free", "delay,lag"], "choose from delay, gain"),
         (["--plant", "1/(2*s+1)", "--free", "lag"], "choose from delay, gain, time_constant"),
@@ -302,9 +302,9 @@ def test_what_cannot_be_fitted_is_refused_always(files, more, words):
     ("more", "words"),
     [
         (["--kp", 2, "--method", "guess"], "not one of all, auto, output_error"),
-        (["--kp", 2, "--kp", 3], "1 file and 2 of --kp"),
-        (["--kp", 2, "--noise", "loop"], "--noise is for one method"),
-        (["--kp", 2, "--initial-output", 0], "--initial-output is for one method"),
+        (["--kp", 2, "--kp", 3], "1 file and 2 values of --kp"),
+        (["--kp", 2, "--noise", "loop"], "--noise applies to one method only"),
+        (["--kp", 2, "--initial-output", 0], "--initial-output applies to one method only"),
         (
             ["--kp", 2, "--method", "gcc", "--noise", "loop"],
             "--noise is not an option of --method gcc",
@@ -313,11 +313,11 @@ def test_what_cannot_be_fitted_is_refused_always(files, more, words):
             ["--kp", 2, "--method", "output_error", "--map", "exact"],
             "--map is not an option of --method output_error",
         ),
-        (["--kp", 2, "--free", "delay"], "--free is for one method"),
+        (["--kp", 2, "--free", "delay"], "--free applies to one method only"),
         (["--kp", 2, "--method", "gcc", "--free", "delay,gain"], "gcc does not fit gain, only"),
-        (["--kp", 2, "--filter", 20], "--filter is for the derivative"),
+        (["--kp", 2, "--filter", 20], "--filter is the filter of the derivative"),
         (["--kp", 2, "--kv", 0.1, "--ki", 0.1], "give --kv, or the others"),
-        (["--kp", 2, "--kd", 0.1, "--kd", 0.2], "1 file and 2 of --kd"),
+        (["--kp", 2, "--kd", 0.1, "--kd", 0.2], "1 file and 2 values of --kd"),
         (["--kp", "nan"], "--kp is nan"),
         (["--kp", 2, "--method", "cta"], "continuous loops"),
         (["--kp", 2, "--method", "relay"], "no limit cycle"),
@@ -332,8 +332,8 @@ def test_invalid_combinations_of_options(files, more, words):
     ("more", "words"),
     [
         (["--method", "all"], "by --method output_error or waveform"),
-        (["--method", "overshoot"], "takes one recording, not 2"),
-        (["--kp", 1, "--kp", 3], "2 files and 3 of --kp"),
+        (["--method", "overshoot"], "takes one recording, but 2"),
+        (["--kp", 1, "--kp", 3], "2 files and 3 values of --kp"),
     ],
 )
 def test_invalid_combinations_of_options_for_several_files(files, more, words):
@@ -343,7 +343,7 @@ def test_invalid_combinations_of_options_for_several_files(files, more, words):
 
 def test_a_window_that_is_none(files):
     said = one_clear_line(run("estimate", f"{files['quick']}@1:x", "--kp", 2, *FLOWN))
-    assert "'x' is no time; write a file with a window as FILE@LOW:HIGH" in said
+    assert "'x' is not a time. Write a file with a window as FILE@LOW:HIGH" in said
 
 
 def test_a_reference_equal_to_the_output_is_refused(tmp_path):

@@ -128,10 +128,10 @@ def test_a_named_plant_is_fitted_and_a_better_one_is_told(files):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--ki", 1], "--ki is for a loop with a known controller"),
-        (["--method", "gcc"], "--method: this is for a loop with a known controller"),
-        (["--check"], "--check: this is for a loop with a known controller"),
-        (["--plant", "1/(s+1)"], "--plant 1/(s+1): without --kp it is one of 'delay', 'lag'"),
+        (["--ki", 1], "--ki needs a known controller"),
+        (["--method", "gcc"], "--method: this option needs a known controller"),
+        (["--check"], "--check: this option needs a known controller"),
+        (["--plant", "1/(s+1)"], "--plant 1/(s+1): without --kp, give one of 'delay', 'lag'"),
         (["--output", "T1"], "no column 'T1' for the output: it has"),
         (["--window", 10, 12], "holds 3 samples"),
         (["--largest-delay", -1], "-1"),

@@ -49,7 +49,7 @@ def test_a_defect_shows_where_it_is_and_asks_to_be_reported(error, monkeypatch, 
     assert code == 70
     assert "Traceback" in said
     assert "in fails" in said
-    assert "please report it" in said.splitlines()[-1]
+    assert "Please report it" in said.splitlines()[-1]
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_what_is_wrong_is_one_line(log, tmp_path):
 def test_a_flight_of_a_log_with_one_is_refused(log):
     result = run("inspect", log, "--flight", 2)
     assert result.returncode != 0
-    assert "DataFlash log, which holds one flight" in one_clear_line(result)
+    assert "DataFlash log, which contains one flight only" in one_clear_line(result)
 
 
 @pytest.mark.parametrize("more", [[], ["--json"]])

@@ -115,7 +115,7 @@ def test_an_error_lists_what_exists(table, log, tmp_path):
     said = one_clear_line(run("latency", bag))
     assert "/cmd_vel:linear.x" in said
     assert "--time" in one_clear_line(run("latency", log, "--time", "t"))
-    assert "has one loop" in one_clear_line(
+    assert "has only one loop" in one_clear_line(
         run("latency", table, "--time", "hours", "--command", "inflow", "--output", "level_now",
             "--axis", "roll")
     )  # fmt: skip
@@ -133,8 +133,8 @@ def test_two_fields_of_a_bag(tmp_path):
 
 def test_what_is_wrong_is_one_line(log):
     assert "no loop with the axis 'yaw'" in one_clear_line(run("latency", log, "--axis", "yaw"))
-    assert "give one, or two" in one_clear_line(run("latency", log, log, log))
-    assert "page of one log" in one_clear_line(run("latency", log, log, "--out", "page.html"))
+    assert "give one log, or two" in one_clear_line(run("latency", log, log, log))
+    assert "page about one log" in one_clear_line(run("latency", log, log, "--out", "page.html"))
 
 
 def test_a_log_of_an_instant_is_answered_by_one_line(tmp_path):

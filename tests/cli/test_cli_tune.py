@@ -59,15 +59,18 @@ def test_a_log_gives_the_parameters_of_its_firmware(folder):
 REFUSED = [
     (["bare.bin", "--loop", "roll rate"], "by controller=, on the command line --controller"),
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
-    (["flown.bin", "--kp", 1], "--kp is for a table"),
+    (["flown.bin", "--kp", 1], "--kp is needed for a table only"),
     (
         ["bump.csv", "--form", "ardupilot"],
         "--loop is missing: the loops of ardupilot are roll rate",
     ),
     (["bump.csv", "--form", "px4", "--loop", "rol"], "--loop rol: the loops of px4 are roll rate"),
-    (["bump.csv", "--loop", "roll"], "--loop is for a vehicle, and the form parallel is not"),
-    (["bump.csv", "--firmware", "4.5"], "--firmware is for a vehicle"),
-    (["bump.csv", "--filter-hz", 2], "--filter-hz is for a derivative"),
+    (
+        ["bump.csv", "--loop", "roll"],
+        "--loop needs the form of a vehicle, and the form parallel is not",
+    ),
+    (["bump.csv", "--firmware", "4.5"], "--firmware needs the form of a vehicle"),
+    (["bump.csv", "--filter-hz", 2], "--filter-hz is the filter of a derivative"),
     (["bump.csv", "--controller", "PID", "--form", "px4", "--loop", "altitude"], "no integral"),
 ]
 
@@ -83,4 +86,4 @@ def test_what_makes_no_sense_is_refused(folder, options, why):
 def test_what_refuses_each_loop_of_a_log_names_it_once(folder):
     done = run("tune", "bare.bin", cwd=folder)
     assert done.returncode == 3
-    assert "can be tuned: roll rate: the log holds no gain of this loop" in done.stderr
+    assert "can be tuned: roll rate: the log has no gain of this loop" in done.stderr

@@ -70,7 +70,7 @@ def test_a_watched_link_with_a_key_believes_signed_messages_only():
 
 def test_restore_needs_a_link_and_names_a_vehicle_that_is_silent(tmp_path):
     done = run("fly", "--restore", cwd=tmp_path)
-    assert "--restore is for a vehicle on a link" in done.stderr
+    assert "--restore needs a vehicle on a link" in done.stderr
 
 
 @pytest.mark.parametrize("foreign", ["\x1b[2J", "\x07", "\x9b31m", "\u202e", "\x00", "\x7f"])

@@ -130,8 +130,8 @@ def test_a_growing_table_may_be_in_every_encoding_and_with_every_separator(
         (b'time,output,command\n0.0,"1.0,0.5\n', "line 2 .*give a finite number"),
         (b"time;output;command\n1,234;1;1\n", "line 2 .*write a decimal point"),
         (b"time;output;command\n0,5;1.5;1\n", "line 2 .*write a decimal point"),
-        (b"\x1f\x8b\x08\x00", "only a text can be followed"),
-        (b"\x00\x01\x02", "is not a text file"),
+        (b"\x1f\x8b\x08\x00", "only a text file can be followed"),
+        (b"\x00\x01\x02", "is neither a text file"),
         (b"\xa3\x95\x80", "open_log"),
     ],
 )

@@ -76,7 +76,7 @@ def test_loops_that_share_a_reason_have_one_line():
 
 
 def test_a_plain_number_that_contradicts_the_fit_has_a_line_of_its_own():
-    few = "too few windows determine the time by themselves, 3 where 8 are needed"
+    few = "too few windows determine the time by themselves: 3, but 8 are needed"
     by = "by moves the log gives 12 ms and the fit 6 ms"
     doubted = loop("yaw", "indication", f"{few}; {by}")
     assert lines_of(doubted) == [f"indication: yaw: {few}", f"indication: yaw: {by}"]

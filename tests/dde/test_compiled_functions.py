@@ -77,7 +77,7 @@ def test_an_object_with_an_address_is_no_compiled_function():
     class Host:
         address = 12345
 
-    with pytest.raises(TypeError, match="no function"):
+    with pytest.raises(TypeError, match="not a function"):
         solve(Host())
 
 

@@ -26,7 +26,7 @@ def test_two_lags_are_found_and_a_third_is_not(most_lags):
     assert choice.ci(0.5)[0] > low
     table = str(choice)
     assert "2 lags *" in table
-    assert "Delay and lag together, over all plants" in table
+    assert "Sum of delay and lag, averaged over all plants" in table
     assert choice.to_dict()["chosen"] == "2 lags"
 
 

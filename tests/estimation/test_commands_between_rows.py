@@ -93,7 +93,7 @@ def test_straight_commands_are_half_of_the_hold_later(sparse, straight):
 
 def test_what_is_wrong_about_a_hold_is_said(sparse):
     for hold in (-0.01, np.inf, np.nan):
-        with pytest.raises(ValueError, match="is not a time above zero"):
+        with pytest.raises(ValueError, match="give a time above zero"):
             of(sparse, hold=hold)
     loop = dtm.ControlLoop(dtm.Integrator(), dtm.P(1.0))
     with pytest.raises(ValueError, match="hold is for an estimate without a loop"):

@@ -94,7 +94,7 @@ def test_a_zero_without_lags_is_fitted_beside_the_pair():
 
 def test_what_cannot_be_fitted_is_refused_by_name():
     plant = dtm.ParametricPlant(lambda a, b: ([1.0], [1.0, a, 100.0 + b]), {"a": 5.0, "b": 0.0})
-    with pytest.raises(ValueError, match="b=0: give another value"):
+    with pytest.raises(ValueError, match="b=0: give an initial value"):
         dtm.estimate_delay(recorded(0), loop_with(plant), free=("delay", "b"))
 
     def many(a, b, c, d, e):

@@ -124,7 +124,7 @@ def test_a_comparison_says_by_how_much_and_why_methods_are_off():
     assert differences["dominant"].seconds < -0.02
     (said,) = (one for one in found.limitations() if one.startswith("Paper's overshoot"))
     assert f"{-differences['dominant'].seconds:.3f} s less than output error (" in said
-    assert "takes the gain as given" in said
+    assert "assumes that the gain is known" in said
     assert not any(one.startswith(("Waveform", "Output")) for one in found.limitations())
     row = next(row for row in found.rows() if row[0] == "gcc")
     assert row[-3:-1] == [

@@ -89,7 +89,7 @@ def test_a_plant_without_a_largest_gain_says_so(fit):
     assert "no proportional gain makes the loop unstable; at " in slow.summary()
     with pytest.raises(ValueError, match="no proportional gain makes the loop unstable"):
         slow.ci(0.95, "largest_gain")
-    with pytest.raises(ValueError, match=r"omega=-1 rad/s is not above zero"):
+    with pytest.raises(ValueError, match=r"omega=-1 rad/s: give a frequency above zero"):
         fit.at(-1.0)
 
 

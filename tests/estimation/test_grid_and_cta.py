@@ -84,7 +84,7 @@ def test_the_curvature_gives_the_spread_for_noise_outside_the_loop():
         low, high = fit.details["curvature_interval_95"]
         assert low < fit.delay < high
     assert root_mean_square(errors) / np.mean(stderrs) == pytest.approx(1.0, abs=0.4)
-    with pytest.raises(ValueError, match="leaves out that"):
+    with pytest.raises(ValueError, match="ignores that"):
         fit.ci()
 
 

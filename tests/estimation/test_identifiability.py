@@ -243,7 +243,7 @@ def test_a_plan_has_a_summary_and_plots():
     assert alone.plot(axes) == axes
     with pytest.raises(ValueError, match="give 2"):
         alone.plot(axes[1:])
-    with pytest.raises(ValueError, match="not free"):
+    with pytest.raises(ValueError, match="not a free parameter"):
         plan.bound.correlation("delay", "offset")
     again = copy.deepcopy(plan.bound)
     with pytest.raises(ValueError, match="read-only"):
@@ -403,18 +403,18 @@ def flat(value=0.0):
     ("loop", "experiment", "options", "match"),
     [
         (held_loop(lag=0.1), flat(), {}, "does not excite"),
-        (held_loop(lag=0.1), flat(1e3), {}, "1 throughout, at its limit"),
+        (held_loop(lag=0.1), flat(1e3), {}, "at its limit throughout, 1"),
         (
             held_loop(delay=3.0),
             dtm.Experiment.step(2.0, 0.5),
             {"free": ("delay",)},
-            "make it longer",
+            "make the experiment longer",
         ),
         (
             held_loop(),
             dtm.Experiment.step(),
             {"free": ("delay", "gain", "lag")},
-            "assume a lag",
+            "Assume a lag",
         ),
         (
             dtm.ControlLoop(
@@ -422,7 +422,7 @@ def flat(value=0.0):
             ),
             dtm.Experiment.step(),
             {"free": ("delay",)},
-            "straight to its output",
+            "direct feedthrough",
         ),
     ],
 )
@@ -441,8 +441,8 @@ def test_what_an_experiment_cannot_identify_is_refused_with_the_reason(
         ({"initial_output": 1.0}, "rest at zero"),
         ({"flights": -1}, "flights"),
         ({"loop": held_loop().replace(delay=None), "free": ("delay",)}, "delay"),
-        ({"loop": dtm.Integrator()}, "not a ControlLoop"),
-        ({"experiment": np.zeros(9)}, "not an Experiment"),
+        ({"loop": dtm.Integrator()}, "give a ControlLoop"),
+        ({"experiment": np.zeros(9)}, "give an Experiment"),
     ],
 )
 def test_invalid_arguments_are_refused(change, match):

@@ -65,7 +65,7 @@ def test_before_the_command_changes_there_is_no_estimate_and_the_reason_is_said(
     assert not found.known
     assert not found.informed
     assert found.ci[1] - found.ci[0] > 0.5
-    assert found.message.startswith("no estimate yet: the command has not yet changed")
+    assert found.message.startswith("no estimate yet: the command has not changed")
 
 
 def test_the_noise_is_learned_and_the_start_is_told_again():
@@ -207,11 +207,11 @@ def test_rows_of_a_long_rest_are_not_kept():
 def test_what_is_wrong_is_said():
     with pytest.raises(ValueError, match="give times of at least zero"):
         OnlineEstimator(LOOP, delays=(-0.1, 0.5))
-    with pytest.raises(ValueError, match="lags= is for a plant with a lag"):
+    with pytest.raises(ValueError, match="lags= needs a plant with a lag"):
         OnlineEstimator(LOOP.replace(plant=dtm.Integrator()), lags=(0.1, 0.2))
     with pytest.raises(ValueError, match="noise=0"):
         OnlineEstimator(LOOP, noise=0.0)
-    with pytest.raises(ValueError, match="follows"):
+    with pytest.raises(ValueError, match="comes after"):
         list(OnlineEstimator(LOOP).run([(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]))
     time, output, _ = flown(5.0)
     with pytest.raises(dtm.RecordingError, match="has no command"):

@@ -213,8 +213,8 @@ def test_the_height_servo_is_found_without_being_named(name):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"limit": 1.0}, "limit=1.0 is that of a controller"),
-        ({"controller": dtm.PI(1.0, 0.1)}, "only that of a P controller follows"),
+        ({"limit": 1.0}, "limit=1.0 is the limit of a controller"),
+        ({"controller": dtm.PI(1.0, 0.1)}, "only for a P controller"),
         ({"plant": "two poles"}, "plant='two poles' is not one of 'delay', 'lag'"),
         ({"largest_delay": 0.0}, "largest_delay"),
         ({"method": "gcc"}, "method and free are for an estimate with a loop"),
@@ -233,14 +233,14 @@ def test_what_cannot_be_is_refused(options, words):
 
 def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(fit):
     time, command, output = bump(rows=150)
-    with pytest.raises(dtm.RecordingError, match="no command, and without a loop"):
+    with pytest.raises(dtm.RecordingError, match="no command, so nothing shows"):
         dtm.estimate_delay(dtm.Recording(time, command, output))
     loop = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0))
     with pytest.raises(ValueError, match="at_rest is for an estimate without a loop"):
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
     with pytest.raises(ValueError, match="no recording was given"):
         dtm.estimate_delay([])
-    with pytest.raises(ValueError, match="omega=-1 rad/s is not above zero"):
+    with pytest.raises(ValueError, match="omega=-1 rad/s: give a frequency above zero"):
         fit.at([-1.0])
     with pytest.raises(ValueError, match="'zeros' has no interval"):
         fit.ci(0.95, "zeros")

@@ -115,7 +115,7 @@ def test_inconsistent_arguments_are_refused(arguments, error, match):
 
 def test_methods_for_one_recording_refuse_several():
     flight, loop = record_step(2.0, 0.001, 0)
-    with pytest.raises(ValueError, match="one recording, not 2"):
+    with pytest.raises(ValueError, match="one recording, but 2"):
         dtm.estimate_delay([flight, flight], loop, method="overshoot")
 
 

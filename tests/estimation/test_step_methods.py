@@ -139,7 +139,7 @@ def test_the_standard_error_of_the_decay_is_that_of_repeated_recordings():
     [
         ({"Kp": 2.0}, 1.0, "overshoots"),
         ({"Kp": 0.5, "duration": 20.0}, 2.0, "gain is smaller"),
-        ({"Kp": 0.5, "duration": 20.0}, 0.3, "faster than e·K"),
+        ({"Kp": 0.5, "duration": 20.0}, 0.3, "at most e·K"),
         ({"Kp": 0.8, "noise": 0.05, "duration": 4.0}, 1.0, "tail|follow"),
     ],
 )

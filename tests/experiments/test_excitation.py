@@ -239,7 +239,7 @@ def test_invalid_experiments_are_refused(make, match):
             "sample_time=0.065",
         ),
         (dtm.Experiment.step(), held_loop(dtm.P(1.0)).replace(delay=None), {}, "delay"),
-        (dtm.Experiment.relay(5.0, 2.0), held_loop(dtm.P(1.0)), {}, "beyond the limit"),
+        (dtm.Experiment.relay(5.0, 2.0), held_loop(dtm.P(1.0)), {}, "exceeds the limit"),
         (dtm.Experiment.step(), held_loop(dtm.P(1.0)), {"noise": -1.0}, "noise"),
         (dtm.Experiment.step(), held_loop(dtm.PV(1.0, 0.1)), {"noise": 0.1}, "DerivativeFilter"),
         (

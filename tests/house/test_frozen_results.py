@@ -261,9 +261,9 @@ def test_nothing_in_a_result_can_be_changed(one):
                 assert not value.flags.writeable, name
             elif isinstance(value, dict):
                 for change in ("clear", "popitem", "update", "setdefault"):
-                    with pytest.raises(TypeError, match="does not change"):
+                    with pytest.raises(TypeError, match="cannot be changed"):
                         getattr(value, change)()
-                with pytest.raises(TypeError, match="does not change"):
+                with pytest.raises(TypeError, match="cannot be changed"):
                     value["a"] = 1
                 assert dict(value) == value
                 assert json.loads(json.dumps(dict.fromkeys(value, 1))).keys() == value.keys()

@@ -115,7 +115,9 @@ def test_links_to_two_vehicles_of_one_id_are_refused():
             other._begin -= 7.0
             await MAVLinkVehicle(BOTH, LIMITS).connect()
 
-    with pytest.raises(LinkError, match=r"another vehicle answers over .*14551 than over .*14550"):
+    with pytest.raises(
+        LinkError, match=r"answers over .*14551 is not the one that answers over .*14550"
+    ):
         run(connect())
 
 

@@ -233,7 +233,7 @@ def test_a_parameter_that_is_not_kept_is_refused_and_the_others_put_back():
         async with StandIn() as vehicle:
             before = dict(vehicle.parameters)
             vehicle.drop = lambda m: m.get_type() == "PARAM_SET" and m.param_id == "FENCE_ACTION"
-            with pytest.raises(LinkError, match="does not keep FENCE_ACTION = 2"):
+            with pytest.raises(LinkError, match="does not keep the value FENCE_ACTION = 2"):
                 await MAVLinkVehicle(ADDRESS, LIMITS).connect()
             assert vehicle.parameters == before
 

@@ -110,7 +110,7 @@ def test_a_setpoint_at_rest_is_to_be_moved(flown):
     rest = Series(loop.setpoint.time, np.zeros(len(loop.setpoint)), "rad/s", "RATE.RDes")
     log = as_log(flown, "PX4", "", replace(loop, setpoint=rest), SDLOG_PROFILE=17.0)
     assert lines(log) == [
-        "roll rate: move its setpoint; in this log the response hardly follows any of it"
+        "roll rate: move its setpoint; in this log the response follows almost no part of it"
     ]
 
 

@@ -159,7 +159,7 @@ def test_without_its_library_a_bag_names_the_line_that_installs_it(folder, name,
 
 
 def test_headers_that_are_missing_are_named(folder):
-    with pytest.raises(dtm.RecordingError, match="/cmd_vel has no time in its headers"):
+    with pytest.raises(dtm.RecordingError, match="the headers of /cmd_vel contain no time"):
         open_bag(folder / "zstd.mcap").recording(COMMAND, SPEED, stamps="header")
 
 
@@ -167,7 +167,7 @@ def test_what_is_no_bag_is_refused(tmp_path):
     path = tmp_path / "a.mcap"
     for data, message in (
         (b"time,x\n0,1\n", "is a text"),
-        (b"\x07\x03\x01\x02", "is no bag"),
+        (b"\x07\x03\x01\x02", "is not a bag"),
         (b"\x89MCAP0\r\n", "without a message that can be read"),
     ):
         path.write_bytes(data)
@@ -178,7 +178,7 @@ def test_what_is_no_bag_is_refused(tmp_path):
     named = tmp_path / "bag.dat"
     bags.ros1(tmp_path / "a.bag")
     (tmp_path / "a.bag").rename(named)
-    with pytest.raises(dtm.RecordingError, match=r"let its name end in \.bag"):
+    with pytest.raises(dtm.RecordingError, match=r"its name ends in \.bag"):
         open_bag(named)
     with pytest.raises(dtm.RecordingError, match=r"open it with deadtime\.logs\.open_bag"):
         dtm.open_log(named)
@@ -227,7 +227,7 @@ def test_messages_that_cannot_be_decoded_are_named(tmp_path):
         log.finish()
     bag = open_bag(path)
     assert list(bag.topics) == ["/known"]
-    assert bag.remarks == ("not decoded, in an encoding that is not known: /strange",)
+    assert bag.remarks == ("not decoded, because the encoding is not known: /strange",)
 
 
 @pytest.mark.parametrize(

@@ -207,7 +207,7 @@ def test_what_stands_before_a_cut_is_read(cut):
     count = contents.topics["main"].time.size
     assert_holds(contents, log, rows[:count])
     assert count > 100 - 3 - cut / 30
-    assert contents.remarks[-1] == "The log has no mark of its end: it was cut off."
+    assert contents.remarks[-1] == "The log has no end mark, so it was cut off."
 
 
 def several():

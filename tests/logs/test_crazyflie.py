@@ -119,7 +119,7 @@ def test_damage_to_the_end_is_named():
     contents = read_crazyflie(log, "log00")
     assert_fixed(contents, fixed(20))
     place = len(fixed_log(20))
-    assert f"What follows byte {place} of {place + 100} is damaged" in contents.remarks[1]
+    assert f"The part from byte {place} of {place + 100} on is damaged" in contents.remarks[1]
 
 
 def named(text):
@@ -128,8 +128,8 @@ def named(text):
 
 
 BAD = {
-    "nothing": (b"", "starts with the byte 0xbc"),
-    "another format": (b"PK\3\4", "starts with the byte 0xbc"),
+    "nothing": (b"", "would start with the byte 0xbc"),
+    "another format": (b"PK\3\4", "would start with the byte 0xbc"),
     "a first byte alone": (b"\xbc", "definitions of the events are damaged"),
     "another version": (sealed(definitions({}, version=3)), "version 3 is not known"),
     "no events": (sealed(definitions({})), "no record that can be read"),

@@ -130,12 +130,12 @@ def test_a_log_that_is_cut_off_is_read_as_far_as_it_goes(name, share, tmp_path):
     ("data", "words"),
     [
         (b"", "is empty"),
-        (b"\x07\x03time", "is no log of a known format: it begins with 07 03 74 69"),
+        (b"\x07\x03time", "is not a log of a known format: it begins with 07 03 74 69"),
         (b"time,reference\n0,1\n", rf"is a text, and no log .*: {TABLE}"),
         ("höhe\n".encode("latin-1"), rf"is a text, and no log .*: {TABLE}"),
         (
             b"version https://git-lfs.github.com/spec/v1\noid sha256:da9\nsize 11927552\n",
-            "is a Git LFS pointer and not the file: run `git lfs pull`",
+            "is a Git LFS pointer instead of the file itself: run `git lfs pull`",
         ),
         (b"\x1f\x8b\x08" + bytes(20), rf"is packed by gzip: {TABLE}"),
         (b"PAR1" + bytes(20), rf"is a Parquet table: {TABLE}"),
@@ -168,7 +168,7 @@ def test_a_tlog_without_an_autopilot_is_refused(tmp_path):
     pytest.importorskip("pymavlink", reason="pymavlink reads tlogs")
     path = tmp_path / "flight.tlog"
     path.write_bytes(struct.pack(">Q", 17 * 10**14) + b"\xfe\x01\x00\x00\x00\x00\x00\x00\x00")
-    with pytest.raises(dtm.RecordingError, match="no autopilot sends a HEARTBEAT"):
+    with pytest.raises(dtm.RecordingError, match="contains no HEARTBEAT of an autopilot"):
         dtm.open_log(path)
 
 
@@ -191,7 +191,7 @@ def test_a_format_of_length_zero_does_not_hang(tmp_path):
     path.write_bytes(log.data)
     found = dtm.open_log(path)
     assert len(found.loops["roll"].setpoint) == 20
-    assert any("are no message and are left out" in remark for remark in found.remarks)
+    assert any("do not belong to a message and are left out" in remark for remark in found.remarks)
 
 
 def test_damage_in_the_middle_costs_only_the_messages_in_it(tmp_path):
@@ -202,7 +202,7 @@ def test_damage_in_the_middle_costs_only_the_messages_in_it(tmp_path):
     path.write_bytes(bytes(data))
     found = dtm.open_log(path)
     assert 195 <= len(found.loops["roll"].setpoint) < 200
-    assert any("are no message" in remark for remark in found.remarks)
+    assert any("do not belong to a message" in remark for remark in found.remarks)
 
 
 def test_a_packet_with_a_wrong_checksum_is_left_out(tmp_path):

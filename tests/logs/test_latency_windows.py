@@ -257,7 +257,7 @@ def test_few_windows_are_an_indication(alike):
     assert alike.verdict == "reliable"
     few = answer_of(flown([0.03], seconds=1.6))
     assert few.verdict == "indication"
-    assert few.reason == "too few windows determine the time by themselves, 1 where 4 are needed"
+    assert few.reason == "too few windows determine the time by themselves: 1, but 4 are needed"
 
 
 def test_a_plant_that_is_not_determined_has_a_time_where_windows_show_it(alike):

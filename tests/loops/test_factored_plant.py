@@ -68,7 +68,7 @@ def test_the_range_of_a_lag_ends_at_zero():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "a gain alone"),
+        ({}, "only a gain"),
         ({"lags": [0.1, -0.2]}, "lag_2=-0.2 is negative"),
         ({"lags": [0.1], "gain": 0.0}, "gain=0"),
         ({"lags": [0.1], "zero": np.inf}, "zero"),

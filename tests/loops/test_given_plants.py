@@ -177,7 +177,7 @@ def test_what_such_a_loop_cannot_do_is_refused_by_name():
         loop.simulate([0.0, 1.0], sensitivities=("Kp",))
     with pytest.raises(ValueError, match="state space"):
         dtm.sweep(loop, {"Kp": (0.1, 0.2, 2)})
-    with pytest.raises(ValueError, match="impulse of the command"):
+    with pytest.raises(ValueError, match="command of this loop an impulse"):
         dtm.ControlLoop(INSIDE, dtm.PD(0.1, 0.1), delay=0.2).step_response()
 
 

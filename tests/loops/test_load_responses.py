@@ -109,7 +109,7 @@ def test_a_pulse_that_the_output_times_show_is_not_missed():
 def test_a_function_without_end_of_its_changes_is_refused():
     loop = dtm.ControlLoop(PLANT, dtm.P(0.8), delay=0.2)
     draw = np.random.default_rng(1)
-    with pytest.raises(ValueError, match=r"load changes too often .* a pair \(times, values\)"):
+    with pytest.raises(ValueError, match=r"load changes too often: .* a pair \(times, values\)"):
         loop.simulate(TIMES, 0.0, load=lambda t: draw.normal(size=t.shape))
 
 

@@ -298,14 +298,14 @@ def test_a_comma_that_may_stand_for_thousands_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (gzip.compress(as_csv().encode(), mtime=0)[:-20], "cannot be unpacked, it is damaged"),
+        (gzip.compress(as_csv().encode(), mtime=0)[:-20], "is damaged and cannot be unpacked"),
         (gzip.compress(as_csv().encode(), mtime=0)[:300] + b"\xff" * 90, "cannot be unpacked"),
         (gzip.compress(b"PK\x03\x04" + bytes(99), mtime=0), "is a zip archive"),
-        (gzip.compress(b"PAR1" + bytes(99), mtime=0), "holds no text: unpack it"),
-        (gzip.compress(bytes(99), mtime=0), "not a text file"),
-        (b"\xff\xfe" + as_csv().encode("utf-16")[3:], "not a text file"),
-        (b"time\x07reference", "not a text file"),
-        (b"\xfe\xed\xfa\xce\x0f", "not a text file"),
+        (gzip.compress(b"PAR1" + bytes(99), mtime=0), "contains no text: unpack the file"),
+        (gzip.compress(bytes(99), mtime=0), "neither a text file"),
+        (b"\xff\xfe" + as_csv().encode("utf-16")[3:], "neither a text file"),
+        (b"time\x07reference", "neither a text file"),
+        (b"\xfe\xed\xfa\xce\x0f", "neither a text file"),
     ],
 )
 def test_damaged_files_are_refused(content, words, tmp_path):
@@ -316,5 +316,5 @@ def test_damaged_files_are_refused(content, words, tmp_path):
 def test_a_file_that_unpacks_to_far_more_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("deadtime.recordings.readers._limits.UNPACKED", 0)
     long = as_csv() + "# a comment\n" * 1_000_000
-    with pytest.raises(dtm.RecordingError, match="unpacks to more than"):
+    with pytest.raises(dtm.RecordingError, match="but would have more than"):
         read(tmp_path, gzip.compress(long.encode()))

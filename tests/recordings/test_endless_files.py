@@ -67,7 +67,7 @@ def test_a_pipe_without_end_is_refused_at_the_limit(tmp_path, monkeypatch, reade
 @pytest.mark.parametrize("device", ["/dev/full", "/dev/zero"])
 @pytest.mark.parametrize("reader", READERS[:2])
 def test_a_device_of_zeros_is_refused(device, reader):
-    with pytest.raises(dtm.RecordingError, match=r"is no log|is not a text file"):
+    with pytest.raises(dtm.RecordingError, match=r"is not a log|is neither a text file"):
         reader(device)
 
 

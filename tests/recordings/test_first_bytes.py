@@ -64,7 +64,7 @@ def test_the_name_of_a_file_does_not_matter(tmp_path):
         ("ardupilot_sitl_guided_heights.bin", "DataFlash"),
         ("betaflight_error_recovery.bbl", "Blackbox"),
         ("crazyflie_log10.cfusd", "Crazyflie"),
-        ("ardrone2_full_navdata_expD_every12.lp32", "not a text file"),
+        ("ardrone2_full_navdata_expD_every12.lp32", "neither a text file"),
     ],
 )
 def test_logs_of_vehicles_are_told_from_tables(name, words):
@@ -79,5 +79,5 @@ def test_a_separator_is_for_text():
 
 @pytest.mark.parametrize("source", [3, None, b"flight.csv", [1.0, 2.0], np.zeros(9)])
 def test_what_is_no_table_is_refused(source):
-    with pytest.raises(TypeError, match="is no table: give a path, a DataFrame"):
+    with pytest.raises(TypeError, match="is not a table: give a path, a DataFrame"):
         dtm.read_recording(source)

@@ -115,7 +115,7 @@ def test_two_columns_of_one_name_are_refused(tmp_path):
     [
         (b"", "is empty"),
         (b"\n\n", "is empty"),
-        (bytes(range(256)), "not a text file"),
+        (bytes(range(256)), "neither a text file"),
         (b"PK\x03\x04\0\0\0\0", "is a zip archive"),
         (b"t_s,ref_m,height_m\n", "0 samples"),
         (b'"t_s,ref_m\n', "not a CSV file"),

@@ -72,7 +72,7 @@ def test_the_sample_time_is_held_against_the_times_of_the_commands():
 
 
 def test_a_command_and_sent_ones_exclude_each_other():
-    with pytest.raises(TypeError, match="not both"):
+    with pytest.raises(TypeError, match="give only one of the two"):
         recording(command=np.zeros(20))
 
 

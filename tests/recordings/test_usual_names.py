@@ -68,7 +68,7 @@ def test_without_a_usual_name_the_columns_and_the_option_are_told(signal, tmp_pa
 def test_stamps_that_are_no_seconds_since_1970_are_refused():
     rows = np.arange(20.0)
     table = {"Timestamp": 1.7e12 + 1e3 * rows, "pv": rows, "op": rows % 5}
-    with pytest.raises(dtm.RecordingError, match="which is no time in seconds"):
+    with pytest.raises(dtm.RecordingError, match="which cannot be seconds"):
         dtm.read_recording(table, command="auto")
     table["Timestamp"] *= 1e-3
     assert len(dtm.read_recording(table, command="auto")) == 20

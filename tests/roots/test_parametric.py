@@ -109,7 +109,7 @@ def test_a_parameter_does_not_divide():
         lambda: Kp / s,
         lambda: (s + Kp) / (s + T),
     ):
-        with pytest.raises(TypeError, match="Multiply the equation through"):
+        with pytest.raises(TypeError, match="Multiply the equation by this divisor"):
             quotient()
     assert (Kp + s) / 2 == 0.5 * Kp + 0.5 * s
     with pytest.raises(ZeroDivisionError):
@@ -121,7 +121,7 @@ def test_a_parameter_does_not_divide():
 def test_powers_are_whole():
     assert (s + Kp) ** 2 == s**2 + 2 * Kp * s + Kp**2
     assert Kp**0 == 1 + 0 * Kp
-    with pytest.raises(ValueError, match="multiply the equation through"):
+    with pytest.raises(ValueError, match="multiply the equation by the divisor"):
         Kp**-1
     with pytest.raises(TypeError):
         Kp**0.5
@@ -157,7 +157,7 @@ def test_values_are_checked():
 def test_it_is_made_by_algebra_and_does_not_change():
     with pytest.raises(TypeError, match="by algebra"):
         dtm.roots.ParametricQuasiPolynomial()
-    with pytest.raises(AttributeError, match="does not change"):
+    with pytest.raises(AttributeError, match="cannot be changed"):
         Kp._names = ("x",)
     h = s + Kp * delay(T)
     for twin in (copy.deepcopy(h), pickle.loads(pickle.dumps(h)), Kp * delay(T) + s):

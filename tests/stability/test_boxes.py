@@ -138,7 +138,7 @@ def test_a_loop_is_its_family():
     np.testing.assert_array_equal(ours.unstable, theirs.unstable)
     with pytest.raises(ValueError, match="continuous"):
         dtm.proved_boxes(loop.replace(sample_time=0.05), ranges)
-    with pytest.raises(ValueError, match="no such number"):
+    with pytest.raises(ValueError, match="does not depend on such a number"):
         dtm.proved_boxes(loop, {"Ki": (0, 1)})
     with pytest.raises(ValueError, match="delay of this loop is None"):
         dtm.proved_boxes(loop.replace(delay=None), ranges)
@@ -198,7 +198,7 @@ def test_degenerate_ranges():
     for bad in (math.nan, math.inf):
         with pytest.raises(ValueError, match="finite"):
             dtm.proved_boxes(VELOCITY, {"Kp": (0, bad), "Kv": (-1, 1)})
-    with pytest.raises(ValueError, match="no value for Kv"):
+    with pytest.raises(ValueError, match="Kv has no value"):
         dtm.proved_boxes(VELOCITY, {"Kp": (0, 6)})
     with pytest.raises(ValueError, match="no such parameter"):
         dtm.proved_boxes(VELOCITY, {"Kp": (0, 6), "Kv": (0, 1), "Kd": (0, 1)})
@@ -210,7 +210,7 @@ def test_degenerate_ranges():
         dtm.proved_boxes(s + delay(1.0), {"Kp": (0, 6)})
     with pytest.raises(TypeError, match="not a number"):
         dtm.proved_boxes(VELOCITY, {"Kp": (0, "6"), "Kv": (-1, 1)})
-    with pytest.raises(ValueError, match="this takes no points"):
+    with pytest.raises(ValueError, match="a range without points"):
         dtm.proved_boxes(VELOCITY, {"Kp": (0, 1, 2), "Kv": (-1, 1)})
     for bad in (-0.1, 1.5, math.nan):
         with pytest.raises(ValueError, match="tol"):
@@ -381,7 +381,7 @@ def test_radius_refuses_what_has_none():
         dtm.stability_radius(family, 2.0)
     with pytest.raises(ValueError, match="tol"):
         dtm.stability_radius(family, {"Kp": 2.0, "T": 0.1}, tol=0.0)
-    with pytest.raises(ValueError, match="no value for T"):
+    with pytest.raises(ValueError, match="T has no value"):
         dtm.stability_radius(family, {"Kp": 2.0})
 
 
@@ -414,7 +414,7 @@ def test_robust_map_includes_delays_between_the_ends():
 
 def test_robust_map_refuses_what_makes_no_sense():
     ranges = {"Kp": (0, 6), "Kv": (-1, 1)}
-    with pytest.raises(ValueError, match="axis and has an interval"):
+    with pytest.raises(ValueError, match="an axis and an interval"):
         dtm.robust_map(VELOCITY, ranges, {"Kp": (0, 1)})
     with pytest.raises(ValueError, match="one to three"):
         dtm.robust_map(VELOCITY, ranges, {})

@@ -494,5 +494,5 @@ def test_the_page_on_simulation_runs():
 
 
 def test_a_transfer_function_has_no_state_to_start_from():
-    with pytest.raises(TypeError, match="says nothing of the state"):
+    with pytest.raises(TypeError, match="does not describe the state"):
         (1.0 / (dtm.s + 1.0)).simulate([0.0, 1.0], initial_state=1.0)

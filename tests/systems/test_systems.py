@@ -223,7 +223,7 @@ def test_singular_equations_are_refused():
         (lambda: DelaySystem(1.0, 1.0, [[1, 2]]), ValueError, "C with delay 0 s"),
         (lambda: DelaySystem(1.0, 1.0, 1.0, [[1, 2]]), ValueError, "D with delay 0 s"),
         (lambda: DelaySystem(1.0, E=np.eye(2)), ValueError, "E with delay 0 s"),
-        (lambda: DelaySystem(1.0, N={0.0: 1.0}), ValueError, "that one is E"),
+        (lambda: DelaySystem(1.0, N={0.0: 1.0}), ValueError, "this matrix is E"),
         (lambda: DelaySystem(1.0, N=1.0), TypeError, "N: give a dict"),
         (lambda: DelaySystem(1e200 * np.eye(2)).characteristic(), ValueError, "1e308"),
     ],

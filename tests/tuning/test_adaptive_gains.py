@@ -79,7 +79,7 @@ def test_the_interval_is_widened_by_what_the_delay_may_move():
 def test_time_does_not_run_back():
     chooser = follower()
     chooser.update(1.0, 0.1, 0.15)
-    with pytest.raises(ValueError, match="do not run back"):
+    with pytest.raises(ValueError, match="do not decrease"):
         chooser.update(0.9, 0.1, 0.15)
 
 

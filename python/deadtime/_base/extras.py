@@ -20,6 +20,6 @@ def library(module: str, purpose: str, installs: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise MissingExtraError(
-            f"{purpose} needs {module.partition('.')[0]}, which is not installed; this line "
-            f"installs it: pip install {installs}"
+            f"{purpose} needs {module.partition('.')[0]}, which is not installed. This "
+            f"command installs it: pip install {installs}"
         ) from error

@@ -16,7 +16,7 @@ class FrozenDict(dict[Any, Any]):
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError(
-            "this dict belongs to a result and does not change: change a copy of it, dict()"
+            "this dict belongs to a result and cannot be changed: change a copy of it, dict(...)"
         )
 
     __setitem__ = __delitem__ = __ior__ = _refuse
@@ -32,10 +32,14 @@ class Immutable:
     __slots__ = ()
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a {type(self).__name__} does not change: cannot set {name!r}")
+        raise AttributeError(
+            f"a {type(self).__name__} cannot be changed: its {name!r} cannot be set"
+        )
 
     def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a {type(self).__name__} does not change: cannot delete {name!r}")
+        raise AttributeError(
+            f"a {type(self).__name__} cannot be changed: its {name!r} cannot be deleted"
+        )
 
 
 class PickledByFields:

@@ -68,7 +68,7 @@ def _elsewhere(
                 report(done)
     except BrokenProcessPool as error:
         raise WorkerError(
-            "the other processes cannot start or were killed: in a script, put its code "
+            "the worker processes could not start, or were killed: in a script, put the code "
             'under `if __name__ == "__main__":`, or give processes=1'
         ) from error
     finally:

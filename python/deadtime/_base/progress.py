@@ -31,7 +31,8 @@ def reported(progress: Progress, total: int | None = None) -> Iterator[Report | 
     if not isinstance(progress, bool):
         if not callable(progress):
             raise TypeError(
-                f"progress={progress!r}: give True for a bar, or a function of the number done"
+                f"progress={progress!r}: give True for a bar, or a function that takes the "
+                "number of finished parts"
             )
         yield progress
         return
@@ -56,7 +57,8 @@ def stage_report(progress: Stages) -> Callable[[str], object]:
         return _print_stage if progress else lambda stage: None
     if not callable(progress):
         raise TypeError(
-            f"progress={progress!r}: give True to print the stages, or a function of their names"
+            f"progress={progress!r}: give True to print the stages, or a function that takes "
+            "the name of a stage"
         )
     return progress
 

@@ -86,7 +86,8 @@ def unmasked(name: str, values: Any) -> Any:
         if masked.size or values is np.ma.masked:
             where = f"[{', '.join(map(str, masked[0]))}]" if values.ndim else ""
             raise ValueError(
-                f"{name}{where} is masked and has no number: leave masked entries out, or fill them"
+                f"{name}{where} is masked, so it has no value: leave masked entries out, or "
+                "fill them"
             )
         return values.data
     if isinstance(values, (list, tuple)):
@@ -104,7 +105,9 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
         array = np.asarray(values)
     except ValueError as error:
-        raise ValueError(f"{name} has rows of different lengths") from error
+        raise ValueError(
+            f"{name} has rows of different lengths: give rows of one length"
+        ) from error
     if array.size and array.dtype.kind not in "biuf":
         raise TypeError(f"{name} of dtype {array.dtype}: give real numbers")
     return array.astype(np.float64, copy=False)
@@ -185,7 +188,9 @@ def interval(name: str, given: Any, *, may_be_point: bool = False) -> Range:
     """
     low, high, count = _ends_of(name, given)
     if count is not None:
-        raise ValueError(f"{name}={given!r}: this takes no points, give the range (low, high)")
+        raise ValueError(
+            f"{name}={given!r}: this argument is a range without points, so give (low, high)"
+        )
     return _increasing(name, given, low, high, may_be_point)
 
 
@@ -197,7 +202,7 @@ def open_interval(name: str, given: Any) -> Range:
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if not is_range(given) or len(given) != 2 or any(isinstance(one, str) for one in given):
-        raise TypeError(f"{name}={given!r}: give a range (low, high), None for an open end")
+        raise TypeError(f"{name}={given!r}: give a range (low, high), with None if an end is open")
     try:
         low, high = (
             default if end is None else float(end)
@@ -205,7 +210,7 @@ def open_interval(name: str, given: Any) -> Range:
         )
     except (TypeError, ValueError) as error:
         raise TypeError(
-            f"{name}={given!r}: give a range (low, high), None for an open end"
+            f"{name}={given!r}: give a range (low, high), with None if an end is open"
         ) from error
     return low, high
 
@@ -227,8 +232,8 @@ def given_points(name: str, given: Any, size: int | None = None) -> NDArray[np.f
     number = size if count is None else count
     if number is None:
         raise ValueError(
-            f"{name}={given!r} is a range: say how many points it has, (low, high, n), or give the "
-            "points as an array"
+            f"{name}={given!r} does not say how many points the range has: give (low, high, "
+            "n), or the points as an array"
         )
     return np.linspace(low, high, number)
 
@@ -237,16 +242,18 @@ def points_of(name: str, given: Any, size: int) -> NDArray[np.float64]:
     """Return the points of an axis: those of a range, or the given ones, increasing and finite."""
     if not isinstance(given, (tuple, list, np.ndarray)) and np.ndim(given) == 0:
         raise TypeError(
-            f"{name}={given!r}: give a range (low, high), or points as an array; a parameter with "
-            "one value belongs in at={...}"
+            f"{name}={given!r}: give a range (low, high), or points as an array. Give a "
+            "parameter that has one value in at={...}"
         )
     points = given_points(name, given, size)
     if points.ndim != 1 or points.size == 0:
-        raise ValueError(f"{name} of shape {points.shape}: give one point or more in one dimension")
+        raise ValueError(
+            f"{name} of shape {points.shape}: give a one-dimensional array with at least one point"
+        )
     if not np.isfinite(points).all():
-        raise ValueError(f"{name}: not all points are finite")
+        raise ValueError(f"{name}: a point is not finite; give finite numbers")
     if not (np.diff(points) > 0.0).all():
-        raise ValueError(f"{name}: points must increase; sort them and drop repeated ones")
+        raise ValueError(f"{name}: the points do not increase; sort them and remove repeated ones")
     return points
 
 
@@ -267,7 +274,8 @@ def numbers_at(at: Mapping[str, SupportsFloat] | None, varied: Any = ()) -> dict
     for name in at:
         if name in varied:
             raise ValueError(
-                f"{name} has a range and the value at={{{name!r}: {at[name]!r}}}: give one of them"
+                f"{name} has both a range and the value at={{{name!r}: {at[name]!r}}}: give "
+                "only one of them"
             )
     return {name: finite(name, value) for name, value in at.items()}
 
@@ -286,17 +294,17 @@ def _ends_of(name: str, given: Any) -> tuple[float, float, int | None]:
         count = operator.index(given[2])
     except TypeError as error:
         raise TypeError(
-            f"{name}={given!r}: three entries are a range (low, high, n) with a whole number n of "
-            "points; give three points as an array, numpy.array([...])"
+            f"{name}={given!r}: three entries mean a range (low, high, n), whose n is a whole "
+            "number. For three points, give an array, numpy.array([...])"
         ) from error
     if count < 2:
-        raise ValueError(f"{name}={given!r}: a range (low, high, n) has at least n=2 points")
+        raise ValueError(f"{name}={given!r}: a range (low, high, n) needs n=2 points or more")
     return low, high, count
 
 
 def _increasing(name: str, given: Any, low: float, high: float, may_be_point: bool) -> Range:
     if low > high or (low == high and not may_be_point):
-        raise ValueError(f"{name}={given!r}: the low end of a range is below its high end")
+        raise ValueError(f"{name}={given!r}: the low end of a range must be below its high end")
     if math.isinf(high - low):
-        raise ValueError(f"{name}={given!r}: the range is wider than 1e308")
+        raise ValueError(f"{name}={given!r}: the range is wider than 1e308; give a narrower range")
     return low, high

@@ -23,23 +23,23 @@ FAILURES = (DeadtimeError, ArithmeticError, MemoryError, OSError, ValueError)
 #: The commands with the first lines of their help. Each is `command` in the file of its name.
 COMMANDS = {
     "estimate": "Find the plant of a recording, or the delay of a known loop, with a verdict.",
-    "inspect": "List what the log of an autopilot holds: vehicle, modes, loops, rates, gains.",
+    "inspect": "List the contents of an autopilot's log: vehicle, modes, loops, rates, gains.",
     "latency": "Show how long each loop takes to respond, by stage, and which gains this permits.",
-    "roots": "Characteristic roots of a loop: the rightmost ones, or all in a region.",
-    "map": "Map which gains of a PV controller are stable, with the boundary and the best of them.",
+    "roots": "Find the characteristic roots of a loop: the rightmost ones, or all in a region.",
+    "map": "Map which gains of a PV controller are stable, with the boundary and the best gains.",
     "explore": "Explore a loop in the browser: its map of gains, roots, margins, responses.",
-    "design": "Find the gains that are best in the worst case, within margins.",
+    "design": "Find the gains with the best worst case, within given margins.",
     "tune": "Propose gains from a recording, in the form of your controller, with predicted "
     "responses.",
-    "reproduce": "Reproduce the paper on delays in quadrotor control: each printed number beside "
-    "ours.",
+    "reproduce": "Reproduce the paper on delays in quadrotor control, and compare each "
+    "printed number.",
     "fly": "Fly steps under P control, estimate the delay, design PV gains, fly with them, land.",
-    "watch": "Follow the delay of a loop row by row, with its interval, while the loop runs.",
-    "internet-loop": "Control an integrator over UDP, estimate the loop's delay, and measure it.",
+    "watch": "Follow the delay of a running loop row by row, with its interval.",
+    "internet-loop": "Control an integrator over UDP, estimate its delay, and measure the delay.",
     "simulate": "Simulate the step response of a loop, exactly.",
     "report": "Write one page about a recording: delay, map of gains, a controller to try.",
     "demo": "Simulate a loop whose delay is known, find the delay, and design gains for it.",
-    "emulate": "Emulate a vehicle, on its own ports and in its own protocol.",
+    "emulate": "Emulate a vehicle, with its own network ports and protocol.",
 }
 
 
@@ -66,7 +66,7 @@ def _loaded(name: str) -> Any:
 app = typer.Typer(
     name="deadtime",
     cls=_Commands,
-    help="Control loops with a delay in them: estimate it, map the gains, design for it.",
+    help="Control loops with a delay: estimate the delay, map stable gains, design controllers.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -135,7 +135,7 @@ def run() -> None:
             message = f"{error.filename}: {error.strerror}"
         elif isinstance(error, ArithmeticError):
             message = (
-                f"a number leaves the range of double precision ({message}): choose other units"
+                f"a number exceeds the range of double precision ({message}): choose other units"
             )
         elif isinstance(error, MemoryError):
             message = f"out of memory: {message or 'ask for less at once'}"
@@ -146,8 +146,8 @@ def run() -> None:
 
         print(printable(traceback.format_exc()), file=sys.stderr)
         print(
-            f"deadtime: the command has failed internally ({type(error).__name__}); this is a "
-            "defect, please report it with the lines above and the command",
+            "deadtime: the command failed because of a defect in deadtime "
+            f"({type(error).__name__}). Please report it, with the command and the lines above",
             file=sys.stderr,
         )
         raise SystemExit(DEFECT) from None

@@ -74,16 +74,16 @@ def command(
         print_points(found.comparison.explanation())
         print_text("")
     print_text(
-        f"Simulated: a vehicle with a lag, behind {flight.truth.delay:g} s of radio delay, with "
-        "noise on its height. Its true delay and lag are "
-        f"{flight.numbers['delay+lag']:.3f} s together."
+        f"Simulated: a vehicle with a lag, commanded through {flight.truth.delay:g} s of "
+        "radio delay, with noise on the measured height. The true sum of delay and lag is "
+        f"{flight.numbers['delay+lag']:.3f} s."
     )
     print_text(f"\n{found.headline()}\n", "bold")
     if methods:
         for line in _next_commands(found.known, flight.window, file):
             print(line)
     print(f"open {page}")
-    print("your own file: deadtime estimate FILE")
+    print("to use your own file: deadtime estimate FILE")
 
 
 def _next_commands(loop: ControlLoop, window: opt.Ends, file: Path) -> list[str]:

@@ -30,7 +30,12 @@ CONTROLLERS: dict[str, type[Controller]] = {"P": P, "PV": PV, "PD": PD, "PI": PI
 def command(
     delay: opt.Delay = None,
     delay_to: Annotated[
-        float | None, typer.Option(help="Upper end of --delay, if it is an interval, s.")
+        float | None,
+        typer.Option(
+            help=(
+                "Upper end of the delay in s, if the delay is an interval that begins at --delay."
+            )
+        ),
     ] = None,
     controller: Annotated[Kind, typer.Option(help="Kind of controller.")] = "PV",
     kp: Annotated[opt.Ends | None, typer.Option(help="Range of the proportional gain.")] = None,
@@ -38,44 +43,63 @@ def command(
     ki: Annotated[opt.Ends | None, typer.Option(help="Range of the integral gain.")] = None,
     kd: Annotated[opt.Ends | None, typer.Option(help="Range of the derivative gain.")] = None,
     fix: Annotated[
-        list[str] | None, typer.Option(help="A gain that is fixed, such as Kp=2; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            help=(
+                "Keep a gain at this value, such as Kp=2. Give the option once for each such gain."
+            )
+        ),
     ] = None,
     plant: opt.Plant = None,
     gain: opt.Gain = 1.0,
     gain_to: Annotated[
-        float | None, typer.Option(help="Upper end of the plant's gain, if it is an interval.")
+        float | None,
+        typer.Option(help=("Upper end of the plant's gain, if the gain is an interval.")),
     ] = None,
     lag: opt.Lag = 0.0,
     sample_time: opt.Sample_time = None,
     limit: opt.Limit = None,
     filter: opt.Filter = None,  # noqa: A002
     choose_filter: Annotated[
-        bool, typer.Option("--choose-filter", help="Choose the corner of the filter as well.")
+        bool,
+        typer.Option(
+            "--choose-filter", help=("Also choose the corner of the derivative's filter.")
+        ),
     ] = False,
     objective: Annotated[
         Objective | None,
-        typer.Option(help="Objective. Default: load, or abscissa if the filter is chosen as well."),
+        typer.Option(
+            help=(
+                "Objective of the design. Default: load, or abscissa if the corner of the filter "
+                "is chosen as well."
+            )
+        ),
     ] = None,
     max_sensitivity: Annotated[
-        float | None, typer.Option(help="Largest Ms, for loads and set points; 1.6 if not given.")
+        float | None, typer.Option(help="Largest Ms, for loads and set points. Default: 1.6.")
     ] = None,
     noise_gain: Annotated[
         float | None,
-        typer.Option(help="Largest ratio of the noise of the command to that of the measurement."),
+        typer.Option(help="Largest ratio of the command's noise to the measurement's noise."),
     ] = None,
     settling_time: Annotated[
         float | None, typer.Option(help="Longest settling time of a step, s.")
     ] = None,
-    gain_margin: Annotated[float | None, typer.Option(help="Least gain margin, a factor.")] = None,
+    gain_margin: Annotated[
+        float | None, typer.Option(help=("Least gain margin, as a factor."))
+    ] = None,
     phase_margin: Annotated[float | None, typer.Option(help="Least phase margin, °.")] = None,
     delay_margin: Annotated[float | None, typer.Option(help="Least delay margin, s.")] = None,
     amplitude: Annotated[float, typer.Option(help="Size of the step.")] = 1.0,
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Find the gains that are best in the worst case, within margins."""
+    """Find the gains with the best worst case, within given margins."""
     if choose_filter and filter is not None:
-        raise ValueError("--filter gives the corner and --choose-filter asks for it: take one")
+        raise ValueError(
+            "--filter gives the corner of the filter and --choose-filter asks for a choice of "
+            "the corner: give only one of them"
+        )
     delay = opt.delay_beside(plant, delay)
     # The gains are varied: any that are not zero will do.
     loop = opt.described_loop(
@@ -126,7 +150,7 @@ def _gain(text: str) -> tuple[str, float]:
     except ValueError:
         equals = ""
     if not equals:
-        raise ValueError(f"--fix {text}: give a gain and its value, such as --fix Kp=2")
+        raise ValueError(f"--fix {text}: give the name and the value of a gain, such as --fix Kp=2")
     return name.strip(), finite(name.strip(), value)
 
 

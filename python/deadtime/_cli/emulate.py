@@ -26,7 +26,7 @@ from deadtime.links.ardrone2.emulator.options import PORT_BASE, ports_from
 from deadtime.links.parent_watch import parent_ended
 
 command = typer.Typer(
-    help="Emulate a vehicle, on its own ports and in its own protocol.",
+    help="Emulate a vehicle, with its own network ports and protocol.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -41,7 +41,7 @@ PORTS = ("navdata_port", "command_port", "control_port", "ftp_port", "video_port
 
 @command.callback()
 def _group() -> None:
-    """Emulate a vehicle, on its own ports and in its own protocol."""
+    """Emulate a vehicle, with its own network ports and protocol."""
 
 
 @command.command()
@@ -116,8 +116,9 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
     """Print the addresses and ports of the drone once it listens."""
     options = emulator.options
     warning = (
-        f"{options.host} can be reached by others. Only {', '.join(options.clients)} is answered, "
-        "but addresses can be forged, and there is no authentication: use a closed network."
+        f"{options.host} can be reached by other computers. Only {', '.join(options.clients)} is "
+        "answered, but addresses can be forged, and there is no authentication. Use a closed "
+        "network."
     )
     if not options.only_here:
         print(f"deadtime: {warning}", file=sys.stderr)
@@ -133,10 +134,11 @@ def print_address(emulator: Emulator, as_json: bool) -> None:
         return
     # The shared console would wrap the line in a file.
     Console(soft_wrap=True, highlight=False).print(
-        f"An AR.Drone 2.0 (plant {options.plant}, transport delay {options.transport_delay:g} s) "
-        f"is on {emulator.host}: navdata on UDP {emulator.navdata_port}, commands on UDP "
-        f"{emulator.command_port}, configuration on TCP {emulator.control_port}, no files on TCP "
-        f"{emulator.ftp_port}, no video on TCP {emulator.video_port}. Ctrl-C ends it.",
+        f"An AR.Drone 2.0 (plant {options.plant}, transport delay {options.transport_delay:g} "
+        f"s) is emulated at {emulator.host}. UDP ports: navdata {emulator.navdata_port}, "
+        f"commands {emulator.command_port}. TCP ports: configuration {emulator.control_port}, "
+        f"no files on {emulator.ftp_port}, no video on {emulator.video_port}. Ctrl-C ends the "
+        "emulation.",
         markup=False,
     )
     sys.stdout.flush()

@@ -57,7 +57,7 @@ def command(
         if value is not None:
             option = name.replace("_", "-")
             raise ValueError(
-                f"--{option} is for a plant that is chosen from the recording: leave out "
-                f"--{option}, or {', '.join(loop.named)}"
+                f"--{option} applies only if the plant is chosen from the recording: leave "
+                f"out --{option}, or {', '.join(loop.named)}"
             )
     estimate_loop(loop, as_json)

@@ -79,11 +79,13 @@ class NamedLoop:
         """The loop of each file."""
         if not self.gains["kp"]:
             raise ValueError(
-                f"{', '.join(self.named) or 'several files'}: this is for a loop with a known "
+                f"{', '.join(self.named) or 'several files'}: this option needs a known "
                 "controller: give --kp, or leave the option out"
             )
         if self.corner is not None and not (self.gains["kv"] or self.gains["kd"]):
-            raise ValueError("--filter is for the derivative: give --kv or --kd, or leave it out")
+            raise ValueError(
+                "--filter is the filter of the derivative: give --kv or --kd, or leave --filter out"
+            )
         each = (_each(name, own or [0.0], self.files) for name, own in self.gains.items())
         loops = [
             opt.described_loop(
@@ -126,8 +128,8 @@ def estimate_loop(asked: NamedLoop, as_json: bool) -> None:
     if asked.plant in AUTOMATIC:
         if asked.free is not None or name == "all":
             raise ValueError(
-                f"--plant {asked.plant} fits every number of a plant by one method: leave out "
-                "--free, and name --method output_error or waveform, or auto"
+                f"--plant {asked.plant} fits all numbers of a plant by one method: leave out "
+                "--free, and give --method output_error, waveform or auto"
             )
         own = _with_options(name, asked.options)
         choice = choose_plant(flights, loops, method=own, window=asked.windows)
@@ -135,7 +137,7 @@ def estimate_loop(asked: NamedLoop, as_json: bool) -> None:
         return
     if name == "all":
         if asked.free is not None:
-            raise ValueError("--free is for one method: name it by --method")
+            raise ValueError("--free applies to one method only: name the method by --method")
         compared = compare_methods(flights[0], loops[0], asked.windows[0])
         _show_all(compared, findings, asked.plot, as_json)
         return
@@ -163,8 +165,8 @@ def _each(name: str, values: Sequence[Each], files: Sequence[Path]) -> list[Each
     """A value for each file, of one for all or of one each."""
     if len(values) not in (1, len(files)):
         raise ValueError(
-            f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(values)} of --{name}: "
-            "give one for all, or one for each"
+            f"{len(files)} {'file' if len(files) == 1 else 'files'} and {len(values)} values "
+            f"of --{name}: give one value for all files, or one for each file"
         )
     return list(values) * (len(files) if len(values) == 1 else 1)
 
@@ -177,12 +179,12 @@ def _chosen(method: str | None, number: int, options: Mapping[str, Any]) -> str:
         raise ValueError(f"--method {method} is not one of {', '.join(CHOICES)}")
     if method == "all" and number > 1:
         raise ValueError(
-            f"--method all compares methods on one file, and there are {number}: fit them "
-            f"together by --method {' or '.join(JOINT)}"
+            f"--method all compares methods on one file, but {number} files are given: fit "
+            f"them together by --method {' or '.join(JOINT)}"
         )
     if method == "all" and options:
         option = next(iter(options)).replace("_", "-")
-        raise ValueError(f"--{option} is for one method: name it by --method")
+        raise ValueError(f"--{option} applies to one method only: name the method by --method")
     return method
 
 
@@ -242,8 +244,8 @@ def _show_all(
     print_grave_findings(findings)
     print_table(estimates_table(comparison))
     print_text(
-        "in brackets: assumed; sum: delay plus lag; off: difference of the sum from that of "
-        f"{comparison.best.method}, in s and in its standard errors",
+        "in brackets: assumed values; sum: delay plus lag; off: difference between the sum "
+        f"and that of {comparison.best.method}, in s and in standard errors",
         "dim",
     )
     print_points([*comparison.explanation(), *comparison.limitations()])

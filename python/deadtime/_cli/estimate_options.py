@@ -15,16 +15,16 @@ CHOICES = ("all", "auto", *METHODS)
 Files = Annotated[
     list[Path],
     typer.Argument(
-        help="Tables of one vehicle: CSV with a header line, Parquet, Arrow or MAT. "
-        "FILE@LOW:HIGH is a file with a window of its own.",
+        help="Tables recorded from one vehicle: CSV with a header line, Parquet, Arrow or MAT. "
+        "FILE@LOW:HIGH reads only the times LOW to HIGH, in s.",
         show_default=False,
     ),
 ]
 Kp = Annotated[
     list[float] | None,
     typer.Option(
-        help="Proportional gain of the controller in the loop. This and the other gains: one, "
-        "or one for each file. The command of a P controller need not be logged.",
+        help="Proportional gain of the controller in the loop. Give each gain once for all files, "
+        "or once for each file. With a P controller the command need not be logged.",
         show_default=False,
     ),
 ]
@@ -63,24 +63,33 @@ Free = Annotated[
     ),
 ]
 Map = Annotated[
-    OvershootMap | None, typer.Option(help="Map from overshoot to delay, for the method overshoot.")
+    OvershootMap | None,
+    typer.Option(help=("Map from overshoot to delay, used by the method overshoot.")),
 ]
 Noise_path = Annotated[
     NoisePath | None,
     typer.Option(
-        help="For waveform: is the sensor noise in the recording alone, or in the loop too?"
+        help=(
+            "Whether the sensor noise is in the recording alone, or also in the loop. For the "
+            "method waveform."
+        )
     ),
 ]
 Initial_output = Annotated[
     float | None,
-    typer.Option(help="True output at the start, if known; for output_error, waveform, grid, cta."),
+    typer.Option(
+        help=(
+            "True output at the first row, if it is known. For the methods output_error, "
+            "waveform, grid and cta."
+        )
+    ),
 ]
 At_rest = Annotated[
     bool | None,
     typer.Option(
         "--at-rest/--not-at-rest",
-        help="Was the plant at rest at the first row? Default: judged from the recording. Only if "
-        "the plant is chosen from the recording.",
+        help="Whether the plant was at rest at the first row. Default: judged from the recording. "
+        "Applies only if the plant is chosen from the recording.",
         show_default=False,
     ),
 ]
@@ -88,22 +97,25 @@ Closed_loop = Annotated[
     bool | None,
     typer.Option(
         "--closed-loop/--open-loop",
-        help="Does a controller compute the command? Default: yes with --kp or a reference that "
-        "moves. Only if the plant is chosen from the recording.",
+        help="Whether a controller computes the command. Default: yes, if --kp is given or the "
+        "reference moves. Applies only if the plant is chosen from the recording.",
         show_default=False,
     ),
 ]
 Largest_delay = Annotated[
     float | None,
     typer.Option(
-        help="Largest delay that is tried, s. Only if the plant is chosen from the recording."
+        help=(
+            "Largest delay that is tried, s. Applies only if the plant is chosen from the "
+            "recording."
+        )
     ),
 ]
 Check = Annotated[
     bool,
     typer.Option(
         "--check",
-        help="Estimate nothing: print what a check of the files finds. The exit code is 1 if "
-        "it refuses one.",
+        help="Only check the files and print what the check finds, without an estimate. The exit "
+        "code is 1 if a file is refused.",
     ),
 ]

@@ -102,8 +102,8 @@ def estimate_plant(asked: Asked, as_json: bool) -> None:
     has_loop = loop.gains["kp"] is not None
     if plant is not None and plant not in PLANTS:
         raise ValueError(
-            f"--plant {plant}: without --kp it is one of {', '.join(map(repr, PLANTS))}; a formula "
-            "needs --kp"
+            f"--plant {plant}: without --kp, give one of {', '.join(map(repr, PLANTS))}; with "
+            "--kp, a formula is possible too"
         )
     columns = dict(asked.columns)
     findings: list[dict[str, Any]] = []
@@ -147,8 +147,8 @@ def _refuse_loop(loop: NamedLoop) -> None:
     for name, value in {**given, "limit": loop.limit}.items():
         if value is not None:
             raise ValueError(
-                f"--{name.replace('_', '-')} is for a loop with a known controller: give --kp, or "
-                "leave the option out"
+                f"--{name.replace('_', '-')} needs a known controller: give --kp, or leave "
+                "the option out"
             )
 
 

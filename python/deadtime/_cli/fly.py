@@ -30,12 +30,13 @@ from deadtime.links.axes import AxisName
 EMULATED_CLIMB, REAL_CLIMB = FlightPlan().limits.max_climb, Limits().max_climb
 
 CLIMB = (
-    f"Largest vertical speed commanded, m/s: {EMULATED_CLIMB:g} (the paper's) on this computer, "
-    f"{REAL_CLIMB:g} elsewhere."
+    "Largest vertical speed that is commanded, m/s. Default: "
+    f"{EMULATED_CLIMB:g} (as in the paper) for an emulator on this computer, {REAL_CLIMB:g} for "
+    "any other vehicle."
 )
 LONGEST = Annotated[
     float,
-    typer.Option("--longest-delay", help="Longest delay for which --adapt proves gains, s."),
+    typer.Option("--longest-delay", help="Longest delay up to which --adapt proves its gains, s."),
 ]
 
 #: The options of the ports; the help of the first is that of all.
@@ -167,7 +168,7 @@ def _by_axis(option: str, given: list[str], names: list[str]) -> dict[str, tuple
         name, _, numbers = text.rpartition("=")
         name = name.strip() or "z"
         if name not in names:
-            raise ValueError(f"{option} {text}: the axis {name} is not flown, see --axes")
+            raise ValueError(f"{option} {text}: the axis {name} is not among those of --axes")
         if name in found:
             raise ValueError(f"{option} {text}: {name} is given twice")
         try:
@@ -196,7 +197,13 @@ def _print_restored(said: list[str], as_json: bool) -> None:
     if as_json:
         print_json("restored", {"restored": said})
     else:
-        print_text("\n".join(said) or "no earlier run has left changed parameters in the vehicle")
+        print_text(
+            "\n".join(said)
+            or (
+                "no earlier run has left changed parameters in the vehicle, so there is nothing "
+                "to restore"
+            )
+        )
 
 
 def _print_report(found: FlightReport) -> None:
@@ -206,7 +213,10 @@ def _print_report(found: FlightReport) -> None:
             print_text("\n".join(found.adapted[study.axis.name].lines()))
     print_text(f"\nRecordings and report are in {found.folder}: {found.page.name}")
     if found.round_trip is not None:
-        print_text(f"The round trip of the link, by TIMESYNC, was {1e3 * found.round_trip:.1f} ms.")
+        print_text(
+            "The round trip time of the link, measured by TIMESYNC, was "
+            f"{1e3 * found.round_trip:.1f} ms."
+        )
 
 
 def _print_study(study: FlightStudy) -> None:

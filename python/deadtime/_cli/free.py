@@ -30,14 +30,14 @@ def checked_free(text: str | None, loop: ControlLoop, method: str) -> tuple[str,
             continue
         why = f"{name!r} cannot be fitted"
         if name in FORMS:
-            why = f"this plant has no {name}, only a plant {FORMS[name]} has it"
+            why = f"this plant has no {name}; only a plant {FORMS[name]} has this number"
         elif name in OF_WAVEFORM and method != "waveform":
-            why = f"{name} is for --method waveform"
+            why = f"{name} can be fitted only by --method waveform"
         elif name == "limit":
-            why = "the fit of a limit begins at --limit, which is not given"
+            why = "the limit cannot be fitted because its initial value, --limit, is missing"
         raise ValueError(f"--free {text}: {why}; {choice}")
     if "delay" not in names and loop.delay is None:
-        raise ValueError(f"--free {text}: the delay is not known, so name it too; {choice}")
+        raise ValueError(f"--free {text}: the delay is not known, so add delay to --free; {choice}")
     return names
 
 

@@ -44,7 +44,7 @@ def command(
     flight: opt.Flight = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """List what the log of an autopilot holds: vehicle, modes, loops, rates, gains.
+    """List the contents of an autopilot's log: vehicle, modes, loops, rates, gains.
 
     Parameters
     ----------
@@ -143,7 +143,8 @@ def _reasons(log: Log) -> list[str]:
         for sentence in loop.why_left_out:
             names.setdefault(sentence.partition(": ")[2] or sentence, []).append(loop.name)
     return [
-        f"left out where {reason}: "
+        f"rows left out because x.py:61|{reason} is a bag, which has topics but no loops or "
+        "flights: leave --loop and --flight out "
         + ("all loops" if len(found) == len(log.loops) else ", ".join(found))
         for reason, found in names.items()
     ]

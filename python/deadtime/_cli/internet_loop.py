@@ -29,7 +29,9 @@ SETTINGS = Fills(
     Trial,
     "sample_time duration lag limit watchdog seed",
     sample_time=Annotated[float, Bounds(1e-4)],
-    duration=Annotated[float, typer.Option(help="Of a run, s; it steps after 1 s.")],
+    duration=Annotated[
+        float, typer.Option(help=("Duration of a run, s. The reference steps after 1 s."))
+    ],
     seed=Annotated[int, Bounds(0)],
 )
 
@@ -48,7 +50,7 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Control an integrator over UDP, estimate the loop's delay, and measure it.
+    """Control an integrator over UDP, estimate its delay, and measure the delay.
 
     Parameters
     ----------
@@ -65,7 +67,7 @@ def command(
     if trial.duration < trial.rest + 1.0:
         raise ValueError(
             f"--duration {trial.duration:g} leaves less than 1 s after the step at "
-            f"{trial.rest:g} s: give a longer one"
+            f"{trial.rest:g} s: give a longer duration"
         )
     with stages(2 * len(gains) + 1, quiet=as_json) as begin:
         found = run_internet_loop(

@@ -50,12 +50,18 @@ def command(
     ],
     axis: Annotated[
         list[str] | None,
-        typer.Option(help="Only loops of this axis; may be repeated.", show_default=False),
+        typer.Option(
+            help=("Only loops of this axis. Give the option once for each axis."),
+            show_default=False,
+        ),
     ] = None,
     loop: Annotated[
         list[str] | None,
         typer.Option(
-            help="Only this loop, with all details, such as 'roll rate'; repeat for more loops.",
+            help=(
+                "Only this loop, with all its details, such as 'roll rate'. Give the option "
+                "once for each loop."
+            ),
             show_default=False,
         ),
     ] = None,
@@ -64,25 +70,29 @@ def command(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="Write a page with all fits, for one log.", show_default=False),
+        typer.Option(
+            help=("Write a page with all fits of one log to this file."), show_default=False
+        ),
     ] = None,
     command: Annotated[
         str | None,
         typer.Option(
-            help="Column of a table, or TOPIC:FIELD of a bag, that is followed.",
+            help="Column of a table, or TOPIC:FIELD of a bag, that holds what the loop follows.",
             show_default=False,
         ),
     ] = None,
     output: Annotated[
         str | None,
         typer.Option(
-            help="Column of a table, or TOPIC:FIELD of a bag, that responds.", show_default=False
+            help=("Column of a table, or TOPIC:FIELD of a bag, that holds the response."),
+            show_default=False,
         ),
     ] = None,
     reference: Annotated[
         str | None,
         typer.Option(
-            help="Column of a table that is followed, in place of --command.", show_default=False
+            help=("Column of a table that holds what the loop follows, instead of --command."),
+            show_default=False,
         ),
     ] = None,
     time: opt.Time = None,
@@ -94,11 +104,11 @@ def command(
     Exit codes: 0 a time, reliable or an indication; 3 none; 1 an error.
     """
     if len(logs) > 2:
-        raise ValueError(f"{len(logs)} logs were given: give one, or two to compare")
+        raise ValueError(f"{len(logs)} logs were given: give one log, or two logs to compare")
     if out is not None:
         check_pages()
         if len(logs) > 1:
-            raise ValueError("--out writes the page of one log: give one, or leave it out")
+            raise ValueError("--out writes a page about one log: give one log, or leave --out out")
     columns = {"time": time, "reference": reference, "output": output, "command": command}
     found = []
     with without_waiting_for_threads():
@@ -137,12 +147,13 @@ def _opened(path: Path, columns: Mapping[str, str | None], flight: int | None) -
     found = open_log(path, flight=flight)
     if named:
         raise ValueError(
-            f"{path} is a {found.format} log, whose loops are known: leave {', '.join(named)} out"
+            f"{path} is a {found.format} log, from which the loops are already known: leave "
+            f"{', '.join(named)} out"
         )
     if found.duration < SHORTEST:
         raise NotIdentifiableError(
-            f"{found.source} is {stated(found.duration, 0.0, 's')} long, in which no loop of a "
-            "vehicle responds: give a longer log"
+            f"{found.source} is {stated(found.duration, 0.0, 's')} long, and no loop of a "
+            "vehicle responds within it: give a longer log"
         )
     return found
 
@@ -154,11 +165,11 @@ def _of_bag(path: Path, columns: Mapping[str, str | None]) -> Recording:
         names = [f"{one}:{field}" for one, topic in bag.topics.items() for field in topic.fields]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise ValueError(
-            f"{path} is a bag: name what is followed and what responds by --command and --output, "
-            f"each TOPIC:FIELD; it has {', '.join(names[:LISTED]) or 'none'}{more}"
+            f"{path} is a bag: give the setpoint by --command and the response by --output, "
+            f"each as TOPIC:FIELD; the bag has {', '.join(names[:LISTED]) or 'none'}{more}"
         )
     if columns["time"] is not None:
-        raise ValueError(f"{path} is a bag, whose messages have their times: leave --time out")
+        raise ValueError(f"{path} is a bag, whose messages already have times: leave --time out")
     return bag.recording(told, came, columns["reference"])
 
 
@@ -204,7 +215,7 @@ def _print_json(found: list[Latency]) -> None:
 def _print_changes(one: Latency, other: Latency) -> None:
     changes = compare_latencies(one, other)
     if not changes:
-        print_text("no loop has a time in both logs", "yellow")
+        print_text("no loop has a response time in both logs", "yellow")
         return
     rows = [
         (

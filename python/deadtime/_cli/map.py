@@ -46,24 +46,27 @@ def command(
     counts: Annotated[
         bool,
         typer.Option(
-            "--counts", help="Count unstable roots only, which takes a fraction of the time."
+            "--counts", help="Only count the unstable roots, which is several times faster."
         ),
     ] = False,
     decay: Annotated[
-        float, typer.Option(help="Stable means: every root decays at least this fast, 1/s.")
+        float,
+        typer.Option(
+            help=("Call a cell stable only if every root decays at least at this rate, 1/s.")
+        ),
     ] = 0.0,
     damping: Annotated[
         opt.Ends | None,
         typer.Option(
-            help="Stable also means: at least this damping ratio, of roots that decay slower than "
-            "this rate, 1/s."
+            help="Call a cell stable only if roots that decay slower than this rate, 1/s, have at "
+            "least this damping ratio."
         ),
     ] = None,
     proof: Annotated[
         Proof, typer.Option(help="Prove whole rows by their crossings, or each cell by itself.")
     ] = "curves",
     along: Annotated[
-        Gains | None, typer.Option(help="List the crossings of the axis along this gain.")
+        Gains | None, typer.Option(help="List the crossings of the imaginary axis along this gain.")
     ] = None,
     at: Annotated[
         float | None, typer.Option(help="Value of the other gain. Default: that of the best cell.")
@@ -71,7 +74,7 @@ def command(
     plot: opt.Plot = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Map which gains of a PV controller are stable, with the boundary and the best of them."""
+    """Map which gains of a PV controller are stable, with the boundary and the best gains."""
     delay = opt.delay_beside(plant, delay)
     # The gains are varied: any that are not zero will do.
     loop = opt.described_loop(
@@ -152,7 +155,10 @@ def _crossings_along(
     other = "Kv" if along == "Kp" else "Kp"
     if at is None:
         if best is None:
-            raise ValueError(f"--along {along} needs --at: no cell is known to be the best")
+            raise ValueError(
+                f"--along {along} needs --at: the best cell, whose gain would be the default, "
+                "is not known"
+            )
         at = best[other]
     ends = (float(axes[along][0]), float(axes[along][-1]))
     return crossings(loop, {along: ends}, at={other: at})

@@ -62,17 +62,25 @@ Output = Annotated[
     ),
 ]
 Command = Annotated[str | None, typer.Option(help="Column of the command, if it was logged.")]
-Window = Annotated[Ends | None, typer.Option(help="Use the samples between these times, s.")]
+Window = Annotated[
+    Ends | None, typer.Option(help=("Use only the samples between these two times, s."))
+]
 Kp = Annotated[float, typer.Option(help="Proportional gain.", show_default=False)]
 Kv = Annotated[float, typer.Option(help="Velocity gain.")]
 Delay = Annotated[
     float | None,
     typer.Option(
-        help="Delay of the loop, s, added to that of --plant. Default: 0 if --plant has one.",
+        help=(
+            "Delay of the loop, s. It is added to the delay of --plant. Default: 0 if --plant "
+            "has a delay."
+        ),
         show_default=False,
     ),
 ]
-Gain = Annotated[float, typer.Option(help="Gain of the integrating plant, a factor on --plant.")]
+Gain = Annotated[
+    float,
+    typer.Option(help=("Gain of the integrating plant. With --plant, a factor on that plant.")),
+]
 Plant = Annotated[
     str | None,
     typer.Option(
@@ -82,22 +90,28 @@ Plant = Annotated[
 ]
 Lag = Annotated[float, typer.Option(help="Lag of the plant, s.")]
 Sample_time = Annotated[
-    float | None, typer.Option(help="Time between commands, s; each is held. Default: continuous.")
+    float | None,
+    typer.Option(
+        help=(
+            "Time between commands, s. Each command is held until the next. Default: a continuous "
+            "controller."
+        )
+    ),
 ]
-Limit = Annotated[float | None, typer.Option(help="Largest size of the command.")]
+Limit = Annotated[float | None, typer.Option(help="Largest magnitude of the command.")]
 Filter = Annotated[
     float | None,
-    typer.Option(help="Corner of the derivative's filter, rad/s. Default: ideal derivative."),
+    typer.Option(help="Corner of the derivative's filter, rad/s. Default: no filter."),
 ]
 Plot = Annotated[
     Path | None,
-    typer.Option(help="Write a picture to this .png, .svg or .pdf.", callback=_drawn_later),
+    typer.Option(help="Write a picture to this file (.png, .svg or .pdf).", callback=_drawn_later),
 ]
 As_json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 Flight = Annotated[
     int | None,
     typer.Option(
-        help="Which flight of a Blackbox file, from 1; by default the longest.",
+        help="Number of the flight in a Blackbox file, from 1. Default: the longest flight.",
         show_default=False,
     ),
 ]
@@ -130,7 +144,10 @@ def described_loop(
             raise ValueError(f"--{name} is {value}: give a finite number")
     controller = _described_controller(kp, kv, ki, kd, corner)
     if plant is not None and lag != 0.0:
-        raise ValueError("--lag is that of the integrating plant: write it into --plant")
+        raise ValueError(
+            "--lag is the lag of the integrating plant, but --plant is given: write the lag "
+            "into --plant"
+        )
     loop = ControlLoop(
         Integrator(gain=gain, lag=lag) if plant is None else plant_from(plant),
         controller,
@@ -148,8 +165,8 @@ def delay_beside(plant: Plant, delay: Delay) -> float:
     G = None if plant is None else plant_from(plant)
     if G is None or not (G.num.delays.any() or G.den.delays.any()):
         raise ValueError(
-            "--delay is missing: give the delay of the loop in s, or write it as delay(T) into "
-            "--plant"
+            "--delay is missing: give the delay of the loop in s, or write the delay into "
+            "--plant as delay(T)"
         )
     return 0.0
 
@@ -193,6 +210,7 @@ def check_duration(loop: ControlLoop, duration: float | None = None) -> None:
     for name, length in times.items():
         if 0.0 < length < duration / MOST_PARTS:
             raise ValueError(
-                f"{name} is {length:g} s, less than a millionth of the {duration:g} s to simulate: "
-                "that takes too long; leave such a time out, or shorten the simulation"
+                f"{name} is {length:g} s, less than a millionth of the {duration:g} s to "
+                "simulate, so the run would take too long. Leave this time out, or shorten "
+                "the simulation"
             )

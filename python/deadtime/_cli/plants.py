@@ -52,9 +52,11 @@ def plant_from(text: str) -> TransferFunction:
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except SyntaxError as error:
-        raise _misread(text.strip(), (error.offset or 1) - 1, "this is no formula") from None
+        raise _misread(
+            text.strip(), (error.offset or 1) - 1, "this is not a valid formula"
+        ) from None
     except (ValueError, RecursionError, MemoryError):
-        raise ValueError(f"--plant {text!r} is no formula: {_MEANING}") from None
+        raise ValueError(f"--plant {text!r} is not a valid formula: {_MEANING}") from None
     found = _Reader(text.strip()).value(tree.body)
     return found if isinstance(found, TransferFunction) else TransferFunction(found)
 
@@ -121,19 +123,19 @@ class _Reader:
             case ast.Call(func=ast.Name(id="delay"), args=[only], keywords=[]):
                 return self.late(only)
             case ast.Name():
-                raise self.misread(node, f"{node.id!r} has no meaning here")
+                raise self.misread(node, f"{node.id!r} is not a name that a plant may contain")
             case ast.BinOp(op=ast.BitXor()):
-                raise self.misread(node, "a power is written with **, as in s**2")
+                raise self.misread(node, "write a power with **, as in s**2")
             case ast.Call(func=ast.Name(id="exp")):
-                raise self.misread(node, "exp(-T*s) is written delay(T)")
-        raise self.misread(node, "this has no meaning here")
+                raise self.misread(node, "write exp(-T*s) as delay(T)")
+        raise self.misread(node, "this expression is not allowed in a plant")
 
     def joined(self, node: ast.BinOp) -> Any:
         left, right = self.value(node.left), self.value(node.right)
         try:
             found = _OPERATORS[type(node.op)](left, right)
         except ZeroDivisionError:
-            raise self.misread(node.right, "a division by zero") from None
+            raise self.misread(node.right, "this divides by zero") from None
         except (ValueError, ArithmeticError) as error:
             raise self.misread(node, str(error)) from None
         return self.number(node, found) if isinstance(found, float) else found
@@ -141,17 +143,19 @@ class _Reader:
     def power(self, node: ast.BinOp) -> Any:
         base, exponent = self.value(node.left), self.value(node.right)
         if not isinstance(exponent, float):
-            raise self.misread(node.right, "an exponent is a number")
+            raise self.misread(node.right, "an exponent must be a number")
         if not isinstance(base, float):
             if not exponent.is_integer() or abs(exponent) > _HIGHEST:
-                raise self.misread(node.right, f"an exponent is whole, up to {_HIGHEST}")
+                raise self.misread(
+                    node.right, f"an exponent must be a whole number of at most {_HIGHEST}"
+                )
             exponent = int(exponent)
             if exponent < 0 and isinstance(base, QuasiPolynomial):
                 base = TransferFunction(base)
         try:
             found = base**exponent
         except ZeroDivisionError:
-            raise self.misread(node.left, "a division by zero") from None
+            raise self.misread(node.left, "this divides by zero") from None
         except (ValueError, OverflowError):
             raise self.misread(node, "this power is out of range") from None
         return self.number(node, found) if isinstance(base, float) else found
@@ -159,7 +163,7 @@ class _Reader:
     def late(self, node: ast.expr) -> QuasiPolynomial:
         time = self.value(node)
         if not isinstance(time, float) or time < 0.0:
-            raise self.misread(node, "a delay is a number of seconds, zero or more")
+            raise self.misread(node, "a delay must be a number of seconds, zero or more")
         return delay(time)
 
     def number(self, node: ast.expr, value: Any) -> float:
@@ -168,7 +172,7 @@ class _Reader:
         except (OverflowError, TypeError):  # too large, or complex
             number = math.nan
         if not math.isfinite(number):
-            raise self.misread(node, "this is no finite real number")
+            raise self.misread(node, "this is not a finite real number")
         return number
 
     def misread(self, node: ast.expr, why: str) -> ValueError:

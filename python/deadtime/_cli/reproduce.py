@@ -39,12 +39,15 @@ def command(
     out: Path = Path("reproduction"),
     page: Path | None = None,
     only: Annotated[
-        str | None, typer.Option(help=f"Parts, between commas, of {', '.join(PARTS)}.")
+        str | None,
+        typer.Option(
+            help=(f"Parts to reproduce, separated by commas. They are {', '.join(PARTS)}.")
+        ),
     ] = None,
     pictures: Literal["png", "svg", "pdf"] = "png",
     as_json: opt.As_json = False,
 ) -> None:
-    """Reproduce the paper on delays in quadrotor control: each printed number beside ours.
+    """Reproduce the paper on delays in quadrotor control, and compare each printed number.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def command(
     certificate: Path | None = None,
     as_json: opt.As_json = False,
 ) -> None:
-    """Characteristic roots of a loop: the rightmost ones, or all in a region.
+    """Find the characteristic roots of a loop: the rightmost ones, or all in a region.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def command(
     delay = opt.delay_beside(numbers["plant"], delay)
     loop = opt.described_loop(kp, kv, delay, corner=filter, **numbers)
     if (re is None) != (im is None):
-        raise ValueError("a region needs both --re and --im")
+        raise ValueError("a region needs both --re and --im: give both, or neither")
     found = loop.rightmost(rightmost) if re is None else loop.poles(re, im)
     chain = -np.inf if loop.is_sampled else loop.characteristic().chain_abscissa()
     proof = None

@@ -74,9 +74,11 @@ def check_picture(path: Path) -> None:
     """Refuse a file to which no figure can be written; called before the long computation."""
     check_matplotlib()
     if path.suffix.lower() not in PICTURES:
-        raise ValueError(f"{path} is no picture: end it in {', '.join(PICTURES)}")
+        raise ValueError(f"{path} is not the name of a picture: end it in {', '.join(PICTURES)}")
     if not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}; make it, or give another one")
+        raise ValueError(
+            f"{path}: there is no folder {path.parent}; create the folder, or give another one"
+        )
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -36,8 +36,8 @@ def command(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A table with a bump test or a closed loop, FILE or FILE@LOW:HIGH, or the log of "
-            "a vehicle.",
+            help="A table with a bump test or a closed-loop recording, FILE or FILE@LOW:HIGH; or "
+            "the log of a vehicle.",
             show_default=False,
         ),
     ],
@@ -141,7 +141,10 @@ def command(
             )
         else:
             if flight is not None:
-                raise ValueError("--flight is for the log of a vehicle: a table has no flights")
+                raise ValueError(
+                    "--flight selects a flight in the log of a vehicle, and a table has no "
+                    "flights: leave --flight out"
+                )
             _check_form(form or "parallel", loop, firmware)
             columns["command"] = columns["command"] or "auto"
             found = tune(
@@ -167,9 +170,15 @@ def _template(
 ) -> type[Controller] | Controller | None:
     """The kind of controller that is asked for, with its filter and weight; None where none is."""
     if corner is not None and kind not in ("PV", "PD", "PID"):
-        raise ValueError("--filter-hz is for a derivative: give --controller PV, PD or PID")
+        raise ValueError(
+            "--filter-hz is the filter of a derivative, which this controller does not have: "
+            "give --controller PV, PD or PID"
+        )
     if weight is not None and kind not in (None, "PI", "PID"):
-        raise ValueError("--weight is for the set point: give --controller PI or PID")
+        raise ValueError(
+            "--weight is the weight of the set point, which this controller does not have: "
+            "give --controller PI or PID"
+        )
     if corner is None and weight is None:
         return None if kind is None else CONTROLLERS[kind]
     found: Any = CONTROLLERS[kind or "PI"]
@@ -189,8 +198,8 @@ def _check_form(form: Form, loop: str | None, firmware: str) -> None:
     if loops is None and (loop or firmware):
         option = "--loop" if loop else "--firmware"
         raise ValueError(
-            f"{option} is for a vehicle, and the form {form} is not: leave it out, or give --form "
-            f"{', '.join(LOOPS_OF_FORMS)}"
+            f"{option} needs the form of a vehicle, and the form {form} is not one: leave "
+            f"{option} out, or give --form {', '.join(LOOPS_OF_FORMS)}"
         )
     if loops is not None and loop not in loops:
         raise ValueError(
@@ -204,7 +213,9 @@ def _flown(
     """The controller that was in use, by its gains."""
     if kp is None:
         if ki is not None or kd is not None:
-            raise ValueError("--ki and --kd are gains that were in use: give --kp with them")
+            raise ValueError(
+                "--ki and --kd are gains that were in use together with --kp: give --kp too"
+            )
         return None
     ki, kd = ki or 0.0, kd or 0.0
     return PV(kp, kd) if kind == "PV" else ParallelForm(kp, ki, kd).controller()
@@ -214,7 +225,10 @@ def _refuse(given: Given) -> None:
     """Refuse what a log says itself."""
     for name, value in given.items():
         if value not in (None, "", False):
-            raise ValueError(f"--{name} is for a table: a log of a vehicle already contains it")
+            raise ValueError(
+                f"--{name} is needed for a table only, because the log of a vehicle already "
+                f"contains this: leave --{name} out"
+            )
 
 
 def _show(found: Proposal, path: Path, plot: Path | None, out: Path | None, as_json: bool) -> None:
@@ -248,4 +262,7 @@ def _next(found: Proposal, path: Path) -> str:
         for name, gain in found.controller.gains.items():
             option = "kd" if name == "Kv" else name.lower()
             words += [f"--{option}", f"{gain:.6g}"]
-    return f"try them, record a step of the set point, and check: {shlex.join(words)}"
+    return (
+        "try these gains, record a step of the set point, and check the recording: "
+        f"{shlex.join(words)}"
+    )

@@ -63,10 +63,13 @@ class VehicleOptions:
     def __post_init__(self) -> None:
         if self.host is not None and self.link is not None:
             raise ValueError(
-                "--host is for an AR.Drone, --link for ArduPilot or PX4: give only one of them"
+                "--host is the address of an AR.Drone, and --link that of ArduPilot or PX4: "
+                "give only one of them"
             )
         if self.key is not None and self.link is None:
-            raise ValueError("--key signs the messages of a link: give --link")
+            raise ValueError(
+                "--key signs the messages of a link, but no link is given: give --link"
+            )
 
     @property
     def elsewhere(self) -> str | None:
@@ -86,22 +89,23 @@ class VehicleOptions:
         """Refuse a vehicle that is not on this computer alone without consent."""
         if self.elsewhere is not None and not self.consent:
             raise ValueError(
-                f"nothing was sent to {self.elsewhere}: a drone there would take off twice and fly "
-                "as said above. If nobody and nothing can be hurt by it, add --i-have-a-safe-area"
+                f"nothing was sent to {self.elsewhere}: a drone at this address would take "
+                "off twice and fly as described above. Add --i-have-a-safe-area if the flight "
+                "cannot hurt or damage anything"
             )
 
     def moving(self) -> MovingDelay | None:
         """The delay of the emulator, if it moves."""
         if self.virtual_time and (self.host is not None or self.link is not None):
             raise ValueError(
-                "--virtual-time is for the emulator only, a vehicle flies in real time: leave "
-                "one option out"
+                "--virtual-time works with the emulator only, because a vehicle flies in real "
+                "time: leave one of the two options out"
             )
         if self.moving_delay is None:
             return None
         if not self.virtual_time:
             raise ValueError(
-                "--moving-delay is for the emulator in virtual time: add --virtual-time"
+                "--moving-delay needs the emulator in virtual time: add --virtual-time"
             )
         try:
             first, longest = (float(part) for part in self.moving_delay.split(","))
@@ -114,7 +118,7 @@ class VehicleOptions:
     def restored(self, folder: Path | None) -> list[str]:
         """Put back what earlier runs have left changed over the link; what was done."""
         if self.link is None:
-            raise ValueError("--restore is for a vehicle on a link: give --link")
+            raise ValueError("--restore needs a vehicle on a link: give --link")
         with terminated_like_interrupted():
             link = MAVLinkVehicle(self.link, key=self._key(), folder=folder)
             return run_landing(link.restore())

@@ -25,8 +25,8 @@ def verdict(loop: ControlLoop) -> str:
     if chain > 0.0:
         return f"unstable: a chain of roots approaches Re s = {chain:.6g} 1/s"
     return (
-        f"not proved stable: spectral abscissa {abscissa:.6g} 1/s, on the imaginary axis or too "
-        "close to it to decide"
+        f"not proved stable: spectral abscissa {abscissa:.6g} 1/s; a root is on the imaginary "
+        "axis, or too close to the axis for a proof"
     )
 
 

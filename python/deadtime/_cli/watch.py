@@ -44,7 +44,7 @@ def command(
     page: bool = False,
     as_json: opt.As_json = False,
 ) -> None:
-    """Follow the delay of a loop row by row, with its interval, while the loop runs.
+    """Follow the delay of a running loop row by row, with its interval.
 
     Parameters
     ----------
@@ -131,9 +131,11 @@ def _events(
         secret = None if key is None else read_key(key)
         return heard_rows(LinkAddress.of(source), axis, silence, secret, system)
     if key is not None:
-        raise ValueError(f"--key signs a link, and {source} is a file")
+        raise ValueError(f"--key signs a link, but {source} is a file: leave --key out")
     if system is not None:
-        raise ValueError(f"--system selects a vehicle on a link, and {source} is a file")
+        raise ValueError(
+            f"--system selects a vehicle on a link, but {source} is a file: leave --system out"
+        )
     if follow:
         return growing_rows(Path(source), columns, silence)
     return recorded_rows(Path(source), columns)

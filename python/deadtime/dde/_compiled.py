@@ -77,4 +77,4 @@ def _check_numba(signature: Any) -> None:
 
 
 def _refusal(signature: str) -> ValueError:
-    return ValueError(f"fun has the signature {signature}: it must be {_SIGNATURE}")
+    return ValueError(f"fun has the signature {signature}, but must have {_SIGNATURE}")

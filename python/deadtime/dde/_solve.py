@@ -159,9 +159,11 @@ def solve_dde(
         past = np.repeat(past, initial.size)
     compiled = addresses(fun)
     if compiled is None and not callable(fun):
-        raise TypeError(f"fun={fun!r} is no function")
+        raise TypeError(f"fun={fun!r} is not a function: give a function")
     if compiled is not None and args:
-        raise ValueError("args: a compiled function takes its data from its LowLevelCallable")
+        raise ValueError(
+            "args: a compiled function takes no args; put its data into its LowLevelCallable"
+        )
     run = native.solve_dde(
         DelayProblem(
             fun=fun if compiled is None else compiled,
@@ -264,9 +266,9 @@ def _message(run: native.DelayRun) -> str:
             "is solved exactly by ControlLoop.simulate."
         )
     return (
-        f"The right-hand side is not finite at t={run.end!r} and later: the solution leaves the "
-        "domain of fun there. Check fun for roots, logarithms and divisions, or end the run "
-        "with a terminal event."
+        f"The right-hand side is not finite from t={run.end!r} on: the solution leaves the "
+        "domain of fun at this time. Check fun for roots, logarithms and divisions, or end "
+        "the run with a terminal event."
     )
 
 
@@ -284,7 +286,10 @@ def _history(history: Any) -> tuple[Any, Any]:
         return history, None
     if isinstance(history, tuple) and any(callable(part) for part in history):
         if len(history) != 2 or not all(callable(part) for part in history):
-            raise TypeError(f"history={history!r}: a pair is the function and its derivative")
+            raise TypeError(
+                f"history={history!r}: if history is a pair, both entries must be functions: "
+                "the history and its derivative"
+            )
         return history
     return np.atleast_1d(_vector("history", history)), None
 
@@ -298,8 +303,8 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
     found = past(start)
     if found is None:
         raise TypeError(
-            f"history at t={start} returned None: end it with a return statement that gives the "
-            "values"
+            f"history at t={start} returned None: end it with a return statement that gives "
+            "the values"
         )
     value = np.atleast_1d(real_array(f"history at t={start}", found))
     if value.ndim != 1:
@@ -308,7 +313,7 @@ def _initial(past: Any, y0: ArrayLike | None, start: float) -> Array:
         )
     if not np.isfinite(value).all():
         raise ValueError(
-            f"history is {value} at t={start}: give finite values, or y at the start as y0"
+            f"history is {value} at t={start}: give finite values, or give y at the start as y0"
         )
     return np.ascontiguousarray(value)
 
@@ -332,11 +337,13 @@ def _events(events: Any) -> list[DelayEvent]:
     found = []
     for event in (events,) if callable(events) else events:
         if not callable(event):
-            raise TypeError(f"events: {event!r} is no function")
+            raise TypeError(f"events: {event!r} is not a function: give functions")
         direction = int(np.sign(finite("direction", getattr(event, "direction", 0))))
         terminal = finite("terminal", getattr(event, "terminal", None) or 0)
         if not 0 <= terminal < 2**31 or terminal != int(terminal):
-            raise ValueError(f"terminal={terminal}: give True, or the number of a crossing")
+            raise ValueError(
+                f"terminal={terminal}: give True, or the number of the crossing that ends the run"
+            )
         found.append(DelayEvent(event, direction, int(terminal)))
     return found
 
@@ -347,7 +354,7 @@ def _jumps(jumps: Iterable[Any], start: float, end: float) -> list[DelayJump]:
     for jump in jumps:
         time, change = jump if isinstance(jump, tuple) else (jump, None)
         if change is not None and not callable(change):
-            raise TypeError(f"jumps: {change!r} is no function of t and y")
+            raise TypeError(f"jumps: {change!r} is not a function: give functions of t and y")
         found.append(DelayJump(finite("jumps", time), change))
     found.sort(key=lambda jump: jump.time)
     return [jump for jump in found if start < jump.time < end]

@@ -146,10 +146,10 @@ class PlantChoice(ReadOnlyArrays):
         """What the table means, in sentences."""
         found = ["BIC is less that of the likeliest plant; * was taken; times in s."]
         if self.best.verdict != "reliable":
-            found.append("No plant of the family is reliable.")
+            found.append("No plant of the family gives a reliable estimate.")
             return found
         found.append(
-            "Delay and lag together, over all plants by their weight: "
+            "Sum of delay and lag, averaged over all plants by their weights: "
             f"{between(*self.ci(), math.nan, 's')} (95 %)."
         )
         return found
@@ -245,7 +245,7 @@ def choose_plant(
     True
     """
     if most_lags < 1:
-        raise ValueError(f"most_lags={most_lags}: give at least one")
+        raise ValueError(f"most_lags={most_lags}: give 1 or more")
     runs = paired_runs(recording, loop, window)
     # The plants of this family are the rivals of one another.
     chosen = method_of(method, (run.recording for run in runs))
@@ -254,8 +254,9 @@ def choose_plant(
     loops = [run.loop for run in runs]
     if not all(one.plant.is_rational for one in loops):
         raise ValueError(
-            "the plant has delays inside: choose_plant fits a gain, lags and a zero behind one "
-            "delay; give an Integrator() or a FirstOrder(), which says whether the plant integrates"
+            "the plant has delays inside, but choose_plant fits a gain, lags and a zero "
+            "behind one delay. Give an Integrator() or a FirstOrder() to say whether the "
+            "plant integrates"
         )
     estimates: dict[str, DelayEstimate] = {}
     refusals = {}

@@ -223,13 +223,15 @@ class Comparison:
             sentences += _overshoot_against_fit(dominant, plain, IN_WORDS[self.trusted])
         if lagged is not None and lagged.ci(0.95, "lag")[0] > 0.0 and lagged.lag is not None:
             sentences.append(
-                f"The vehicle has a lag: the fit with it gives {lagged.delay:.3f} s of delay and "
-                f"{lagged.lag:.3f} s of lag. Part of what looks like dead time is the dynamics of "
-                f"the vehicle; the sum, {lagged.delay_plus_lag:.3f} s, is what the recording "
-                "determines well."
+                f"The vehicle has a lag: a fit with a lag gives {lagged.delay:.3f} s of delay "
+                f"and {lagged.lag:.3f} s of lag. Part of the apparent dead time is thus the "
+                "dynamics of the vehicle. The recording determines only the sum well, "
+                f"{lagged.delay_plus_lag:.3f} s."
             )
         if plain.verdict != "reliable":
-            sentences.append(f"The fit without a further lag is an indication: {plain.reason}.")
+            sentences.append(
+                f"The fit without a further lag is only an indication: {plain.reason}."
+            )
         return sentences
 
 
@@ -260,7 +262,7 @@ def _in_errors(one: MethodDifference) -> str:
     """A difference in standard errors, in brackets."""
     if one.standard_errors is None:
         return ""
-    return f" ({abs(one.standard_errors):.2g} of its standard errors)"
+    return f" ({abs(one.standard_errors):.2g} of the standard errors of this difference)"
 
 
 def _signed(value: float | None) -> str:

@@ -287,13 +287,13 @@ def estimate_delay(
     chosen = method_of(method, (run.recording for run in runs))
     if len(runs) > 1 and not chosen.joint:
         raise ValueError(
-            f"the {chosen.name} method takes one recording, not {len(runs)}: fit them together by "
-            f"{' or '.join(map(repr, JOINT))}"
+            f"the {chosen.name} method takes one recording, but {len(runs)} are given: fit "
+            f"them together by {' or '.join(map(repr, JOINT))}"
         )
     if not isinstance(chosen, OutputError) and not all(run.loop.plant.is_linear for run in runs):
         raise ValueError(
-            f"the {chosen.name} method is for linear plants, and this one limits the rate of its "
-            "command: use method='output_error' on a recording with the logged command"
+            f"the {chosen.name} method is for linear plants, but this plant limits the rate "
+            "of its command. Use method='output_error' and a recording with the logged command"
         )
     of_loop = isinstance(chosen, Waveform)
     if chosen.joint:

@@ -175,11 +175,11 @@ class Felt:
         given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
         bad = given[~(given > 0.0)]
         if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s is not above zero")
+            raise ValueError(f"omega={bad[0]:g} rad/s: give a frequency above zero")
         if not self.loop.plant.is_linear:
             raise ValueError(
-                "the plant limits the rate of its command, so it is not linear: it has no gain "
-                "and phase"
+                "the plant limits the rate of its command, so the plant is not linear and has "
+                "no gain or phase"
             )
         turned = _integrators(self.loop.plant) * 0.5 * np.pi
 

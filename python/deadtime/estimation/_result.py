@@ -230,7 +230,7 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
             return self._felt_interval(level, name)
         if name not in self.stderr:
             raise ValueError(
-                f"{name!r} was not fitted, there are intervals for {', '.join(self.stderr)}"
+                f"{name!r} was not fitted; there are intervals only for {', '.join(self.stderr)}"
             )
         value, beside = self._value(name), self._added(name)
         if self._profile is not None and self._profile.preferred:
@@ -307,11 +307,12 @@ class DelayEstimate(Felt, ReadOnlyArrays, Pictured):
         """
         if self._profile is None:
             raise ValueError(
-                f"the {self.method} method has no profile; 'output_error' and 'waveform' have"
+                f"the {self.method} method has no profile; only 'output_error' and 'waveform' "
+                "have profiles"
             )
         if name not in self.stderr:
             raise ValueError(
-                f"{name!r} was not fitted, there are profiles for {', '.join(self.stderr)}"
+                f"{name!r} was not fitted; there are profiles only for {', '.join(self.stderr)}"
             )
         if values is None:
             middle, reach = self._value(name), 4.0 * self._reach(name)

@@ -85,7 +85,11 @@ class SharedNumber:
         if not self.agree:
             each = ", ".join(shown(one, error, unit) for one in self.estimates)
             return f"{text}; they contradict one another: {each}"
-        return text if self.verdict == "reliable" else f"{text}; one of them is an indication"
+        return (
+            text
+            if self.verdict == "reliable"
+            else (f"{text}; one of the estimates is only an indication")
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The number as plain values for JSON."""
@@ -142,7 +146,9 @@ def shared_number(
     from scipy import optimize, special
 
     if len(estimates) < 2:
-        raise ValueError(f"{len(estimates)} estimates were given: a shared number needs two")
+        raise ValueError(
+            f"{len(estimates)} estimates were given: a shared number needs two or more"
+        )
     if not 0.0 < level < 1.0:
         raise ValueError(f"level={level!r} is not between 0 and 1: 0.95 is usual")
     ends = [one.ci(level, name) for one in estimates]

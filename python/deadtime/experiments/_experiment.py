@@ -156,7 +156,8 @@ class Experiment(ReadOnlyArrays):
         begin = non_negative("rest", rest)
         if begin >= time[-1]:
             raise ValueError(
-                f"rest={begin} s: the step is after the end at {time[-1]:g} s; give a shorter rest"
+                f"rest={begin} s: the step would come after the end at {time[-1]:g} s; give a "
+                "shorter rest"
             )
         height = finite("amplitude", amplitude)
         reference = np.where(time < begin - ON_A_SAMPLE * sample_time, 0.0, height)
@@ -294,8 +295,8 @@ class Experiment(ReadOnlyArrays):
         if whole_period(positive("period", period), sample) is None:
             near = max(1, round(period / sample)) * sample
             raise ValueError(
-                f"period={period} s is no whole number of samples of {sample} s, so the wave would "
-                f"not be periodic: give {near:.10g}, for example"
+                f"period={period} s is not a whole number of samples of {sample} s, so the "
+                f"wave would not be periodic: give {near:.10g}, for example"
             )
         count = round(period / sample)
         excited = excited_lines(lines, count, odd)
@@ -378,8 +379,8 @@ class Experiment(ReadOnlyArrays):
             missed = np.abs(np.diff(self.time) - loop.sample_time)
             if (missed > ON_A_SAMPLE * loop.sample_time).any():
                 raise ValueError(
-                    f"the experiment has a sample every {np.median(np.diff(self.time)):g} s and "
-                    f"the loop every {loop.sample_time:g} s: make the experiment with "
+                    f"the experiment has a sample every {np.median(np.diff(self.time)):g} s, "
+                    f"but the loop every {loop.sample_time:g} s: make the experiment with "
                     f"sample_time={loop.sample_time:g}"
                 )
         loop = loop.replace(delay_path="command")
@@ -387,8 +388,8 @@ class Experiment(ReadOnlyArrays):
             return loop
         if loop.limit is not None and loop.limit < self.relay_amplitude:
             raise ValueError(
-                f"a relay of {self.relay_amplitude:g} is beyond the limit of the command, "
-                f"{loop.limit:g}: give it at most that amplitude"
+                f"a relay of {self.relay_amplitude:g} exceeds the limit of the command, "
+                f"{loop.limit:g}: give an amplitude up to this limit"
             )
         gain = RELAY_GAIN * self.relay_amplitude
         return loop.replace(controller=P(gain), limit=self.relay_amplitude)

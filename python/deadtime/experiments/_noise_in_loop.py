@@ -36,7 +36,7 @@ def check_reads_samples(loop: ControlLoop) -> None:
     if loop.sample_time is None:
         why, advice = "a continuous controller", "give the loop a sample_time"
     elif gains.get("Ki", 0.0) != 0.0:
-        why, advice = "the integral of the controller", "take a controller without Ki"
+        why, advice = "the integral of the controller", "use a controller without Ki"
     elif smooth is not None and smooth.discretisation is None:
         why = "the continuous filter of the controller"
         advice = "give the DerivativeFilter a discretisation"
@@ -57,20 +57,20 @@ def reference_shift(error: Array, loop: ControlLoop) -> Array:
         return error
     if smooth is None:
         raise ValueError(
-            "noise has no ideal derivative: give the controller a DerivativeFilter, or keep the "
-            "noise out of the loop (noise_in_loop=False)"
+            "noise has no ideal derivative: give the controller a DerivativeFilter, or use "
+            "noise_in_loop=False"
         )
     if not isinstance(controller, PV):
         return error
     if loop.sample_time is None:
         raise ValueError(
-            "noise through the filter of a PV controller is computed on samples: give the loop a "
-            "sample_time, or keep the noise out of the loop (noise_in_loop=False)"
+            "noise through the filter of a PV controller is computed on samples only: give "
+            "the loop a sample_time, or use noise_in_loop=False"
         )
     if controller.Kp == 0.0:
         raise ValueError(
-            "Kp=0: the reference does not enter, so noise cannot be added to it; give a Kp other "
-            "than zero, or keep the noise out of the loop (noise_in_loop=False)"
+            "Kp=0: the reference has no effect, so noise cannot be added to it. Give a Kp "
+            "other than zero, or use noise_in_loop=False"
         )
     return error + slope / controller.Kp * _derivative(error, smooth, loop.sample_time)
 

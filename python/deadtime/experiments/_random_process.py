@@ -142,6 +142,6 @@ class RandomProcess(NamedTuple):
         growth = float(np.max(np.linalg.eigvals(self.A).real)) * float(time[-1] - time[0])
         if growth > MOST_GROWTH:
             raise ValueError(
-                f"the plant is unstable and grows by e^{growth:.3g} over the run, so that the "
-                "effect of the air is lost in rounding: give a shorter experiment"
+                f"the plant is unstable and grows by e^{growth:.3g} over the run, so rounding "
+                "errors hide the effect of wind (air): give a shorter experiment"
             )

@@ -35,13 +35,13 @@ def sample_times(duration: float, sample_time: float) -> Array:
     count = positive("duration", duration) / sample
     if count < MINIMUM_SAMPLES:
         raise ValueError(
-            f"duration={duration} s is less than {MINIMUM_SAMPLES} samples of {sample} s: give a "
-            "longer one"
+            f"duration={duration} s is less than {MINIMUM_SAMPLES} samples of {sample} s: "
+            "give a longer duration"
         )
     if count > MOST_SAMPLES:
         raise ValueError(
-            f"duration={duration} s is {count:.3g} samples of {sample} s, beyond {MOST_SAMPLES}: "
-            "give a shorter one, and check that it is in seconds"
+            f"duration={duration} s is {count:.3g} samples of {sample} s, more than "
+            f"{MOST_SAMPLES}: give a shorter duration, and check that its unit is seconds"
         )
     return np.arange(np.ceil(count - ON_A_SAMPLE), dtype=np.float64) * sample
 
@@ -49,7 +49,9 @@ def sample_times(duration: float, sample_time: float) -> Array:
 def hold_numbers(time: Array, hold: float, sample_time: float) -> Whole:
     """Index of the hold interval of each sample."""
     if positive("hold", hold) < sample_time * (1.0 - ON_A_SAMPLE):
-        raise ValueError(f"hold={hold} s is shorter than a sample of {sample_time} s")
+        raise ValueError(
+            f"hold={hold} s is shorter than a sample of {sample_time} s: give a longer hold"
+        )
     return np.floor((time + ON_A_SAMPLE * sample_time) / hold).astype(np.int64)
 
 
@@ -74,7 +76,9 @@ def excited_lines(lines: int | Sequence[int], count: int, odd: bool) -> Whole:
     if odd:
         found = found[found % 2 == 1]
     if found.size == 0:
-        raise ValueError(f"lines={lines!r} leaves no {'odd ' if odd else ''}harmonic: give one")
+        raise ValueError(
+            f"lines={lines!r} contains no {'odd ' if odd else ''}harmonic: give one or more"
+        )
     return found.astype(np.int64)
 
 
@@ -84,7 +88,10 @@ def binary_sequence(needed: int, seed: int) -> tuple[Array, int]:
 
     bits = max(2, needed.bit_length())
     if bits > MOST_BITS:
-        raise ValueError(f"{needed} changes of sign are too many: give a longer hold")
+        raise ValueError(
+            f"the signal would change its sign {needed} times, which is too often: give a "
+            "longer hold"
+        )
     # Each state of the register but zero is a position in the sequence.
     start = np.random.default_rng(seed).integers(1, 2**bits)
     register = (start >> np.arange(bits)) & 1

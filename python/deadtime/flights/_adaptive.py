@@ -195,8 +195,8 @@ def schedule_of(
     loop = ControlLoop(plant, controller, sample_time=plan.sample_time, limit=largest)
     if fit.delay >= adapt.longest:
         raise NotProvedError(
-            f"the delay was estimated as {fit.delay:.3g} s, and gains are to be proved up to "
-            f"{adapt.longest:g} s: prove them up to a longer delay"
+            f"the delay was estimated as {fit.delay:.3g} s, but gains are to be proved only "
+            f"up to {adapt.longest:g} s: prove them up to a longer delay"
         )
     return adaptive_gains(
         loop,

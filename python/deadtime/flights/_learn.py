@@ -87,16 +87,16 @@ class Learned:
         found = []
         if self.irregular:
             found.append(
-                f"The times of the flights are not regular ({'; '.join(self.irregular)}), so the "
-                "estimate is an indication: repeat the experiment on a computer with less other "
-                "work."
+                f"The times of the flights are irregular ({'; '.join(self.irregular)}), so "
+                "the estimate is only an indication: repeat the experiment on a computer "
+                "without other work."
             )
         if self.split is not None and not self.adds_up:
             parts = self.split.transport.delay + self.split.vehicle_delay
             found.append(
-                f"By the vehicle's reports link and vehicle take {rough(parts, 's')}, by command "
-                f"and output {rough(self.whole_delay, 's')}: they do not add up within their "
-                "intervals, so the estimate is an indication."
+                f"From the vehicle's reports, link and vehicle take {rough(parts, 's')}; from "
+                f"command and output, {rough(self.whole_delay, 's')}. The two differ by more "
+                "than their intervals allow, so the estimate is only an indication."
             )
         if self.fit.verdict != "reliable":
             found.append(

@@ -141,7 +141,10 @@ def _fitted(study: FlightStudy) -> str:
             "message. This is part of the delay."
         )
     if learned.split is None:
-        words += f" The delay is not divided between link and vehicle: {learned.unsplit}."
+        words += (
+            " How much of the delay belongs to the link and how much to the vehicle is not "
+            f"known: {learned.unsplit}."
+        )
     return words
 
 

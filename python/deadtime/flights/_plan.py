@@ -107,7 +107,7 @@ class FlightPlan:
             If there is no such axis.
         """
         if axis not in USUAL:
-            raise ValueError(f"no axis {axis!r}: there are {', '.join(USUAL)}")
+            raise ValueError(f"there is no axis {axis!r}: there are {', '.join(USUAL)}")
         usual = AUTOPILOT if autopilot and axis == "z" else USUAL[axis]
         return cls(**{"axis": axis, **usual, **changes})
 
@@ -142,14 +142,14 @@ class FlightPlan:
             would exceed the limits.
         """
         if self.axis not in AXES:
-            raise ValueError(f"no axis {self.axis!r}: there are {', '.join(AXES)}")
+            raise ValueError(f"there is no axis {self.axis!r}: there are {', '.join(AXES)}")
         if not self.gains:
-            raise ValueError("no gains to fly: give at least one")
+            raise ValueError("there are no gains to fly: give one or more")
         axis = self.flown_axis
         if positive("step", self.step) < LEAST_STEP:
             raise ValueError(
                 f"step={self.step:g} {axis.unit} is within the noise of the {axis.words}: fly "
-                f"{LEAST_STEP:g} {axis.unit} or more"
+                f"steps of {LEAST_STEP:g} {axis.unit} or more"
             )
         for Kp in self.gains:
             check_gain(Kp, self.prior_delay, self.prior_gain)

@@ -185,14 +185,15 @@ class FlownSteps:
         clock, timing = self.clock, self.timing
         if clock is not None and not clock.even:
             return (
-                f"the vehicle's clock was {1e3 * clock.misfit:.0f} ms off a steady rate against "
-                "that of this computer: one of them stood still or ran slowly"
+                f"the vehicle's clock deviated by {1e3 * clock.misfit:.0f} ms from a steady "
+                "rate against the clock of this computer: one of the two stood still or ran "
+                "slowly"
             )
         samples = len(self.recording) + timing.missed
         if timing.missed > MISSED * samples:
             return (
-                f"the control loop ran late and left out {timing.missed} of {samples} samples: this"
-                " computer was too busy"
+                f"the control loop ran late and skipped {timing.missed} of {samples} samples, "
+                "because this computer was too busy"
             )
         return ""
 

@@ -210,9 +210,9 @@ async def fly_steps(
     distance, most = abs(value - base), limits.error_of(axis)
     if distance + MARGIN > most:
         raise FlightAbortedError(
-            f"the vehicle hovers at {value:.2f} {axis.unit}: the distance to the first "
+            f"the vehicle hovers at {value:.2f} {axis.unit}. Its distance to the first "
             f"reference, {base:g} {axis.unit}, exceeds the error that ends a flight, {most:g} "
-            f"{axis.unit}: begin closer to it"
+            f"{axis.unit}. Begin closer to this reference"
         )
     error = min(most, GROWTH * max(programme.largest_step, distance) + MARGIN)
     stricter = replace(limits, max_error=error, max_heading_error=error)
@@ -224,7 +224,7 @@ async def fly_steps(
             state = await vehicle.state()
             if not state.flying:
                 raise FlightAbortedError(
-                    "the vehicle no longer flies, although it was not commanded to land"
+                    "the vehicle is not flying any more, although no landing was commanded"
                 )
             time = now()
             reference = programme.reference(sample * programme.sample_time)

@@ -116,7 +116,9 @@ def problem(key: str) -> Problem:
         return _problems()[key]
     except KeyError:
         near = difflib.get_close_matches(str(key), _problems(), n=3, cutoff=0.3) or names()
-        raise KeyError(f"no problem {key!r} in the gallery: there is {', '.join(near)}") from None
+        raise KeyError(
+            f"there is no problem {key!r} in the gallery: there is {', '.join(near)}"
+        ) from None
 
 
 def problems() -> Iterator[Problem]:

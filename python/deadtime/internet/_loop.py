@@ -84,7 +84,7 @@ def run_internet_loop(
     """
     report = stage_report(progress)
     if not len(gains):
-        raise ValueError("gains is empty: give one or more")
+        raise ValueError("gains is empty: give one or more gains")
     trials = [
         replace(trial, gain=positive("gain", gain), seed=trial.seed + index)
         for index, gain in enumerate(gains)

@@ -220,7 +220,7 @@ class InternetLoop:
     def explanation(self) -> list[str]:
         """Comparison of the estimates with the measured delay, in sentences."""
         if not math.isfinite(self.age):
-            return ["In a run no command arrived in time, so no delay was measured."]
+            return ["In one run no command arrived in time, so no delay was measured."]
         budgets = [run.budget() for run in self.runs]
         mean = {name: 1e3 * float(np.mean([one[name] for one in budgets])) for name in budgets[0]}
         sentences = [
@@ -234,9 +234,10 @@ class InternetLoop:
         unsteady = [run for run in self.runs if run.is_unsteady]
         if unsteady:
             sentences.append(
-                "The delay is not constant: a step contains few of its values, and the interval "
-                "of a single fit is for these. For the mean delay use the intervals of the "
-                "replayed steps, or make the delay constant with a jitter buffer."
+                "The delay is not constant: a step contains few of its values, and the "
+                "interval of a single fit is for these only. For the mean delay use the "
+                "intervals of the replayed steps, or make the delay constant with a jitter "
+                "buffer."
             )
         lag = self.runs[0].trial.lag
         if lag > 0.0:

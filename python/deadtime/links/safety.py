@@ -329,8 +329,8 @@ class Watch:
             )
         if now - self._moved > limits.max_still:
             return (
-                f"the {axis.words} has read {value:.3f} {axis.unit} for {now - self._moved:.1f} s "
-                "although it is not at the reference"
+                f"the {axis.words} has read {value:.3f} {axis.unit} for "
+                f"{now - self._moved:.1f} s, although it is not at the reference"
             )
         return self._broken_since(state)
 

@@ -59,7 +59,9 @@ class _Jump(selectors.DefaultSelector):
         if ready:
             return ready
         if timeout is None:
-            raise LinkError("all tasks wait and no event is scheduled: the program would never end")
+            raise LinkError(
+                "all tasks wait, but no event is scheduled, so the program would never end"
+            )
         self.time += max(timeout, 0.0)
         return []
 
@@ -168,9 +170,11 @@ class _Datagrams(asyncio.DatagramTransport):
             return
         target = addr or self._remote
         if target is None:
-            raise ValueError("no address to send to: give one, or connect the endpoint")
+            raise ValueError("there is no address to send to: give one, or connect the endpoint")
         if len(data) > 65507:
-            raise OSError(90, f"a datagram of {len(data)} bytes: at most 65507 are possible")
+            raise OSError(
+                90, f"a datagram of {len(data)} bytes is too long: at most 65507 bytes are possible"
+            )
         receiver = self._loop._datagrams.get((target[0], target[1]))
         if receiver is not None:
             self._loop.call_soon(receiver._receive, bytes(data), self._local)

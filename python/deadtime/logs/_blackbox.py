@@ -74,7 +74,8 @@ def read_blackbox(data: bytes, source: str, *, flight: int | None = None) -> Log
     starts = [found.start() for found in re.finditer(re.escape(MARK), data)]
     if not starts:
         raise RecordingError(
-            f'{source}: no Blackbox log, because the line "{MARK[2:].decode().strip()}" is missing'
+            f"{source} is not a Blackbox log, because the line "
+            f'"{MARK[2:].decode().strip()}" is missing'
         )
     if flight is not None and not 1 <= flight <= len(starts):
         raise RecordingError(
@@ -192,13 +193,13 @@ def _remarks(flight: _Flight, autopilot: str) -> Iterator[str]:
             "Cleanflight nor INAV: its fields are read as the head defines them."
         )
     if frames.damaged:
-        yield f"The log is damaged at {frames.damaged} places; what stands there is left out."
+        yield f"The log is damaged at {frames.damaged} places; these parts are left out."
     if frames.unusable:
         yield (
-            f"{frames.unusable} frames are left out because the frame that they build on is lost."
+            f"{frames.unusable} frames are left out because the frame on which they depend is lost."
         )
     if not frames.ended:
-        yield "The log has no mark of its end: it was cut off."
+        yield "The log has no end mark, so it was cut off."
 
 
 def _gps(flight: _Flight) -> Topic:

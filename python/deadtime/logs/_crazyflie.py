@@ -74,7 +74,9 @@ def read_crazyflie(data: bytes, source: str) -> LogContents:
     (array([2.5]), array([1.5]))
     """
     if data[:1] != bytes([MARK]):
-        raise RecordingError(f"{source}: no log of a Crazyflie, which starts with the byte 0xbc")
+        raise RecordingError(
+            f"{source}: not a log of a Crazyflie, which would start with the byte 0xbc"
+        )
     try:
         version, events, start = _definitions(data)
     except (struct.error, ValueError) as error:
@@ -163,7 +165,7 @@ def _records(
         if size is None:
             found = _next(data, at, stop, sizes)
             if found is None:
-                faults.append(f"What follows byte {at} of {stop} is damaged and left out.")
+                faults.append(f"The part from byte {at} of {stop} on is damaged and left out.")
                 break
             lost += 1
             at = found
@@ -173,7 +175,7 @@ def _records(
         appends[number](at)
         at += size
     if lost:
-        faults.append(f"The log is damaged at {lost} places; what stands there is left out.")
+        faults.append(f"The log is damaged at {lost} places; these parts are left out.")
     return places, faults
 
 

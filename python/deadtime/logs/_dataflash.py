@@ -42,7 +42,9 @@ def read_dataflash(data: bytes, source: str) -> LogContents:
     messages = _BinaryMessages(data, index)
     remarks = []
     if index.skipped:
-        remarks.append(f"{index.skipped} bytes of the file are no message and are left out")
+        remarks.append(
+            f"{index.skipped} bytes of the file do not belong to a message and are left out"
+        )
     if index.cut:
         remarks.append("the file is cut off in a message")
     return contents_of("DataFlash", source, messages, remarks)

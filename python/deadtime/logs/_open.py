@@ -72,7 +72,10 @@ def open_log(path: str | os.PathLike[str], *, flight: int | None = None) -> Log:
         head = stream.read(HEAD)
         form = _format(path, head)
         if flight is not None and form != "Blackbox":
-            raise ValueError(f"flight={flight}: {path} is a {form} log, which holds one flight")
+            raise ValueError(
+                f"flight={flight}: {path} is a {form} log, which contains one flight only: "
+                "leave flight out"
+            )
         data = whole(stream, head)
     try:
         contents = _read(form, data, path.name, flight)
@@ -102,7 +105,7 @@ def _format(path: Path, head: bytes) -> str:
     form = format_of(path, head, "open_log")
     if form is None:
         raise RecordingError(
-            f"{path} is no log of a known format: it begins with {head[:8].hex(' ')}; these are "
-            f"read: {', '.join(READERS)}"
+            f"{path} is not a log of a known format: it begins with {head[:8].hex(' ')}. "
+            f"These formats are read: {', '.join(READERS)}"
         )
     return form

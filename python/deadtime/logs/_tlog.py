@@ -76,14 +76,16 @@ def read_tlog(data: bytes, source: str) -> LogContents:
     vehicle = _vehicle(found)
     if vehicle is None:
         raise RecordingError(
-            f"{source} looks like a tlog, but no autopilot sends a HEARTBEAT in it"
+            f"{source} looks like a tlog, but contains no HEARTBEAT of an autopilot"
         )
     kind, pilot = (
         int(_values(found, "HEARTBEAT", name, vehicle)[-1]) for name in ("type", "autopilot")
     )
     remarks = []
     if packets.skipped:
-        remarks.append(f"{packets.skipped} bytes of the file are no packet and are left out")
+        remarks.append(
+            f"{packets.skipped} bytes of the file do not belong to a packet and are left out"
+        )
     if packets.cut:
         remarks.append("the file is cut off in a packet")
     if damaged:
@@ -143,7 +145,7 @@ def _one_session(
     low, high = edges[longest], edges[longest + 1]
     if starts.size:
         remarks.append(
-            f"the vehicle's clock starts anew {starts.size} times: the longest part is read"
+            f"the vehicle's clock restarts {starts.size} times: only the longest part is read"
         )
         first = at[low] if low else 0
         last = at[high] if high < at.size else np.inf

@@ -77,7 +77,10 @@ def tune_loop(
     firmware = FORMS.get(log.autopilot)
     if firmware is None:
         names = ", ".join(FORMS)
-        raise ValueError(f"{log.source} is a log of {log.autopilot or 'no autopilot'}, not {names}")
+        raise ValueError(
+            f"{log.source} is a log of {log.autopilot or 'no autopilot'}, but gains can be "
+            f"proposed only for {names}"
+        )
     if loop is not None:
         return _tuned(log, log.loop(loop), firmware, controller, form, allow_indication, demands)
     refused = []
@@ -117,8 +120,8 @@ def _tuned(
     flown = _flown(log, loop.name, firmware)
     if flown is None and controller is None:
         raise ValueError(
-            f"{loop.name}: the log holds no gain of this loop, so that its controller is not "
-            "known: name one by controller=, on the command line --controller"
+            f"{loop.name}: the log has no gain of this loop, so its controller is not known. "
+            "Give the controller by controller=, on the command line --controller"
         )
     own = form is None or form == firmware
     return tune(

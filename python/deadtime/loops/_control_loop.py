@@ -258,12 +258,12 @@ def _with_computation(time: float, delay: float | None, path: str) -> float:
     time = non_negative("computation_time", time)
     if delay is None:
         raise ValueError(
-            f"computation_time={time:g} is added to the delay, which is None: give both, or "
-            "their sum as the delay once it is known"
+            f"computation_time={time:g} is added to the delay, but the delay is None: give "
+            "both, or give their sum as the delay once it is known"
         )
     if path == "measurement":
         raise ValueError(
-            f"computation_time={time:g} delays the command, and delay_path='measurement' has "
-            "the delay elsewhere: leave one of them out"
+            f"computation_time={time:g} delays the command, but with delay_path='measurement' "
+            "the delay is elsewhere: leave one of the two out"
         )
     return non_negative("delay", delay) + time

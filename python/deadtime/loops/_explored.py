@@ -41,8 +41,8 @@ def described(loop: LoopSpecification) -> dict[str, Any]:
     controller, plant = loop.controller, _simplest(loop.plant)
     if not plant.is_rational or not plant.is_linear:
         raise ValueError(
-            f"{type(plant).__name__}: the explorer shows linear plants that are rational except "
-            "for one delay in series; make a loop around such a plant first"
+            f"{type(plant).__name__}: the explorer shows only linear plants that are rational "
+            "except for one delay in series. Make a loop around such a plant first"
         )
     refuse_discretised(controller, loop.sample_time, "the explorer")
     known = type(controller).__name__

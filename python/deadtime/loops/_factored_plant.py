@@ -88,12 +88,12 @@ class FactoredPlant(Plant):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         if not lags and not self.integrator and not self.has_pair:
             raise ValueError(
-                "a plant without lags or integrator is a gain alone: give lags=[0.1] to begin "
-                "with, or RationalPlant([gain], [1.0])"
+                "a plant without lags or integrator is only a gain: give lags, such as "
+                "lags=[0.1], or RationalPlant([gain], [1.0])"
             )
         if self.zero != 0.0 and not any(lags) and not self.has_pair:
             raise ValueError(
-                f"zero={self.zero}: a plant with a zero needs a lag above zero, lags=[0.1] for one"
+                f"zero={self.zero}: a plant with a zero needs a lag above zero, such as lags=[0.1]"
             )
 
     @property

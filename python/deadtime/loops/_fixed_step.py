@@ -178,8 +178,8 @@ def _inputs(
             found.append((np.empty(0), np.empty(0)))
         elif callable(put) and not isinstance(put, SampledNoise):
             raise ValueError(
-                f"{name} is a function: give a number, an array or a pair (times, values), since "
-                "steps do not end where it bends"
+                f"{name} is a function, and fixed steps would miss the points where it bends. "
+                "Give a number, an array or a pair (times, values)"
             )
         else:
             times = steps[0] * np.arange(steps[1] + 1.0)
@@ -191,7 +191,9 @@ def _steps(duration: float, step: float) -> int:
     """Return the number of steps that reach `duration`."""
     count = duration / step
     if count > 2**53:
-        raise ValueError(f"step={step} s makes {count:.1e} steps: take a longer one")
+        raise ValueError(
+            f"step={step} s makes {count:.1e} steps, which is too many: give a longer step"
+        )
     return round(count) if abs(count - round(count)) <= _WHOLE else math.ceil(count)
 
 
@@ -201,6 +203,7 @@ def _sample_steps(sample_time: float | None, step: float) -> int | None:
     ratio = sample_time / step
     if ratio < 0.5 or abs(ratio - round(ratio)) > _WHOLE * ratio:
         raise ValueError(
-            f"the sample time of {sample_time} s is {ratio:.6g} steps: give a step that divides it"
+            f"the sample time of {sample_time} s is {ratio:.6g} steps: give a step that "
+            "divides the sample time"
         )
     return round(ratio)

@@ -147,9 +147,9 @@ class LoopGain:
         if of in ("output", "command"):
             if self.specification.sample_time is not None:
                 raise ValueError(
-                    f"of={of!r}: between the samples, the response of a loop to one frequency "
-                    "contains many; ask for 'sensitivity' or 'complementary', or the "
-                    "continuous() loop"
+                    f"of={of!r}: between samples, the response of a sampled loop to one "
+                    "frequency contains many frequencies. Give 'sensitivity' or "
+                    "'complementary', or use the continuous() loop"
                 )
             return self.specification.transfer(of).hinf_norm()
         found = self._margin(delay_margin=False)
@@ -256,5 +256,7 @@ class LoopGain:
         if loop.sample_time is None:
             return self.margin()._delay_margin()
         if not loop.native.is_stable():
-            raise ValueError("the loop is not stable as it is: it has no delay margin")
+            raise ValueError(
+                "the loop is not stable without further delay, so it has no delay margin"
+            )
         return loop.native.further_delay()[0]

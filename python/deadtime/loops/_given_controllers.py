@@ -29,6 +29,6 @@ def controller_of(given: object) -> Controller:
             Ki, Kp, Kd = (value / den[1] for value in (*num, 0.0, 0.0)[:3])
             return PID(Kp, Ki, Kd) if Kd else PI(Kp, Ki)
     raise ValueError(
-        f"controller={G!r}: a loop takes P, PI, PD, PID and PV controllers; close a loop around "
-        "another one with deadtime.feedback(C * G)"
+        f"controller={G!r}: a loop takes P, PI, PD, PID and PV controllers. For another "
+        "controller, close the loop with deadtime.feedback(C * G)"
     )

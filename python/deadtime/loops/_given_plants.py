@@ -59,8 +59,8 @@ class PlantWithDelays(Plant):
             )
         if not self.transfer.is_causal:
             raise ValueError(
-                f"plant={self.transfer!r}: its output would depend on later commands; give a plant "
-                "that is causal"
+                f"plant={self.transfer!r}: its output would depend on later commands; give a "
+                "causal plant"
             )
         object.__setattr__(self, "gain", non_zero("gain", self.gain, NO_GAIN))
 
@@ -102,8 +102,8 @@ def plant_and_delay(given: object) -> tuple[Plant, float]:
     late = float(G.num.delays[0] - G.den.delays[0])
     if late < 0.0:
         raise ValueError(
-            f"plant={G!r}: its output would come {-late:g} s before its command; give a plant that "
-            "is causal"
+            f"plant={G!r}: its output would come {-late:g} s before its command; give a "
+            "causal plant"
         )
     num, den = (h.coefficients[0, ::-1].tolist() for h in (G.num, G.den))
     return RationalPlant(num, den), late
@@ -120,8 +120,8 @@ def transfer_function_of(given: object) -> TransferFunction | None:
     if isinstance(given, DelaySystem):
         if (given.n_inputs, given.n_outputs) != (1, 1):
             raise ValueError(
-                f"{given!r} as a plant: give a system with one input and one output, or one of its "
-                "transfer functions, system.transfer_function(output, input)"
+                f"{given!r} as a plant: give a system with one input and one output, or one "
+                "of its transfer functions, such as system.transfer_function(output, input)"
             )
         return given.transfer_function()
     found = polynomials_of(given)

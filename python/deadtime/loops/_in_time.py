@@ -274,8 +274,9 @@ class LoopInTime:
         if times is None:
             if not found.is_settled:
                 raise ValueError(
-                    f"the output does not come to rest within {found.span:.4g} s after the load: "
-                    "the loop is not stable, or its limit is too small for this load; give time="
+                    f"the output does not come to rest within {found.span:.4g} s after the "
+                    "load. Either the loop is not stable, or its limit is too small for this "
+                    "load. Give time="
                 )
             times = shown_times(found)
         name = "load" if question.of == "load" else "output_disturbance"
@@ -317,8 +318,8 @@ class LoopInTime:
         for name in ("limit", "rate_limit"):
             if getattr(loop, name) is not None:
                 raise ValueError(
-                    f"{name}={getattr(loop, name)!r}: the command that an impulse causes is beyond "
-                    f"any limit; leave it out with loop.replace({name}=None)"
+                    f"{name}={getattr(loop, name)!r}: an impulse causes a command beyond any "
+                    f"limit; remove the limit with loop.replace({name}=None)"
                 )
         found = loop.transfer("output").impulse_response(time)
         return replace(found, inputs=np.full_like(found.inputs, np.nan))
@@ -350,7 +351,8 @@ def _driven_response(loop: LoopSpecification, times: Array, given: RunArguments)
     """The response to inputs besides a held reference."""
     if given.sensitivities:
         raise ValueError(
-            "sensitivities: a run with loads, noise or a function has none; leave them out"
+            "sensitivities: there are none for a run with loads, noise or a function; leave "
+            "sensitivities out"
         )
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
@@ -359,7 +361,7 @@ def _driven_response(loop: LoopSpecification, times: Array, given: RunArguments)
     if callable(reference):
         if given.reference_time is not None:
             raise ValueError(
-                "reference is a function, so reference_time has no meaning: leave it out"
+                "reference is a function, so reference_time has no use: leave reference_time out"
             )
         if loop.sample_time is None:
             # From its value before the start on.

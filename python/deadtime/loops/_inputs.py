@@ -160,7 +160,8 @@ def _pieces(name: str, given: Any, times: Array) -> _Pieces:
     if isinstance(given, tuple):
         if len(given) != 2:
             raise ValueError(
-                f"{name} is a tuple of {len(given)}: give times and values, two arrays"
+                f"{name} is a tuple of {len(given)} entries: give a pair of arrays, times and "
+                "values"
             )
         starts = increasing(f"the times of {name}", given[0])
         values = real_array(name, given[1])
@@ -200,7 +201,9 @@ def _noise(
         deviation = non_negative("noise", given)
         drawn = deviation * np.random.default_rng(seed).standard_normal(when.size)
     if drawn.shape != when.shape:
-        raise ValueError(f"noise gives values of shape {drawn.shape} at {when.size} times")
+        raise ValueError(
+            f"noise gives values of shape {drawn.shape}, but there are {when.size} times"
+        )
     return _Pieces(when, drawn[:, None])
 
 
@@ -265,8 +268,8 @@ def _fitted(name: str, function: Callable[[Any], Any], times: Array) -> _Pieces:
         count += int(np.count_nonzero(done))
         if count + 2 * np.count_nonzero(~done) > _MOST_PIECES:
             raise ValueError(
-                f"{name} changes too often to be followed: {_MOST_PIECES} pieces between jumps are "
-                "not enough; give a shorter run, or values at times, as a pair (times, values)"
+                f"{name} changes too often: {_MOST_PIECES} pieces between its jumps are not "
+                "enough. Give a shorter run, or values at times, as a pair (times, values)"
             )
         lengths = half[done, None]
         # Where a jump lies within, what follows sets the value after it.

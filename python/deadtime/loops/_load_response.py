@@ -111,7 +111,7 @@ class LoadResponse(Response):
                 f"{', '.join(unused)}: its figures are those against the output before it"
             )
         if output != 0:
-            raise IndexError(f"output={output}: a loop has one output, number 0")
+            raise IndexError(f"output={output}: a loop has only one output, number 0")
         names = ("peak", "peak_time", "iae", "ie", "recovery_time")
         return {name: getattr(self, name) for name in names}
 
@@ -126,16 +126,16 @@ def asked(
     """Check the arguments of `ControlLoop.load_response`; None where no times are given."""
     if not loop.plant.is_rational:
         raise ValueError(
-            "a plant with delays inside has no load response here: give a plant that is rational "
-            "except for one delay in series"
+            "the load response of a plant with delays inside is not computed: give a plant "
+            "that is rational except for one delay in series"
         )
     _ = loop.known_delay
     height = finite("size", size)
     if height == 0.0:
-        raise ValueError("size=0: there is no load, give a number other than zero")
+        raise ValueError("size=0: this is not a load; give a number other than zero")
     band = positive("settling", settling)
     if band >= 1.0:
-        raise ValueError(f"settling={settling}: give a share of the largest deviation, below 1")
+        raise ValueError(f"settling={settling}: give a fraction of the largest deviation, below 1")
     question = DeviationQuestion(load_of(at), height, band)
     if time is None:
         return question, None
@@ -145,7 +145,9 @@ def asked(
     else:
         times = np.array(increasing("time", given))
         if times.size < 2:
-            raise ValueError("time holds one time: give the first and the last one, or a number")
+            raise ValueError(
+                "time has only one entry: give the first and the last time, or a number"
+            )
     return question._replace(span=float(times[-1] - times[0])), times
 
 

@@ -73,7 +73,7 @@ class ParametricPlant(Plant):
             raise ValueError(f"numbers={numbers!r}: give a name and a value for each number")
         taken = [name for name in TAKEN if name in numbers]
         if taken:
-            raise ValueError(f"the name {taken[0]!r} belongs to the loop: take another")
+            raise ValueError(f"the name {taken[0]!r} is already used by the loop: take another")
         values = {str(name): finite(str(name), value) for name, value in numbers.items()}
         object.__setattr__(self, "polynomials_of", polynomials)
         object.__setattr__(self, "numbers", FrozenDict(values))

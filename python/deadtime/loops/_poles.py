@@ -237,9 +237,9 @@ class LoopPoles:
             near = self.rightmost()
             raise ValueError(
                 f"a pole at {near[0]:.6g} 1/s, known to {near.radii[0]:.1e}, is closer to the "
-                "imaginary axis than rounding errors: double precision cannot decide whether "
-                "this loop is stable; change a gain, or take a sample_time nearer to the time "
-                "constants of the loop"
+                "imaginary axis than rounding errors. So double precision cannot decide "
+                "whether this loop is stable. Change a gain, or take a sample_time nearer to "
+                "the time constants of the loop"
             )
         return found
 
@@ -327,8 +327,8 @@ class LoopPoles:
             )
         if not self.is_stable():
             raise ValueError(
-                f"the loop is not stable at {name}={values[name]}: start from a stable one, for "
-                "example with lower gains"
+                f"the loop is not stable at {name}={values[name]}: start from a stable loop, "
+                "for example with lower gains"
             )
         return loop.stable_range(name)
 
@@ -367,9 +367,9 @@ class LoopPoles:
         """Characteristic function with the numbers `names` as its parameters."""
         loop = self.specification
         loop.refuse_hold(
-            "has no characteristic function for a proof, because its poles are eigenvalues: use "
-            "loop.continuous() for the loop without its hold, or look at single cells with "
-            "dtm.stability_map"
+            "has no characteristic function for a proof, because its poles are eigenvalues. "
+            "Use loop.continuous() for the loop without its hold, or use dtm.stability_map "
+            "for single cells"
         )
         return loop.family_of(tuple(names))
 

@@ -67,7 +67,7 @@ class RateLimited(Plant):
     >>> loop = dtm.ControlLoop(plant, dtm.P(Kp=1.0), delay=0.3)
     >>> loop.is_stable()
     Traceback (most recent call last):
-    ValueError: the plant limits the rate of its command, so it is not linear: ask ...
+    ValueError: the plant limits the rate of its command, so it is not linear. Use ...
     >>> loop.replace(plant=plant.for_small_commands()).is_stable()
     True
     """
@@ -175,7 +175,7 @@ class RateLimited(Plant):
 
     def _refuse(self) -> NoReturn:
         raise ValueError(
-            "the plant limits the rate of its command, so it is not linear: ask "
-            "loop.replace(plant=loop.plant.for_small_commands()), which holds where no limit is "
-            "reached"
+            "the plant limits the rate of its command, so it is not linear. Use "
+            "loop.replace(plant=loop.plant.for_small_commands()), which is valid while no "
+            "limit is reached"
         )

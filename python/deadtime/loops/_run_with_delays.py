@@ -31,13 +31,13 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
     for name, is_given in others.items():
         if is_given:
             raise ValueError(
-                f"{name}: a loop whose plant has delays inside takes no such argument; it needs a "
-                "plant that is rational except for one delay in series"
+                f"{name}: a loop whose plant has delays inside does not take {name}. This "
+                "argument needs a plant that is rational except for one delay in series"
             )
     if callable(given.reference):
         raise ValueError(
             "reference: a loop whose plant has delays inside takes a number or an array; give "
-            "values that hold from the times in reference_time on"
+            "values, and in reference_time the times at which they begin"
         )
     times = one_dimensional("time", given.time)
     if times.size == 0:
@@ -50,8 +50,9 @@ def simulate_with_delays(loop: LoopSpecification, given: RunArguments) -> Respon
     rest = output.dcgain() * past if past != 0.0 else 0.0
     if not abs(rest - initial) <= _AT_REST * max(abs(rest), abs(initial)):
         raise ValueError(
-            f"initial_output={initial:g}: under the reference {past:g} before the start, this loop "
-            f"rests at {rest:g}, and with delays inside its plant it can only start there"
+            f"initial_output={initial:g}: under the reference {past:g} before the start, this "
+            f"loop rests at {rest:g}. With delays inside its plant it can start only from "
+            "this rest"
         )
     later = jumps.times >= start
     when = np.append(start, jumps.times[later])
@@ -120,8 +121,8 @@ def _driven(loop: LoopSpecification) -> tuple[TransferFunction, TransferFunction
     command = loop.transfer("command")
     if not command.is_proper:
         raise ValueError(
-            "a step of the reference is an impulse of the command of this loop: give its "
-            "derivative a DerivativeFilter, or take the derivative of the measurement alone, as PV "
-            "does"
+            "a step of the reference makes the command of this loop an impulse. Give its "
+            "derivative a DerivativeFilter, or take the derivative of the measurement alone, "
+            "as PV does"
         )
     return loop.transfer("output"), command

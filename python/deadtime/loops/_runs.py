@@ -77,8 +77,8 @@ def reference_jumps(
     if values.ndim == 0:
         if reference_time is not None:
             raise ValueError(
-                f"reference={values} is one number, so reference_time has no meaning: give an "
-                "array of as many values as there are times"
+                f"reference={values} is one number, so reference_time has no use: give an "
+                "array with one value for each time"
             )
         return ReferenceJumps(times[:1], values.reshape(1), before)
     where = times if reference_time is None else increasing("reference_time", reference_time)

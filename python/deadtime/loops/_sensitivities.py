@@ -34,7 +34,7 @@ def slope_names(loop: LoopSpecification, names: Sequence[str]) -> tuple[str, ...
         if name.startswith("lag") and known[name] == 0.0:
             raise ValueError(
                 f"sensitivities: at {name}=0 the plant changes its order, so there is no "
-                "derivative with respect to the lag; give the plant a small lag, or take the "
+                "derivative with respect to the lag. Give the plant a small lag, or take the "
                 "derivative with respect to the delay, which has a similar effect"
             )
         if name == "delay" and known[name] == 0.0 and loop.sample_time is None:

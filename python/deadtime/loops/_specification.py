@@ -80,8 +80,9 @@ class LoopSpecification(PickledByFields):
             value = getattr(self, name)
             if value is not None:
                 raise ValueError(
-                    f"{name}={value}: a hold or a limit needs a plant that is rational except for "
-                    f"one delay in series, and this one has delays inside; leave {name} out"
+                    f"{name}={value}: a hold or a limit needs a plant that is rational except "
+                    f"for one delay in series, but this plant has delays inside; leave {name} "
+                    "out"
                 )
 
     @property
@@ -300,7 +301,7 @@ class UnequalLimits:
 
     def _refuse(self, *_: object) -> NoReturn:
         raise ValueError(
-            f"limit={self!r}: this takes a loop with equal limits of its command, or none; give "
+            f"limit={self!r}: this function needs equal limits of the command, or none; give "
             "loop.replace(limit=...) one number"
         )
 
@@ -326,8 +327,8 @@ def _limit(limit: Any) -> Any:
     low, high = (float("nan") if x is None else float(x) for x in limit)
     if not (low < high and low <= 0.0 <= high):
         raise ValueError(
-            f"limit={limit!r}: give the least and the greatest command, zero between them; "
-            "float('inf') for none"
+            f"limit={limit!r}: give the least and the greatest command, with zero between "
+            "them; float('inf') for no limit"
         )
     return high if low == -high else UnequalLimits(low, high)
 
@@ -340,8 +341,8 @@ def numbers_of(parameters: Mapping[str, float | None], names: Collection[str]) -
     unknown = [name for name in names if name not in values and name != "delay"]
     if unknown:
         raise ValueError(
-            f"ranges for {', '.join(unknown)}: stability depends on no such number of this loop, "
-            f"but on {', '.join(dict.fromkeys([*values, 'delay']))}"
+            f"ranges for {', '.join(unknown)}: the stability of this loop does not depend on "
+            f"such a number, but on {', '.join(dict.fromkeys([*values, 'delay']))}"
         )
     if "delay" not in values and "delay" not in names:
         raise ValueError(

@@ -154,7 +154,7 @@ class Sweep(ReadOnlyArrays):
         """
         measured = self[metric]
         if not np.isfinite(measured).any():
-            raise ValueError(f"no set has a {metric}: lengthen the time or change the ranges")
+            raise ValueError(f"no set has a {metric}: give a longer time, or change the ranges")
         place = np.unravel_index(np.nanargmin(measured), self.shape)
         return {
             name: float(np.broadcast_to(array, self.shape)[place])
@@ -275,10 +275,10 @@ def sweep(
     common = _checked(loop, arrays)
     height = finite("amplitude", amplitude)
     if height == 0.0:
-        raise ValueError("amplitude=0: there is no step, give a number other than zero")
+        raise ValueError("amplitude=0: this is not a step; give a number other than zero")
     parts = (finite("rise", rise[0]), finite("rise", rise[1]))
     if not 0.0 <= parts[0] < parts[1]:
-        raise ValueError(f"rise={rise}: give two parts of the step, the smaller one first")
+        raise ValueError(f"rise={rise}: give two fractions of the step, the smaller one first")
     band = positive("settling", settling)
     sampled = 1.0 if "sample_time" in values else common.sample_time
     refuse_discretised(common.controller, sampled, "a sweep")
@@ -392,7 +392,9 @@ def _chosen(metrics: Sequence[str] | None, responses: bool) -> tuple[str, ...]:
     if metrics is None:
         return _METRICS
     if responses:
-        raise ValueError("metrics and responses: a sweep gives one of them, leave the other out")
+        raise ValueError(
+            "metrics and responses: a sweep gives only one of them; leave the other out"
+        )
     if isinstance(metrics, str):
         raise TypeError(f"metrics={metrics!r}: give a sequence of names, such as ({metrics!r},)")
     known = (*_METRICS, *_STEP_FIGURES, *_LOAD_FIGURES)
@@ -446,8 +448,8 @@ def _checked(loop: ControlLoop, arrays: Mapping[str, Array]) -> ControlLoop:
     # Most loops have a gain that is never zero.
     if not any(np.all(gain) for gain in given) and np.any(sum(map(np.abs, given)) == 0.0):
         raise ValueError(
-            f"a set has {', '.join(gains)} of zero: its loop is open, give it a gain other than "
-            "zero"
+            f"one set has {', '.join(gains)} of zero, so its loop is open: give a gain other "
+            "than zero"
         )
     return loop
 
@@ -462,7 +464,7 @@ def _times(time: ArrayLike | None, responses: bool) -> Array:
         raise ValueError(f"time={times}: responses need an array of output times")
     times = np.array(increasing("time", times))
     if times.size < 2 and not responses:
-        raise ValueError("time holds one time: give the first and the last one, or a number")
+        raise ValueError("time has only one entry: give the first and the last time, or a number")
     if times.size == 0:
         raise ValueError("time is empty: give at least one output time")
     return times

@@ -131,7 +131,8 @@ def _near_samples(rows: Rows, sample_time: float, whole: int, ratio: float) -> I
             + ("the sample_time" if whole == 1 else f"{whole} times the sample_time")
             + f" of {seconds(sample_time)}: if the time stamps are right, give sample_time="
             f"{rows.mean_time / whole:.6g}; if the controller is, scale the time stamps",
-            f"with the wrong one of two clocks, gain and delay are {100.0 * off:.2g} % off",
+            "if the wrong one of the two clocks is used, gain and delay have an error of "
+            f"{100.0 * off:.2g} %",
             share=off,
         )
     if whole > 1:
@@ -184,8 +185,8 @@ def _other_spacing(
         yield Finding(
             "other_rate",
             "warning",
-            f"{apart}, so the rows are not the samples of the controller, and without the command "
-            "their times are unknown; log the command",
+            f"{apart}, so the rows are not the samples of the controller, and without the "
+            "command the times of its changes are not known; log the command",
             shift,
             0.5 * sample_time,
         )
@@ -199,7 +200,7 @@ def _other_spacing(
                 "note",
                 f"{apart}, and the command holds over several rows: the controller samples where "
                 "it changes",
-                "none, if a fit takes the commands from where they change",
+                "none, if a fit takes the times of the commands from their changes",
             )
 
 
@@ -212,8 +213,8 @@ def _no_such_hold(told: str, soon: float, sample_time: float) -> Finding:
     return Finding(
         "sample_time",
         "refused",
-        f"{told}, but {100.0 * soon:.0f} % of the changes of the command come sooner than that "
-        "after the last one: check sample_time, or leave it out",
+        f"{told}, but {100.0 * soon:.0f} % of the changes of the command come sooner after "
+        "the previous change: check sample_time, or leave it out",
         "the model would contain a hold that is not in the loop, which counts as "
         f"{seconds(0.5 * sample_time)} of delay",
     )

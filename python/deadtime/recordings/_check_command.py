@@ -180,9 +180,9 @@ def command_findings(
         yield Finding(
             "reference_is_command",
             "note",
-            "the reference equals the command on every row: the recording is that of a plant "
+            "the reference equals the command in every row, so the recording shows a plant "
             "without its controller",
-            "a fit of the response to the command is possible, one of the closed loop is not",
+            "the response to the command can be fitted, but the closed loop cannot",
         )
     elif command.law in ("late", "early"):
         late = command.law == "late"
@@ -199,8 +199,9 @@ def command_findings(
         yield Finding(
             "command_approximate",
             "note",
-            "the command is that of the controller except for small differences: the controller "
-            "saw another output than the recorded one, or noise was added to the recording",
+            "the command is that of the controller except for small differences. Either the "
+            "controller used another output than the recorded one, or noise was added to the "
+            "recording",
             "none on a fit to the logged command; for a fit of the loop the noise is that of the "
             "recording: Waveform(noise='recording')",
         )
@@ -208,8 +209,8 @@ def command_findings(
         yield Finding(
             "relay",
             "note",
-            "the command has two values only, as that of a relay",
-            "a fit of the loop would be wrong, method='relay' or 'output_error' are not",
+            "the command has only two values, like that of a relay",
+            "a fit of the loop would be wrong; use method='relay' or 'output_error'",
         )
         return
     elif command.law == "differs":
@@ -221,10 +222,11 @@ def command_findings(
         yield Finding(
             "command_strays",
             "warning",
-            f"the command differs from that of the controller on {command.strays} of "
-            f"{columns.time.size} rows: it was logged at another time there, or did not come from "
-            "this controller",
-            f"each such row may hold a command that is one row, {seconds(rows.row_time)}, off",
+            f"the command differs from that of the controller in {command.strays} of "
+            f"{columns.time.size} rows: either it was logged at another time, or it did not "
+            "come from this controller",
+            "the command in each such row may belong to the next or the previous row, "
+            f"{seconds(rows.row_time)} away",
             rows.row_time * command.strays / columns.time.size,
         )
     yield from _limit_findings(columns, command, loop)
@@ -240,8 +242,8 @@ def _is_relay(command: Array | None) -> bool:
 def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
     """A command that is not that of the controller: another sign, unit or gain, or unrelated."""
     loose = (
-        "a fit of the loop would put the difference into the delay; one of the response to the "
-        "logged command (method='output_error') does not depend on it"
+        "a fit of the loop would attribute the difference to the delay; a fit of the "
+        "response to the logged command (method='output_error') does not depend on it"
     )
     if line is None or line.explained < EXPLAINED:
         part = "" if line is None else f", which explains {100.0 * line.explained:.0f} % of it"
@@ -263,7 +265,7 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
                     "refused",
                     f"the command is {slope:.4g} times Kp (reference - output): {units}, or the "
                     f"reverse; divide the command by {slope:.4g}",
-                    f"the gain would come out wrong by a factor of {times:.4g}",
+                    f"the gain would be wrong by a factor of {times:.4g}",
                 )
     if slope < 0.0:
         return Finding(
@@ -271,7 +273,7 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
             "refused",
             f"the command is {slope:.4g} times Kp (reference - output): it has the other sign; "
             "multiply the command or both other columns by -1",
-            "the gain would come out negative, and no delay would fit",
+            "the gain would be negative, and no delay would fit",
         )
     Kp = loop.parameters["Kp"]
     if abs(slope - 1.0) < LOOSE:
@@ -302,8 +304,8 @@ def _limit_findings(columns: Columns, command: Command, loop: ControlLoop) -> It
         yield Finding(
             "limit_exceeded",
             "refused",
-            f"the command reaches {largest:.6g}, beyond limit={loop.limit:g}: give the limit of "
-            "the controller, or the command after its limit",
+            f"the command reaches {largest:.6g}, beyond limit={loop.limit:g}: give the limit "
+            "of the controller, or record the command after its limit",
             "the model would contain a limit that was not there, and the estimated delay would "
             "be too short",
         )

@@ -38,9 +38,9 @@ def copied_setpoint(reference: Array, output: Array) -> Finding | None:
         "setpoint_copied",
         "refused",
         f"the reference equals the output in {copied} of the {moving.size} rows in which the "
-        "output moves: the setpoint is inactive there, or one column was read twice; choose a "
-        "window in which the controller follows a setpoint of its own",
-        "the delay would come out as zero",
+        "output moves. Either the setpoint is inactive in these rows, or one column was read "
+        "twice. Choose a window in which the controller follows a setpoint of its own",
+        "the delay would be estimated as zero",
     )
 
 
@@ -50,16 +50,16 @@ def no_motion(output: Array, command: Array | None = None) -> Finding | None:
         return Finding(
             "command_constant",
             "refused",
-            f"the command is {command[0]:g} throughout the window: it does not excite the vehicle; "
-            "choose a window in which the command changes",
+            f"the command is {command[0]:g} throughout the window, so it does not excite the "
+            "vehicle; choose a window in which the command changes",
             "every delay would fit",
         )
     if float(np.ptp(output)) == 0.0:
         return Finding(
             "output_constant",
             "refused",
-            f"the output is {output[0]:g} throughout the window: the vehicle did not move; choose "
-            "another window, and check the column",
+            f"the output is {output[0]:g} throughout the window, so the vehicle did not move; "
+            "choose another window, and check the column",
             "every delay would fit",
         )
     return None
@@ -77,8 +77,8 @@ def no_excitation(reference: Array, output: Array, *, in_motion: bool) -> Findin
     return Finding(
         "no_step",
         "refused",
-        f"the reference is {reference[0]:g} throughout the window: it does not excite the loop; "
-        "choose a window with a step",
+        f"the reference is {reference[0]:g} throughout the window, so it does not excite the "
+        "loop; choose a window with a step",
         "only noise and wind would determine the estimated delay",
     )
 
@@ -97,8 +97,9 @@ def excitation_findings(
             still = replace(
                 still,
                 code="saturated",
-                message="the command is at its limit throughout the window, so it does not excite "
-                "the vehicle; choose a window with a smaller step, or the end of this one",
+                message="the command is at its limit throughout the window, so it does not "
+                "excite the vehicle; choose a window with a smaller step, or only the end of "
+                "this window",
             )
         yield still
         return

@@ -189,7 +189,7 @@ def row_findings(columns: Columns, rows: Rows, loop: ControlLoop) -> Iterator[Fi
             f"{rows.repeated.size} rows repeat the row before them while the output moves, "
             f"{100.0 * share:.2g} % of the moving rows: they hold no new measurement; leave them "
             "out, or log each measurement when it arrives",
-            f"in the mean the output is {seconds(share * rows.row_time, 3)} older than its row "
+            f"on average the output is {seconds(share * rows.row_time, 3)} older than its row "
             "says, which adds to the delay",
             share * rows.row_time,
         )
@@ -200,9 +200,9 @@ def _stamp_findings(columns: Columns, rows: Rows) -> Iterator[Finding]:
         yield Finding(
             "stamps_nominal",
             "note",
-            f"the time stamps are exactly {seconds(rows.row_time)} apart, as measured ones rarely "
-            "are",
-            "if they are planned times and not measured ones, jitter is invisible here",
+            f"the time stamps are exactly {seconds(rows.row_time)} apart, which measured "
+            "times rarely are",
+            "if the time stamps are planned and not measured, jitter cannot be seen",
         )
     elif rows.stamps == "jittered":
         rate = float(np.quantile(np.abs(np.diff(columns.output)) / np.diff(columns.time), 0.95))

@@ -23,7 +23,10 @@ LARGEST_FILE, PIECE = 1_000_000_000, 1 << 20
 _FMT = re.compile(rb"^FMT, *\d+, *\d+, *\w+, *\w+,", re.MULTILINE)
 
 #: The text that a clone without Git LFS has in place of each large file.
-LFS, LFS_WHAT = b"version https://git-lfs.github.com/spec/", "a Git LFS pointer and not the file"
+LFS, LFS_WHAT = (
+    b"version https://git-lfs.github.com/spec/",
+    ("a Git LFS pointer instead of the file itself"),
+)
 
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 

@@ -133,8 +133,8 @@ def _lines(file: Path, silence: float) -> Iterator[str]:
             for line in (*whole, text):
                 if len(line) > LONGEST:
                     raise RecordingError(
-                        f"line {count + 1} of {file} has more than {LONGEST} characters: it is no "
-                        "line of a table"
+                        f"line {count + 1} of {file} has more than {LONGEST} characters, so "
+                        "it is not a line of a table"
                     )
                 count += 1
             count -= 1
@@ -151,7 +151,7 @@ def _decoder(file: Path, head: bytes) -> io.IncrementalNewlineDecoder:
     if kind is None:
         raise not_text(file)
     if kind != "text":
-        raise RecordingError(f"{file} is a file of {kind}: only a text can be followed")
+        raise RecordingError(f"{file} is a file of {kind}, but only a text file can be followed")
     # Bytes that are not UTF-8 are kept, as those of Latin-1 in a header.
     name, errors = (
         ("utf-16", "replace") if head.startswith(UTF_16) else ("utf-8-sig", "surrogateescape")

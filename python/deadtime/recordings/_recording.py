@@ -139,7 +139,10 @@ class Recording(ReadOnlyArrays):
         sent: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> None:
         if command is not None and sent is not None:
-            raise TypeError("give the command of each row or those sent between, not both")
+            raise TypeError(
+                "both the command of each row and the commands between rows are given: give "
+                "only one of the two"
+            )
         if reference is None:
             reference = np.full(np.shape(output), np.nan)
         columns = {"time": time, "reference": reference, "output": output}
@@ -436,8 +439,8 @@ def _column(
     far = np.flatnonzero(np.abs(array) > LARGEST)
     if far.size:
         raise RecordingError(
-            f"the {name} reaches {array[far[0]]:g}: values beyond {LARGEST:g} "
-            "may overflow; use another unit"
+            f"the {name} reaches {array[far[0]]:g}, but values beyond {LARGEST:g} may "
+            "overflow: use another unit"
         )
     array.flags.writeable = False
     return array

@@ -159,7 +159,8 @@ class Study:
             f"{NOT_CLAIMED}; {fit.reason}.",
             f"Under proportional control it is unstable above Kp = {self.held_limit:.2f}: keep Kp "
             f"below {self.safe_gain():.2f}.",
-            f"Try {gains}: a step {_settles(self.responses['designed for the delay'])}.",
+            f"Try {gains}: with these gains a step "
+            f"{_settles(self.responses['designed for the delay'])}.",
             f"The loop stays stable up to {self.gain_margin:.1f} times the estimated gain, or a "
             f"delay of {self.largest_delay:.2f} s.",
             "With gains designed without the delay a step "

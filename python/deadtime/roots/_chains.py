@@ -144,7 +144,7 @@ class Chain(ReadOnlyArrays):
         if index.dtype.kind not in "iu":
             raise TypeError(f"n of dtype {index.dtype}: give whole numbers")
         if index.size and index.min() < 0:
-            raise ValueError(f"n={index.min()}: roots are counted upwards from 0")
+            raise ValueError(f"n={index.min()}: roots are numbered from 0 upwards")
         if self._difference is None:
             v = self.offset + 1j * (self._phase + self.spacing * index)
         else:

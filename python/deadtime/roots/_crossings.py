@@ -260,7 +260,10 @@ def delay_margin(
     if isinstance(loop, ParametricQuasiPolynomial):
         return margin_of_family(loop, numbers_at(at))
     if at is not None:
-        raise TypeError("at= gives the parameters of an equation; a loop has its numbers already")
+        raise TypeError(
+            "at= gives the parameters of an equation, but a loop already has its parameters: "
+            "leave at out"
+        )
     found = getattr(loop, "_delay_margin", None)
     if found is None:
         raise TypeError(
@@ -278,8 +281,8 @@ def margin_of_family(family: ParametricQuasiPolynomial, at: Mapping[str, float])
     delays = {name for _, _, (_, slopes) in family._terms for name, _ in slopes}
     if len(delays) != 1:
         raise ValueError(
-            f"{len(delays)} parameters are delays ({', '.join(sorted(delays)) or 'none'}): leave "
-            "one of them, and put numbers in place of the others where the equation is written"
+            f"{len(delays)} parameters are delays ({', '.join(sorted(delays)) or 'none'}): "
+            "keep one of them, and replace the others by numbers in the equation"
         )
     (name,) = delays
     start = at[name]
@@ -292,8 +295,8 @@ def _one_range(ranges: Any) -> tuple[str, Range]:
         raise TypeError(f"ranges={ranges!r}: give a dict such as {{'Kp': (0, 6)}}")
     if len(ranges) != 1:
         raise ValueError(
-            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}): crossings are "
-            "those of one; for two there is stability_map and its boundaries"
+            f"ranges for {len(ranges)} parameters ({', '.join(map(str, ranges))}) are given, "
+            "but crossings need exactly one; for two, use stability_map and its boundaries"
         )
     ((name, given),) = ranges.items()
     return name, interval(name, given)

@@ -67,9 +67,9 @@ def expanded_and_exact(
     states = size - int(bordered)
     if states > LARGEST:
         raise NotExpandedError(
-            f"the determinant of {states} states is not expanded, only up to {LARGEST}: its "
-            "coefficients would no longer determine its roots; poles(), rightmost(), is_stable() "
-            "and frequency_response() work for any number"
+            f"the determinant of {states} states is not expanded, only of up to {LARGEST}, "
+            "because rounding of its coefficients would change its roots too much. For any "
+            "number of states, use poles(), rightmost(), is_stable() or frequency_response()"
         )
     # One power of two makes integers of all entries.
     shift = max(
@@ -84,8 +84,9 @@ def expanded_and_exact(
         if bordered:
             return QuasiPolynomial([[0.0]], [0.0]), True
         raise ValueError(
-            "the determinant of the characteristic matrix is zero for every s: the equations do "
-            "not determine the state, look for a row of E, N and A that is zero or repeated"
+            "the determinant of the characteristic matrix is zero for every s, so the "
+            "equations do not determine the state. Look for a row of E, N and A that is zero "
+            "or repeated"
         )
     h = _rounded(exact, shift**size)
     terms = {
@@ -122,8 +123,9 @@ def _determinant(rows: Sequence[Sequence[_Exact]]) -> _Exact:
                         target[key] = target.get(key, 0) + sign * a * b
                 if len(target) > _MOST_TERMS:
                     raise NotExpandedError(
-                        f"the determinant has more than {_MOST_TERMS} terms: it is not expanded, "
-                        "ask for poles(), rightmost() and frequency_response(), which do without"
+                        f"the determinant has more than {_MOST_TERMS} terms, so it is not "
+                        "expanded. Use poles(), rightmost() and frequency_response(), which "
+                        "do not need the expansion"
                     )
         minors = following
     full = minors.get((1 << len(rows)) - 1, {})

@@ -57,4 +57,4 @@ class NoExponential:
         raise TypeError(f"{base!r} to the power of an expression in s: {self._spelling()}")
 
     def __float__(self) -> NoReturn:
-        raise TypeError(f"an expression in s is no number: {self._spelling()}")
+        raise TypeError(f"an expression in s is not a number: {self._spelling()}")

@@ -85,7 +85,7 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         for coefficient in terms.values():
             if not math.isfinite(coefficient):
                 raise ValueError(
-                    f"coefficient {coefficient}: coefficients must be finite, scale the equation"
+                    f"coefficient {coefficient}: coefficients must be finite; scale the equation"
                 )
         self = object.__new__(ParametricQuasiPolynomial)
         self._adopt(names, {key: value for key, value in terms.items() if value != 0.0})
@@ -169,7 +169,7 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         missing = [name for name in self.names if name not in names]
         if missing:
             raise ValueError(
-                f"no value for {', '.join(missing)}: give it a range, or a value in "
+                f"{', '.join(missing)} has no value: give it a range, or a value in "
                 f"at={{{missing[0]!r}: ...}}"
             )
         return self
@@ -292,8 +292,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
         names, terms = right
         if len(self._terms) * len(terms) > _MAX_TERMS:
             raise ValueError(
-                f"the product has more than {_MAX_TERMS} terms: keep it factored, the roots of a "
-                "product are those of its factors"
+                f"the product has more than {_MAX_TERMS} terms: keep the factors separate, "
+                "because the roots of a product are those of its factors"
             )
         product: Terms = {}
         for a, x in self._terms.items():
@@ -309,8 +309,8 @@ class ParametricQuasiPolynomial(NoExponential, Immutable):
             return NotImplemented
         if exponent < 0:
             raise ValueError(
-                f"power {exponent}: powers are whole and not negative; multiply the equation "
-                "through instead"
+                f"power {exponent}: powers must be whole and not negative; multiply the "
+                "equation by the divisor instead"
             )
         power = self._of(self._names, {_ONE: 1.0})
         for bit in bin(int(exponent))[2:]:
@@ -359,7 +359,7 @@ class Parameter(ParametricQuasiPolynomial):
         if not isinstance(name, str):
             raise TypeError(f"name={name!r}: give a string, such as 'Kp'")
         if not name.isidentifier() or keyword.iskeyword(name):
-            raise ValueError(f"{name!r} is no name: use letters, digits and underscores")
+            raise ValueError(f"{name!r} is not a valid name: use letters, digits and underscores")
         if name == "s":
             raise ValueError("'s' is the variable of every quasi-polynomial: use another name")
         self._adopt((name,), {(((name, 1),), 0, _NO_DELAY): 1.0})
@@ -430,8 +430,8 @@ def _coerced(other: object) -> tuple[tuple[str, ...], Terms] | None:
 
 def _no_quotient(divisor: object) -> str:
     return (
-        f"division by {divisor!r}: the result would be no quasi-polynomial. Multiply the equation "
-        "through by it: a + b/T = 0 becomes T*a + b = 0"
+        f"division by {divisor!r}: the result would not be a quasi-polynomial. Multiply the "
+        "equation by this divisor: a + b/T = 0 becomes T*a + b = 0"
     )
 
 

@@ -384,7 +384,7 @@ class QuasiPolynomial(NoExponential, Immutable, Characteristic):
         found = self._native.expansion(place, highest)
         if not np.isfinite(found.errors).all():
             raise ValueError(
-                f"s={place}: a power of s or an exponential leaves the range of double precision"
+                f"s={place}: a power of s or an exponential exceeds the range of double precision"
             )
         return Expansion(found.coefficients, found.errors, found.delay)
 
@@ -442,7 +442,7 @@ def delay(T: Any) -> Any:
     if hasattr(T, "_exponential"):
         return T._exponential()
     if not is_number(T):
-        raise TypeError(f"T={T!r}: a delay is a real number of seconds")
+        raise TypeError(f"T={T!r}: a delay must be a real number of seconds")
     return QuasiPolynomial([[1.0]], [float(T)])
 
 
@@ -478,7 +478,9 @@ def _real_array(name: str, values: ArrayLike, ndim: int) -> NDArray[np.float64]:
     try:
         array = np.asarray(values)
     except ValueError as error:
-        raise ValueError(f"{name}: rows of different lengths, fill up with zeros") from error
+        raise ValueError(
+            f"{name} has rows of different lengths: fill them up with zeros"
+        ) from error
     if array.dtype.kind not in "biuf":
         raise TypeError(f"{name} of dtype {array.dtype}: give real numbers")
     if array.ndim != ndim or array.size == 0:

@@ -120,8 +120,8 @@ def _integers(name: str, values: ArrayLike) -> NDArray[np.int64]:
         if array.dtype == object and array.size and all(type(i) is int for i in array.flat):
             raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")
         raise TypeError(
-            f"{name}={example!r} (dtype {array.dtype}) is not an integer: branches are "
-            "numbered by integers such as 0 and -1"
+            f"{name}={example!r} (dtype {array.dtype}) is not an integer: give the number of "
+            "a branch, an integer such as 0 or -1"
         )
     if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
         raise ValueError(f"{name}={_largest(array)} does not fit a 64-bit integer")

@@ -36,12 +36,12 @@ def ranges_of(given: Given) -> dict[str, Range]:
     if not isinstance(given, Mapping):
         raise TypeError(f"ranges={given!r}: give a dict such as {{'Kp': (0, 6), 'Kv': (-1, 1)}}")
     if not given:
-        raise ValueError("ranges of no parameter: give one to three")
+        raise ValueError("ranges has no parameter: give one to three parameters")
     ends = {name: interval(name, value, may_be_point=True) for name, value in given.items()}
     if sum(low < high for low, high in ends.values()) > MOST_MOVING:
         raise ValueError(
-            f"ranges for more than {MOST_MOVING} parameters ({', '.join(given)}): "
-            "give the others values in at={...}"
+            f"ranges for more than {MOST_MOVING} parameters ({', '.join(given)}): give the "
+            "others a value in at={...}"
         )
     return ends
 

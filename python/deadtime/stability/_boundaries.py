@@ -64,8 +64,8 @@ def boundaries_of(
     found = family._family.boundaries(axes, decay=decay, damping=damping)
     if found is None:
         raise ValueError(
-            f"the family is affine in neither {' nor '.join(axes)}, and a root of all its "
-            "members stays at 0: cancel the factor s to see where the others cross"
+            f"the family is affine in neither {' nor '.join(axes)}, and all its members have "
+            "a root at 0: cancel the factor s to see the crossings of the other roots"
         )
     return boundaries_along(found, axes)
 

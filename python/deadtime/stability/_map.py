@@ -110,7 +110,9 @@ class StabilityMap(ReadOnlyArrays, Pictured):
             held = held_plane(self._loop.specification, {}, self.axes)
             return boundaries_along(held.boundaries(self.decay, self.damping), self.axes)
         if self.family is None:
-            raise ValueError("the map was made without what it judges: it has no boundaries")
+            raise ValueError(
+                "the map was made without the family that it judges, so it has no boundaries"
+            )
         return boundaries_of(self.family, self.axes, self.decay, self.damping)
 
     @cached_property
@@ -125,7 +127,10 @@ class StabilityMap(ReadOnlyArrays, Pictured):
             If the map is that of a sampled loop, which has no chains.
         """
         if self.family is None:
-            raise ValueError("the map of a sampled loop has no chains: its poles are finitely many")
+            raise ValueError(
+                "the map of a sampled loop has no chains, because a sampled loop has finitely "
+                "many poles"
+            )
         return read_only(self.family._family.chains(self.axes))
 
     @cached_property
@@ -187,7 +192,8 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         if not np.isfinite(candidates).any():
             if self.stable.any():
                 raise ValueError(
-                    "the map has no abscissa to choose by: compute it with abscissa=True"
+                    "the map has no abscissa, by which the best cell is chosen: compute it "
+                    "with abscissa=True"
                 )
             raise ValueError(
                 f"no cell of the map is stable: try other ranges of {' and '.join(self.names)}"
@@ -253,7 +259,7 @@ class StabilityMap(ReadOnlyArrays, Pictured):
         """
         if self._loop is None:
             raise ValueError(
-                "the explorer shows maps of a ControlLoop, and this is of another family"
+                "the explorer shows maps of a ControlLoop, but this map is of another family"
             )
         ends = {name: (float(axis[0]), float(axis[-1])) for name, axis in self.axes.items()}
         return self._loop.explore(ends)

@@ -99,9 +99,13 @@ def stability_radius(
         units |= {name: positive(f"scale of {name}", scales[name]) for name in scales}
     for name, unit in units.items():
         if unit == 0.0 and name not in (scales or ()):
-            raise ValueError(f"{name}=0 has no scale of its own: give scales={{{name!r}: ...}}")
+            raise ValueError(
+                f"{name}=0 gives no scale for this parameter: give scales={{{name!r}: ...}}"
+            )
     if len(names) > MOST_MOVING:
-        raise ValueError(f"more than {MOST_MOVING} parameters move: give the others in at={{...}}")
+        raise ValueError(
+            f"more than {MOST_MOVING} parameters vary: give the others a value in at={{...}}"
+        )
     known = family_of(family, names, at)
     found = native.stability_radius(
         known._family, values, units, tol=positive("tol", tol), max_boxes=_RADIUS_BOXES

@@ -137,7 +137,7 @@ def robust_map(
     held = ranges_of(over)
     twice = [name for name in held if name in axes]
     if twice:
-        raise ValueError(f"{twice[0]} is an axis and has an interval: give it one of the two")
+        raise ValueError(f"{twice[0]} has both an axis and an interval: give only one of the two")
     known = family_of(family, (first, second, *held), at)
     cells = math.prod(len(points) for points in axes.values())
     with reported(progress, cells) as report:

@@ -58,7 +58,7 @@ class DelayMatrices(Immutable):
             raise TypeError("N: give a dict of matrices by their delays, which are above zero")
         late = {} if N is None else _by_delay("N", N)
         if any(tau == 0.0 for tau in late):
-            raise ValueError("N has a matrix with delay 0: that one is E")
+            raise ValueError("N has a matrix with delay 0, but this matrix is E: give E")
         for name, group, shape in (
             ("A", state, (n, n)),
             ("B", inputs, (n, p)),

@@ -270,8 +270,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
         ):
             if chosen is None and count > 1:
                 raise ValueError(
-                    f"the system has {count} {name}s: choose one by {name}=; the norm from all "
-                    "inputs to all outputs is not computed"
+                    f"the system has {count} {name}s: choose one by {name}=. The norm from "
+                    "all inputs to all outputs is not computed"
                 )
         return self.transfer_function(output or 0, input or 0).hinf_norm()
 
@@ -393,8 +393,8 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
     def _differentiated(self) -> Realisable:
         if any(matrix.any() for matrix in self._D.values()):
             raise ValueError(
-                "D is not zero: the response to an impulse holds an impulse itself; leave D out "
-                "and add its part"
+                "D is not zero, so the response to an impulse contains an impulse itself: "
+                "leave D out, and add its part separately"
             )
         return _Differentiated(self)
 
@@ -428,9 +428,9 @@ class DelaySystem(DelayMatrices, HasPoles, HasResponses):
             exact = False
         if not exact:
             raise ValueError(
-                "a certificate needs an expanded determinant without rounded coefficients, which "
-                "this system does not have: count() proves the same number without writing the "
-                "proof down"
+                "a certificate needs an expanded determinant without rounded coefficients, "
+                "which this system does not have. count() proves the same number, but writes "
+                "no certificate"
             )
         return h
 

@@ -31,7 +31,9 @@ def control_package() -> Any:
     try:
         return importlib.import_module("control")
     except ImportError as error:
-        raise ImportError("this needs python-control: pip install control") from error
+        raise ImportError(
+            "this needs python-control, which is not installed: pip install control"
+        ) from error
 
 
 def polynomials_of(system: object) -> tuple[Array, Array] | None:
@@ -55,8 +57,8 @@ def _of_control(system: Any) -> tuple[Array, Array]:
         raise _is_sampled(system)
     if (system.ninputs, system.noutputs) != (1, 1):
         raise ValueError(
-            f"the system has {system.ninputs} inputs and {system.noutputs} outputs: pick one of "
-            "each first, for example system[0, 0]"
+            f"the system has {system.ninputs} inputs and {system.noutputs} outputs: choose "
+            "one of each first, for example system[0, 0]"
         )
     if isinstance(system, control.StateSpace):
         return _of_state_space(system.A, system.B, system.C, system.D)
@@ -70,7 +72,7 @@ def _of_scipy(system: Any) -> tuple[Array, Array]:
     if isinstance(system, signal.dlti):
         raise _is_sampled(system)
     if not isinstance(system, signal.lti):
-        raise TypeError(f"{type(system).__name__}: give an lti system of scipy.signal")
+        raise TypeError(f"the system has {type(system).__name__} outputs: choose one first")
     if isinstance(system, signal.StateSpace):
         if system.D.shape != (1, 1):
             raise ValueError(
@@ -86,8 +88,8 @@ def _of_scipy(system: Any) -> tuple[Array, Array]:
 
 def _is_sampled(system: Any) -> ValueError:
     return ValueError(
-        f"the system has the time step dt={system.dt}: only continuous systems are read, a sampled "
-        "loop is a ControlLoop with sample_time"
+        f"the system has the time step dt={system.dt}, but only continuous systems are read: "
+        "for a sampled loop, use ControlLoop with sample_time"
     )
 
 
@@ -108,7 +110,7 @@ def _of_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Array, Array]:
 def _numbers(coefficients: Any) -> Array:
     array = np.asarray(coefficients)
     if np.iscomplexobj(array):
-        raise TypeError("the coefficients are complex: real ones are needed")
+        raise TypeError("the coefficients are complex: give real ones")
     return array.astype(np.float64)
 
 

@@ -102,7 +102,9 @@ class Margins(ReadOnlyArrays):
     def _delay_margin(self) -> float:
         """The delay margin of a loop that must be stable."""
         if not self.stable:
-            raise ValueError("the loop is not stable as it is: it has no delay margin")
+            raise ValueError(
+                "the loop is not stable without further delay, so it has no delay margin"
+            )
         return self.delay_margin
 
     def _repr_markdown_(self) -> str | None:

@@ -145,8 +145,8 @@ def _singular(rank: int, size: int, is_neutral: bool) -> str:
     missing = size - rank
     equations = "an algebraic equation" if missing == 1 else f"{missing} algebraic equations"
     text = (
-        f"E has rank {rank} of {size}: the system holds {equations} besides differential ones, "
-        "which is not simulated"
+        f"E has rank {rank} of {size}: the system contains {equations} besides differential "
+        "ones, and such a system is not simulated"
     )
     if is_neutral:
         text += (
@@ -164,7 +164,8 @@ def of_ratio(num: QuasiPolynomial, den: QuasiPolynomial) -> Realisation:
     leading = float(den.coefficients[0, n]) if n < den.coefficients.shape[1] else 0.0
     if n == 0 and len(den.delays) > 1:
         raise ValueError(
-            f"1/({den!r}) is a difference equation without any derivative, which is not simulated"
+            f"1/({den!r}) is a difference equation without any derivative, and such an "
+            "equation is not simulated"
         )
 
     def rows(h: QuasiPolynomial, power: slice, scale: float) -> dict[float, NDArray[np.float64]]:

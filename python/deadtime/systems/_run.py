@@ -81,8 +81,8 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     has_past = callable(history) or np.any(history) or drive.initial_state is not None
     if not model.has_states and has_past:
         raise TypeError(
-            "a transfer function says nothing of the state: give a DelaySystem to start from "
-            "another history than zero"
+            "a transfer function does not describe the state: give a DelaySystem to start "
+            "from a history other than zero"
         )
     times = increasing("time", time)
     if times.size == 0:
@@ -97,8 +97,8 @@ def respond(system: Realisable, time: ArrayLike, drive: Drive) -> Response:
     if not model.has_states and before.any():
         if model.rest is None:
             raise ValueError(
-                f"input_before={before[0]}: {system!r} has a pole at zero, so it rests only under "
-                "an input of zero; give a DelaySystem with its history"
+                f"input_before={before[0]}: {system!r} has a pole at zero, so it is at rest "
+                "only under an input of zero; give a DelaySystem with its history"
             )
         state = model.rest * before
         past = signals.constant(state)
@@ -186,7 +186,7 @@ def _input(
         raise ValueError(f"interpolation={interpolation!r}: give 'hold' or 'linear'")
     if callable(inputs):
         if input_time is not None:
-            raise ValueError("inputs is a callable, so input_time has no meaning: leave it out")
+            raise ValueError("inputs is a callable, so input_time has no use: leave input_time out")
         span = (start, float(times[-1]))
         if span[0] == span[1]:
             value = signals.sampled("input u(t)", inputs, times, p, smooth["vectorized"])[:, 0]
@@ -225,7 +225,9 @@ def _past(
     history, derivative = drive.history, drive.history_derivative
     if not callable(history):
         if derivative is not None:
-            raise ValueError("history_derivative goes with a callable history: leave it out")
+            raise ValueError(
+                "history_derivative needs a callable history: leave history_derivative out"
+            )
         state = _vector("history", history, model.states, "states")
         return signals.constant(state), None, state
     now = np.array([start])

@@ -26,5 +26,7 @@ def smallest_delay(delays: Iterable[float]) -> float:
     """The least delay of the states that is not zero."""
     late = [tau for tau in delays if tau > 0.0]
     if not late:
-        raise ValueError("this system has no delay in its states: its roots do not depend on one")
+        raise ValueError(
+            "this system has no delay in its states, so its roots do not depend on a delay"
+        )
     return min(late)

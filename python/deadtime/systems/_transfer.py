@@ -96,7 +96,7 @@ class TransferFunction(NoExponential, Immutable, FrequencyDomain, HasPoles, HasR
             den = below if den == 1.0 else den * below
         n, d = quasi_polynomial("num", num), quasi_polynomial("den", den)
         if not d.coefficients.any():
-            raise ZeroDivisionError("den is zero: a transfer function needs one that is not")
+            raise ZeroDivisionError("den is zero: give a denominator other than zero")
         dead = non_negative("delay", delay)
         if dead:
             n = n * QuasiPolynomial([[1.0]], [dead])

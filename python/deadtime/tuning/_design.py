@@ -190,8 +190,8 @@ def design(
         doubt = refusal(loop)
         if doubt is not None and not allow_indication:
             raise ValueError(
-                f"the estimate is an indication, so that the margins of a design on it are not "
-                f"known ({doubt}): take allow_indication=True for gains without known margins"
+                f"the estimate is only an indication ({doubt}), so the margins of a design on "
+                "it are not known. Give allow_indication=True for gains without known margins"
             )
         loop, *around = possible_loops(loop, template, level)
         plants = (*plants, *around)
@@ -227,7 +227,7 @@ def _load_weight(objective: ObjectiveName, given: float | None) -> float:
         return 1.0 if objective in ("load", "load_ie") else 0.0
     weight = finite("load_weight", given)
     if not 0.0 <= weight <= 1.0:
-        raise ValueError(f"load_weight={weight}: give a part between 0 and 1")
+        raise ValueError(f"load_weight={weight}: give a number between 0 and 1")
     return weight
 
 
@@ -243,8 +243,8 @@ def _load_slack(
         return LOAD_SLACK if counts and not demands.named else 0.0
     if not counts or not isinstance(template, (PI, PID)):
         raise ValueError(
-            f"load_slack={given}: it is for objective='load' with PI or PID control and no "
-            "load_weight; leave it out"
+            f"load_slack={given} applies only to objective='load' with PI or PID control and "
+            "without load_weight; leave load_slack out"
         )
     return non_negative("load_slack", given)
 

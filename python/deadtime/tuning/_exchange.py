@@ -121,9 +121,9 @@ class Search:
         problem = self.problem
         if found.cost >= NEVER:
             raise ValueError(
-                f"a step of {problem.amplitude:g} does not settle with any gains that were tried: "
-                "the limit may not let the output stay there; give a smaller amplitude, or another "
-                "objective"
+                f"a step of {problem.amplitude:g} does not settle with any gains that were "
+                "tried. The limit of the command may not let the output stay at this level. "
+                "Give a smaller amplitude, or another objective"
             )
         worst = self._scenario(found.worst)
         return Found(np.array(found.gains), found.scenarios, found.value, worst, found.checked)
@@ -176,8 +176,8 @@ def _unmet(
     nearest = ", ".join(map(_with_unit, MARGINS, together))
     at = ", ".join(f"{n} = {v:.4g}" for n, v in search.problem.named(gains).items())
     return ValueError(
-        f"no gains in the ranges have {wanted}: taken alone, the most that can be reached is "
-        f"{most}; together the nearest is {nearest} at {at}. Ask for less, or widen the ranges"
+        f"no gains in the ranges have {wanted}. Each demand alone can reach at most {most}. "
+        f"Together the nearest is {nearest} at {at}. Ask for less, or widen the ranges"
     )
 
 

@@ -159,11 +159,13 @@ def filter_choice(
     """Design with every corner, and choose."""
     if objective == "overshoot":
         raise ValueError(
-            "objective='overshoot': it can be none with any filter; choose by 'abscissa', "
-            "'damping' or 'settling_time'"
+            "objective='overshoot': with any filter the overshoot can be zero, so it does not "
+            "choose one; choose by 'abscissa', 'damping' or 'settling_time'"
         )
     if noise is None and command_noise is not None:
-        raise ValueError("command_noise without noise: give the standard deviation of both")
+        raise ValueError(
+            "command_noise is given without noise: give the standard deviation of both"
+        )
     problem = problem.filtered(None)
     if shape is None:
         shape = (_SIDE[len(problem.free)],) * len(problem.free)
@@ -265,7 +267,7 @@ def _corners(problem: Problem, omegas: ArrayLike | None) -> Array:
     late += 0.5 * numbers.get("sample_time", 0.0)
     if late == 0.0:
         raise ValueError(
-            "the loop has no delay, lag or sample time that sets a scale: give omegas="
+            "the loop has no delay, lag or sample time from which to choose corners: give omegas="
         )
     return np.geomspace(_SLOWEST / late, _FASTEST / late, _CORNERS)
 
@@ -281,16 +283,17 @@ def _too_slow(corners: Array, lost: Sequence[float], loss: float) -> ValueError:
     if not np.isfinite(lost).any():
         return ValueError("no corner has gains with the required margins: require less")
     return ValueError(
-        f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %: the "
-        f"least is {100 * np.nanmin(lost):.3g} %; allow for more loss, or give faster omegas"
+        f"no corner up to {corners[-1]:.4g} rad/s loses as little as {100 * loss:g} %; the "
+        f"smallest loss is {100 * np.nanmin(lost):.3g} %. Allow a larger loss, or give faster "
+        "omegas"
     )
 
 
 def _too_noisy(corners: Array, tried: Sequence[_Tried], most: float) -> ValueError:
     """Why every corner makes more noise."""
     return ValueError(
-        f"no corner from {corners[0]:.4g} rad/s has a noise gain of {most:.4g} or less: the "
-        f"least is {np.nanmin([one.noise_gain for one in tried]):.4g}; allow for more noise, "
+        f"no corner from {corners[0]:.4g} rad/s has a noise gain of {most:.4g} or less; the "
+        f"smallest is {np.nanmin([one.noise_gain for one in tried]):.4g}. Allow more noise, "
         "give slower omegas, or smaller gains"
     )
 

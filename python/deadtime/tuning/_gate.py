@@ -271,7 +271,8 @@ class _Judge:
         if low * high > 0.0:
             return loops
         self.reasons.append(
-            f"the sign of the plant's gain is not certain: it is between {low:.3g} and {high:.3g}"
+            "the sign of the plant's gain is not certain, because the gain is between "
+            f"{low:.3g} and {high:.3g}"
         )
         return loops[:1]
 
@@ -361,7 +362,7 @@ class _Judge:
         if self.on_command > share * limit:
             self.reasons.append(
                 f"the noise on the command has a standard deviation of {self.on_command:.3g}, "
-                f"{100 * self.on_command / limit:.3g} % of the limit: allow for more, or "
+                f"{100 * self.on_command / limit:.3g} % of the limit: allow more noise, or "
                 "filter the derivative"
             )
 

@@ -77,8 +77,8 @@ class Problem(PickledByFields):
             return (self.given,)
         if not self.loop.plant.is_rational:
             raise ValueError(
-                "ranges: the search range of gains follows from plants that are rational except "
-                "for one delay in series; give ranges= for this plant"
+                "ranges: the search range of the gains can be found only for a plant that is "
+                "rational except for one delay in series; give ranges= for this plant"
             )
         return candidate_ranges(self.loop, self.free)
 
@@ -156,8 +156,8 @@ def pose(
     if isinstance(loop, DelayEstimate):
         if delay is not None or gain is not None:
             raise ValueError(
-                "delay and gain are in the region of the estimate: leave delay= and gain= out, or "
-                "give the loop of the estimate, fit.loop"
+                "the region of the estimate already contains delay and gain: leave delay= and "
+                "gain= out, or give the loop of the estimate, fit.loop"
             )
         region = region_of(loop, level, allow_indication)
         loop = loop.loop
@@ -173,13 +173,13 @@ def pose(
     free = tuple(name for name in template.gains if name not in held)
     if not free:
         raise ValueError(
-            f"fixed names every gain of {type(template).__name__} ({', '.join(held)}): leave one "
-            "free, or ask the loop itself for its margins"
+            f"fixed contains every gain of {type(template).__name__} ({', '.join(held)}): "
+            "leave one gain free, or ask the loop itself for its margins"
         )
     if len(free) > _MOST_FREE:
         raise ValueError(
-            f"{len(free)} free gains ({', '.join(free)}): fix some, {_MOST_FREE} are searched at "
-            "most"
+            f"{len(free)} gains are free ({', '.join(free)}), but at most {_MOST_FREE} can be "
+            "searched: fix some of them"
         )
     if region is not None:
         intervals, middle = region.intervals, region.estimate
@@ -196,11 +196,13 @@ def pose(
     if ranges is not None:
         given = _mapping("ranges", ranges)
         if set(given) != set(free):
-            raise ValueError(f"ranges are for {sorted(given)}, the free gains are {sorted(free)}")
+            raise ValueError(
+                f"ranges are given for {sorted(given)}, but the free gains are {sorted(free)}"
+            )
         spans = {name: interval(f"the range of {name}", given[name]) for name in free}
     height = finite("amplitude", amplitude)
     if height == 0.0:
-        raise ValueError("amplitude=0: there is no step, give a number other than zero")
+        raise ValueError("amplitude=0: this is not a step; give a number other than zero")
     return Problem(whole, free, spans, intervals, height, threads, region)
 
 
@@ -211,7 +213,8 @@ def _refuse_too_many_samples(loop: ControlLoop) -> None:
     if loop.delay > _MOST_SAMPLES * loop.sample_time:
         raise ValueError(
             f"sample_time={loop.sample_time:g}: the delay of {loop.delay:g} s has more than "
-            f"{_MOST_SAMPLES} samples; leave sample_time out, a hold this short changes nothing"
+            f"{_MOST_SAMPLES} samples. Leave sample_time out, because so short a hold has no "
+            "effect"
         )
 
 
@@ -234,7 +237,8 @@ def controller_template(controller: type[Controller] | Controller) -> Controller
         names = inspect.signature(controller).parameters
         return controller(**{name: 1.0 for name in names if name.startswith("K")})
     raise TypeError(
-        f"controller={controller!r} is no controller: give P, PV, PD, PI or PID, or one of them"
+        f"controller={controller!r} is not a controller: give P, PV, PD, PI or PID, as a "
+        "class or with gains"
     )
 
 
@@ -242,7 +246,7 @@ def with_filter(controller: Controller, filter: DerivativeFilter | None) -> Cont
     """The same gains with another filter of the derivative, or none."""
     if not isinstance(controller, (PV, PD, PID)):
         raise ValueError(
-            f"{type(controller).__name__} has no derivative to filter: take PV, PD or PID, or "
+            f"{type(controller).__name__} has no derivative to filter: use PV, PD or PID, or "
             "leave filter out"
         )
     return type(controller)(**controller.gains, filter=filter)

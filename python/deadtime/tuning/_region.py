@@ -86,7 +86,9 @@ def region_of(fit: DelayEstimate, level: float, allow_indication: bool) -> Confi
     names = [name for name in fit.free if name in NUMBERS]
     known = {name: fit.loop.parameters[name] for name in ("delay", *names)}
     if not names:
-        raise ValueError(f"the estimate fits {', '.join(fit.free)}, no number of the plant")
+        raise ValueError(
+            f"the estimate fits {', '.join(fit.free)}, which is not a parameter of the plant"
+        )
     sums = _sums(names)
     labels = [_label(names, row) for row in sums]
     centre = sums @ [known[name] for name in names]
@@ -111,8 +113,8 @@ def region_of(fit: DelayEstimate, level: float, allow_indication: bool) -> Confi
     low, high = region.intervals.get("gain", (1.0, 1.0))
     if low * high <= 0.0:
         raise ValueError(
-            f"the region of the gain, {low:.3g} to {high:.3g}, holds zero: a loop without gain has "
-            "no design; record a step with less noise, or a larger one"
+            f"the region of the gain, {low:.3g} to {high:.3g}, contains zero, and a loop "
+            "without gain has no design. Record a step with less noise, or a larger step"
         )
     return region
 
@@ -150,7 +152,9 @@ def _spread(
     for label, value in zip(labels, centre, strict=True):
         low, high = fit.ci(level, label)
         if not math.isfinite(low + high):
-            raise ValueError(f"the interval of {label} is open, {low:g} to {high:g}: fix it")
+            raise ValueError(
+                f"the interval of {label} has an open end, {low:g} to {high:g}: fix this parameter"
+            )
         errors.append(max(high - value, value - low) / quantile)
     deviations = np.sqrt(np.diag(cov))
     deviations[deviations == 0.0] = np.inf  # at its bound: no correlations

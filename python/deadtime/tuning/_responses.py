@@ -106,8 +106,8 @@ class Wanted:
         every = [*corners, *(one for one in fine(problem) if one not in corners)]
         if not problem.loop.plant.is_rational and self.objective != "load_ie":
             raise ValueError(
-                "a plant with delays inside has no response to a load or to a step here: take "
-                "objective='load_ie' or objective='abscissa'"
+                "the response of a plant with delays inside to a load or a step is not "
+                "computed: use objective='load_ie' or objective='abscissa'"
             )
         found, middle = self._found(every, len(corners))
         gains = found.gains

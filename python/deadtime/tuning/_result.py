@@ -309,8 +309,8 @@ def _probability(region: ConfidenceRegion) -> str:
     if region.verdict == "reliable":
         return f"the true loop has these margins with a probability of {100.0 * region.level:g} %"
     return (
-        "the estimate is an indication: with which probability the true loop has these margins is "
-        "not known"
+        "the estimate is only an indication, so the probability that the true loop has these "
+        "margins is not known"
     )
 
 

@@ -102,8 +102,8 @@ def none_stable(loop: ControlLoop, found: StableGains) -> str:
     """Error text: no gain is stable, and up to which gain was searched."""
     far = "" if np.isinf(found.most) else f" up to abs(Kp) = {found.most:.4g}"
     return (
-        f"no proportional gain{far} stabilises this loop with its delay of {loop.delay:g} s: take "
-        "a controller with a derivative, such as PV, or give ranges="
+        f"no proportional gain{far} stabilises this loop with its delay of {loop.delay:g} s: "
+        "use a controller with a derivative, such as PV, or give ranges="
     )
 
 
@@ -120,7 +120,10 @@ def candidate_ranges(loop: ControlLoop, free: Sequence[str]) -> tuple[dict[str, 
         )
     critical = found.critical
     if not abs(critical) < found.most:
-        raise ValueError("no proportional gain makes this loop unstable: give ranges=")
+        raise ValueError(
+            "no proportional gain makes this loop unstable, so the search has no upper end: "
+            "give ranges="
+        )
     low, high = found.widest
     other = low if critical == high else high
     wide = _ranges(free, critical, late)

@@ -80,8 +80,8 @@ def surveyed(problem: Problem, shape: Sequence[int] | None) -> Survey:
     )
     late = " or ".join(f"{delay:g}" for delay in problem.delays)
     raise ValueError(
-        f"no gains of {'x'.join(map(str, counts))} tried in {tried} are stable for a delay of "
-        f"{late} s, which proves nothing about the others: give other ranges="
+        f"of {'x'.join(map(str, counts))} gains that were tried in {tried}, none is "
+        f"stable for a delay of {late} s. Other gains may be stable: give other ranges="
     )
 
 

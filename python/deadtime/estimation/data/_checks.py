@@ -54,11 +54,13 @@ def checked_names(
     if missing:
         raise ValueError(
             f"this loop has no {missing[0]} to fit (its parameters are "
-            f"{', '.join(loop.parameters)}): give it a value to start from, or leave it out of "
-            "`free`"
+            f"{', '.join(loop.parameters)}): give the loop an initial value of this "
+            "parameter, or leave the parameter out of `free`"
         )
     if "delay" not in free and loop.delay is None:
-        raise ValueError("the delay of the loop is unknown, so it has to be among `free`")
+        raise ValueError(
+            "the delay of the loop is unknown, so it must be fitted: add 'delay' to `free`"
+        )
     return tuple(name for name in known if name in free)
 
 
@@ -66,7 +68,7 @@ def integrator_of(loop: ControlLoop, method: str) -> Integrator:
     """The plant of the loop, which has to be an integrator."""
     if not isinstance(loop.plant, Integrator):
         raise ValueError(
-            f"the {method} method is for an Integrator, the loop has a "
+            f"the {method} method is for an Integrator, but the loop has a "
             f"{type(loop.plant).__name__}: use method='waveform'"
         )
     return loop.plant
@@ -76,7 +78,7 @@ def delay_and(free: Sequence[str], loop: ControlLoop, method: str) -> tuple[str,
     """The checked names of what is fitted, for a method that searches the delay."""
     names = checked_names(free, loop)
     if "delay" not in names:
-        raise ValueError(f"the {method} method estimates the delay: keep it among `free`")
+        raise ValueError(f"the {method} method estimates the delay: add 'delay' to `free`")
     return names
 
 
@@ -86,8 +88,9 @@ def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
     if not np.all(np.isfinite(norms)) or np.any(norms == 0.0):
         unseen = [name for name, norm in zip(names, norms, strict=True) if not norm > 0.0]
         raise NotIdentifiableError(
-            f"the recording does not depend on the {' or '.join(unseen) or 'parameters'}: the "
-            "window holds no response to a step, or the command is at its limit throughout"
+            f"the recording does not depend on the {' or '.join(unseen) or 'parameters'}. "
+            "Either the window has no response to a step, or the command is at its limit "
+            "throughout"
         )
     # The thin factor: the full one has as many entries as samples squared.
     _, singular, directions = np.linalg.svd(jacobian / norms, full_matrices=False)
@@ -95,8 +98,8 @@ def check_distinguishable(jacobian: Array, names: Sequence[str]) -> None:
         weights = np.abs(directions[-1])
         mixed = [name for name, weight in zip(names, weights, strict=True) if weight > 0.2]
         raise NotIdentifiableError(
-            f"this recording does not distinguish {' and '.join(mixed)}: fix one of them, or "
-            "record a step that is not at the limit throughout"
+            f"this recording cannot separate the effects of {' and '.join(mixed)}. Fix one of "
+            "them, or record a step that does not keep the command at its limit throughout"
         )
 
 
@@ -131,9 +134,9 @@ def check_response(output: Array, misfit: Array, numbers: int, autocorrelation: 
     if not ratio > 0.0 or special.fdtrc(numbers, freedom, ratio) > F_TEST_LEVEL:
         explained = 100.0 * max(0.0, 1.0 - fitted / constant) if constant > 0.0 else 0.0
         raise NotIdentifiableError(
-            f"the output does not respond to the excitation: the best fit explains {explained:.0f} "
-            "% of its variance, as much as for noise alone; check columns, signs and gains, "
-            "choose a window with a step, or record a larger one"
+            "the output does not respond to the excitation: the best fit explains "
+            f"{explained:.0f} % of its variance, no more than for noise alone. Check columns, "
+            "signs and gains, choose a window with a step, or record a larger step"
         )
 
 
@@ -203,8 +206,8 @@ def check_excitation(data: Recording, numbers: int, *, in_motion: bool = False) 
     left = len(data) - (steps[0].index if steps else 0)
     if left < 2 * (numbers + 1):
         raise NotIdentifiableError(
-            f"{left} samples after the step are too few for {numbers} parameters and an initial "
-            "output: widen the window"
+            f"{left} samples after the step are too few to fit {numbers} parameters and an "
+            "initial output: widen the window"
         )
     check_moves(data.output)
 
@@ -224,9 +227,9 @@ def check_gain(values: Mapping[str, float], errors: Mapping[str, float]) -> None
     """Refuse a fitted gain that may be zero: any delay would then fit as well."""
     if "gain" in values and abs(values["gain"]) < LEAST_GAIN * errors["gain"]:
         raise NotIdentifiableError(
-            f"the gain comes out at {values['gain']:.2g} ± {errors['gain']:.2g}, which may be "
-            "zero: the output does not respond to the input, or the noise hides the response; "
-            "check columns and units"
+            f"the gain is estimated as {values['gain']:.2g} ± {errors['gain']:.2g}, which may "
+            "be zero. Either the output does not respond to the input, or noise hides the "
+            "response. Check columns and units"
         )
 
 
@@ -236,7 +239,7 @@ def check_ends(names: Sequence[str], point: Array, low: Array, high: Array) -> N
         for end in (most,) if name in ("delay", "lag") else (least, most):
             if np.isfinite(end) and abs(value - end) <= 1e-3 * abs(end):
                 raise NotIdentifiableError(
-                    f"the fit ends at a {name} of {end:g}, a bound of its search: the output is "
-                    "no response of such a loop to this reference; check columns, signs, units "
-                    "and gains, and choose a window around one step"
+                    f"the fit ends at a {name} of {end:g}, a bound of its search. So the "
+                    "output is not a response of this loop to this reference. Check columns, "
+                    "signs, units and gains, and choose a window around one step"
                 )

@@ -50,15 +50,15 @@ def whole_periods(data: Recording, period: float, left_out: int, highest: float)
     samples = round(period / h)
     if abs(period / h - samples) > WHOLE or samples < 4:
         raise ValueError(
-            f"period={period:g} s is {period / h:.4g} samples of {h:g} s: give a whole "
-            "number of samples, at least four"
+            f"period={period:g} s is {period / h:.4g} samples of {h:g} s: give a period of a "
+            "whole number of samples, at least four"
         )
     begin = whole_number("left_out", left_out, least=0) * samples
     periods = (len(data) - begin) // samples
     if periods < 2:
         raise NotIdentifiableError(
-            f"{max(0, periods)} periods of {period:g} s after {left_out} left out: at least "
-            "two are needed for their covariance; record longer"
+            f"{max(0, periods)} periods of {period:g} s remain after {left_out} are left out, "
+            "but their covariance needs at least two: record longer"
         )
     begin = len(data) - periods * samples  # the last ones, in which the transient has decayed most
 

@@ -53,8 +53,8 @@ def known_commands(recording: Recording, loop: ControlLoop) -> tuple[Array, str]
         return limited(recording.command, loop), "logged"
     if not isinstance(loop.controller, P):
         raise NotIdentifiableError(
-            "the recording holds no command, and only that of a P controller can be computed from "
-            "reference and output: log the command, or use method='waveform'"
+            "the recording has no command, and a command can be computed from reference and "
+            "output only for a P controller. Log the command, or use method='waveform'"
         )
     command = loop.controller.Kp * (recording.reference - recording.output)
     return limited(command, loop), "computed from reference and output"
@@ -110,15 +110,15 @@ def commands_of(recording: Recording, loop: ControlLoop, computed: bool) -> tupl
     found = known_commands(replace(recording, command=None, sent=None), loop)
     if loop.sample_time is None:
         raise NotIdentifiableError(
-            "the recording holds no command, and that of a continuous controller cannot be "
-            "computed between its rows: log the command, or use method='waveform'"
+            "the recording has no command, and the command of a continuous controller cannot "
+            "be computed between rows. Log the command, or use method='waveform'"
         )
     between = recording.sample_time
     if abs(between - loop.sample_time) > ON_SAMPLES * loop.sample_time:
         raise NotIdentifiableError(
-            f"rows are {between:g} s apart and the controller samples every {loop.sample_time:g} "
-            "s: its command cannot be computed from rows that are not its samples; log it, or use "
-            "method='waveform'"
+            f"rows are {between:g} s apart, but the controller samples every "
+            f"{loop.sample_time:g} s. Its command cannot be computed from such rows. Log the "
+            "command, or use method='waveform'"
         )
     return found
 

@@ -31,19 +31,19 @@ WORDS = {
 
 #: What to do about each.
 REMEDIES = {
-    "load": "if you know the load, record without it",
+    "load": "if the load can be avoided, record without the load",
     "output step": "check the sensor, or the estimator behind it, at that time",
-    "delay change": "estimate before and after it by a window",
+    "delay change": "make an estimate before the change and one after, each with a window",
     "dead zone": "compensate the dead zone in the controller, or use larger commands",
-    "play": "remove the play, or use changes of the command that are large compared with it",
+    "play": "remove the play, or use changes of the command that are large compared with the play",
     "stiction": "free the actuator, or use changes of the command that are large compared with the "
     "sticking",
     "upper limit": "give the controller this limit",
     "lower limit": "give the controller this limit",
     "rate limit": "give the loop this limit of the command's rate",
-    "slope limit": "keep commands small enough not to reach it, or give the plant this limit",
-    "drag": "the gain holds for speeds as in this recording",
-    "gain ramp": "find what changes, such as a battery or a temperature",
+    "slope limit": "keep commands below this limit, or give the plant this limit",
+    "drag": "use the gain only for speeds as in this recording",
+    "gain ramp": "find the cause of the change, such as a battery or a temperature",
     "gain by level": "record around the level at which the loop is to work",
     "jitter": "log the times at which commands are sent, or send them by a steady clock",
 }

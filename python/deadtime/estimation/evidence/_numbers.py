@@ -202,7 +202,7 @@ class FoundPlant(ReadOnlyArrays):
             raise ValueError(f"no interval: {self.reason}")
         if name not in self.intervals:
             names = ", ".join(self.intervals)
-            raise ValueError(f"{name!r} has no interval, there are those of {names}")
+            raise ValueError(f"{name!r} has no interval; there are intervals only for {names}")
 
     def value(self, name: str) -> float:
         """The number that an interval belongs to.
@@ -233,7 +233,7 @@ class FoundPlant(ReadOnlyArrays):
         given = one_dimensional("omega", np.atleast_1d(np.asarray(omega, dtype=float)))
         bad = given[~(given > 0.0)]
         if bad.size:
-            raise ValueError(f"omega={bad[0]:g} rad/s is not above zero")
+            raise ValueError(f"omega={bad[0]:g} rad/s: give a frequency above zero")
         found = self._answer().at(given.tolist())
         values = {name: np.array(found[name][0]) for name in ("gain", "phase", "delay")}
         ends = {f"{name}_ci": np.array(found[name][1:]) for name in values}

@@ -218,15 +218,18 @@ def question_of(
     if controller is not None:
         recording, shift = _with_command(recording, controller, limit)
     elif limit is not None:
-        raise ValueError(f"limit={limit!r} is that of a controller: give the controller too")
+        raise ValueError(
+            f"limit={limit!r} is the limit of a controller, but no controller is given: give "
+            "the controller too"
+        )
     if recording.command is None:
         raise RecordingError(
-            "the recording has no command, and without a loop nothing else says what moved the "
-            "plant: name its column, as by read_recording(..., command='OP'), or give the loop"
+            "the recording has no command, so nothing shows what moved the plant. Name the "
+            "column of the command, as in read_recording(..., command='OP'), or give the loop"
         )
     plant, largest_delay = known.get("plant"), known.get("largest_delay")
     if (hold := known.get("hold")) and not 0.0 < hold < math.inf:
-        raise ValueError(f"hold={hold!r} s is not a time above zero")
+        raise ValueError(f"hold={hold!r} s: give a time above zero")
     if plant is not None and plant not in PLANTS:
         raise ValueError(f"plant={plant!r} is not one of {', '.join(map(repr, PLANTS))}")
     if largest_delay is not None:
@@ -256,8 +259,8 @@ def _with_command(
     has_law = isinstance(controller, P) and recording.has_reference
     if recording.command is None and not has_law:
         raise RecordingError(
-            "the recording has no command; only that of a P controller follows from reference and "
-            "output: name the column of the command"
+            "the recording has no command. A command follows from reference and output only "
+            "for a P controller. Name the column of the command"
         )
     if recording.command is None:
         columns = Columns(recording.time, recording.reference, recording.output, None)

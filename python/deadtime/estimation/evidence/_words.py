@@ -112,26 +112,26 @@ def reason_of(code: str, found: native.FamilyFit, is_one_step: bool, step: float
     size, determined, asked = found.reason_size, found.told, found.asked
     if step and code in ("", NOT_WHITE, "no response"):
         return (
-            f"the sensor reads in steps of {step:.4g}, too coarse for how far the output moves: "
-            "what is left unexplained is mostly rounding"
+            f"the sensor reads in steps of {step:.4g}, too coarse for the range of the "
+            "output, so the residuals are mostly rounding"
         )
     if is_one_step and code in FEW_NUMBERS:
         return (
-            "one step does not distinguish two lags from a dead time and a lag, and the largest "
-            "stable gain depends on that"
+            "one step cannot distinguish two lags from a dead time and a lag, and the largest "
+            "stable gain depends on this difference"
         )
     sentences: Mapping[str, str] = {
         "": "",
-        "too few told": "the command moves too little: the recording determines "
-        f"{determined} of the {asked} numbers of the plant"
+        "too few told": "the command moves too little: the recording determines only "
+        f"{determined} of the {asked} parameters of the plant"
         if determined < asked
-        else "the command is one sine, which determines gain and phase at its frequency alone",
-        "classes contradict": "plants of different kinds explain the recording alike and differ "
-        "where a loop crosses over",
-        NOT_WHITE: "what the plant leaves unexplained is more than sensor noise: there "
-        "is a disturbance, or the plant is of another kind",
-        "command shifted": f"the command fits better one row later or earlier (by {size:.3g} in "
-        "2 ln L), so it was shifted",
+        else "the command is a single sine, which determines gain and phase only at its frequency",
+        "classes contradict": "plants of different kinds explain the recording equally well, "
+        "but have different crossover frequencies",
+        NOT_WHITE: "the residuals are more than sensor noise: there is a disturbance, or the "
+        "plant is of another kind",
+        "command shifted": "the recording is explained better if the command is one row later "
+        f"or earlier (by {size:.3g} in 2 ln L), so the command was shifted",
         "delay at its limit": f"the dead time, {size:.4g} s, is at the limit of what is tried",
         "lag at its limit": f"a time constant, {size:.4g} s, is at the limit of what is tried, far "
         "longer than the recording",
@@ -255,7 +255,7 @@ def _advice_on(fit: FoundPlant) -> Advice:
         )
     if fit._better is not None:
         return Advice(
-            "leave out the plant: another plant is likelier",
+            "leave out the plant, because another plant is likelier",
             {"plant": None},
             fit._question.options(),
         )
@@ -271,25 +271,26 @@ def _advice_on(fit: FoundPlant) -> Advice:
 def _advice_by_reason(fit: FoundPlant, given: dict[str, Any]) -> Advice:
     if fit._code in ("too few told", "classes contradict", "crossover not told"):
         known = [one for one in fit.candidates if len(one.parameters) <= fit.determined]
-        words = "record a run in which the command steps up and down at irregular intervals"
+        words = "record again with a command that steps up and down at irregular intervals"
         if known and "plant" not in given:
             words += f"; or name the plant, if you know that it is {known[0].in_words()}"
             return Advice(words, {"plant": known[0].name}, given)
         return Advice(words)
     if fit.reason.startswith("the sensor reads in steps"):
-        return Advice("let the command move further, or read the sensor in finer steps")
+        return Advice("use larger changes of the command, or read the sensor in finer steps")
     if fit._code == "no response":
         return Advice("check that these are the right columns", draw=True)
     window = None if fit.others else _reliable_part(fit._question)
     if window is not None:
         ends = " to ".join(f"{end:g}" for end in window)
-        words = f"the plant explains the recording from {ends} s: use this part"
+        words = f"the plant explains the recording from {ends} s on: use only this part"
         return Advice(words, {"window": window}, given)
     if fit._code == "delay at its limit":
         larger = float(f"{2.0 * fit.delay:.3g}")
         return Advice("allow a larger dead time", {"largest_delay": larger}, given)
     return Advice(
-        "find where the residuals are large, and leave this part out with a window", draw=True
+        "find the times at which the residuals are large, and leave these times out with a window",
+        draw=True,
     )
 
 

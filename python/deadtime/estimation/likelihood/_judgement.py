@@ -12,24 +12,24 @@ from deadtime.estimation.fit._residuals import Whiteness
 #: What speaks against a fit, by the kernel's name of it, with its sizes.
 WORDS = {
     "colour": (
-        "the residuals are not white beside the fitted noise (lag-1 autocorrelation {0:.2f})"
+        "the residuals are not white even after the noise was fitted (lag-1 autocorrelation "
+        "{0:.2f})"
     ),
-    "lag": "a further lag of {0:.3g} s makes the recording likelier: the plant lacks it",
+    "lag": "a further lag of {0:.3g} s makes the recording likelier, so the plant lacks a lag",
     "lag moves": (
-        "a further lag of {0:.3g} s would move delay and lag together to {1:.3g} s, out of their "
-        "interval"
+        "a further lag of {0:.3g} s would change the sum of delay and lag to {1:.3g} s, which "
+        "is outside its interval"
     ),
     "overshoot": (
-        "a further lag of {0:.3g} s with a zero of {1:.3g} s makes the recording likelier: the "
-        "plant lacks them"
+        "a further lag of {0:.3g} s with a zero of {1:.3g} s makes the recording likelier, so "
+        "the plant lacks both"
     ),
     "below zero": (
         "the delay is at zero, and the likelihood still rises towards zero: the plant has too much "
         "lag, or lacks a zero"
     ),
     "change": (
-        "the delay is not constant over the window{where}: it changes by {time} (standard "
-        "deviation)"
+        "the delay is not constant over the window{where}: its standard deviation is {time}"
     ),
     "speed": (
         "the noise grows with the speed of the output{where}: the time stamps are probably not the "

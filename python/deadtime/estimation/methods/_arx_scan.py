@@ -78,8 +78,9 @@ class ARXScan(OfOne):
         if self.fractional:
             if read.remark:
                 raise ValueError(
-                    "fractional=True is for an Integrator or a FirstOrder, which can be inverted, "
-                    f"the loop has a {type(loop.plant).__name__}: leave it out"
+                    "fractional=True needs a plant that can be inverted, an Integrator or a "
+                    f"FirstOrder, but the loop has a {type(loop.plant).__name__}: leave "
+                    "fractional out"
                 )
             gain = float(loop.parameters["gain"])
             response = np.sign(gain) * read.response
@@ -126,7 +127,7 @@ def _check_response(least: float, none: float, freedom: int, tested: int) -> Non
     ratio = (none - least) / tested / max(least / freedom, 1e-300)
     if float(special.fdtrc(tested, freedom, max(ratio, 0.0))) > F_TEST_LEVEL:
         raise NotIdentifiableError(
-            f"with the command the loss falls from {none:.3g} to {least:.3g}, no more than "
-            "with noise: the output is no response to this command, or the noise hides it; check "
-            "columns and units, or excite more"
+            f"with the command the loss falls only from {none:.3g} to {least:.3g}, no more "
+            "than for noise. Either the output does not respond to this command, or noise "
+            "hides the response. Check columns and units, or excite more"
         )

@@ -80,8 +80,9 @@ class CTA(OfOne):
         if loop.is_sampled or loop.limit is not None:
             what = "a hold" if loop.is_sampled else "a limit"
             raise ValueError(
-                f"the cta method is for continuous loops without a limit, this one has {what}: use "
-                "method='waveform' or 'grid', or loop.continuous() to leave a hold out on purpose"
+                "the cta method is for continuous loops without a limit, but this loop has "
+                f"{what}. Use method='waveform' or 'grid', or use loop.continuous() to ignore "
+                "the hold on purpose"
             )
         return names
 
@@ -94,8 +95,9 @@ class CTA(OfOne):
         delay, ends = float(found.point[0]), model.ends("delay")
         if not 1.01 * ends.low < delay < 0.99 * ends.high:
             raise NotIdentifiableError(
-                f"the fit ends at a delay of {delay:.3g} s, a bound of its search: the output is "
-                "no response of such a loop to this reference; check columns, signs and gains"
+                f"the fit ends at a delay of {delay:.3g} s, a bound of its search. So the "
+                "output is not a response of this loop to this reference. Check columns, "
+                "signs and gains"
             )
         count = len(names)
         every = list(range(len(model.labels)))
@@ -112,8 +114,8 @@ class CTA(OfOne):
             ),
             uncalibrated=(
                 "the cta method approximates the delay by a polynomial of degree "
-                f"{self.intervals}, which biases it; noise alone makes the delay uncertain by "
-                f"{math.sqrt(cov[0, 0]):.2g} s where the controller does not act on it; use "
+                f"{self.intervals}, which biases the estimate. Noise outside the loop gives "
+                f"the delay a standard error of {math.sqrt(cov[0, 0]):.2g} s. Use "
                 "method='waveform' for an interval"
             ),
             details={

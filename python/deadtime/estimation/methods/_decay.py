@@ -57,22 +57,26 @@ class Decay(OfOne):
 
     name: ClassVar[str] = "decay"
     limits: ClassVar[str] = (
-        "It takes the gain as given and the tail as one exponential, so that a wrong gain, a lag "
-        "or other modes move the delay."
+        "The method assumes that the gain is known and the tail is one exponential. A wrong "
+        "gain, a lag or other modes therefore bias the delay."
     )
 
     def __post_init__(self) -> None:
         if positive("tail", self.tail) >= 1.0:
             raise ValueError(
-                f"tail={self.tail}: the tail begins where this share of the step is left, so give "
-                "a number below 1"
+                f"tail={self.tail}: the tail begins when this share of the step remains, so "
+                "give a number below 1"
             )
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
         loop, simulated = run.loop, SimulatedRecording(*run[:3])
         stiffness = stiffness_of(loop, "decay")
-        reading, extremes = read_decaying_step(simulated.recording, "decay")
+        reading, extremes = read_decaying_step(
+            simulated.recording,
+            "the output overshoots, so the rightmost roots are complex and the tail is not an "
+            "exponential. Use method='decrement', 'overshoot' or 'waveform'",
+        )
         if extremes:
             raise NotIdentifiableError(
                 "the output overshoots, so the rightmost roots are complex and the tail is no "
@@ -83,23 +87,23 @@ class Decay(OfOne):
 
         if lag * rate >= 1.0:
             raise NotIdentifiableError(
-                f"the tail decays with {rate:.4g} 1/s, faster than possible with a lag of {lag:g} "
-                "s: the lag is smaller than given"
+                f"the tail decays at a rate of {rate:.4g} 1/s, faster than possible with a "
+                f"lag of {lag:g} s, so the true lag is smaller: check the lag"
             )
         delay, slope = delay_of_rate(rate, stiffness, lag, loop.sample_time)
         stderr = abs(slope) * error
         if delay < 0.0:
             raise NotIdentifiableError(
-                f"the tail decays with {rate:.4g} 1/s, slower than with K = {stiffness:.4g} 1/s "
-                "and no delay at all: the gain is smaller than given, or the tail "
-                "begins too late; check the gains"
+                f"the tail decays at a rate of {rate:.4g} 1/s, slower than without any delay "
+                f"at K = {stiffness:.4g} 1/s. Either the gain is smaller than given, or the "
+                "tail begins too late. Check the gains"
             )
         held = 0.5 * (loop.sample_time or 0.0)
         if rate * (delay + lag + held) >= 1.0:
             raise NotIdentifiableError(
-                f"the tail decays with {rate:.4g} 1/s, faster than e·K = {math.e * stiffness:.4g} "
-                "1/s, the most without overshoot: K·Td is near or above 1/e; use "
-                "method='decrement' or 'waveform'"
+                f"the tail decays at a rate of {rate:.4g} 1/s, but at most e·K = "
+                f"{math.e * stiffness:.4g} 1/s is possible without overshoot. So K·Td is near "
+                "or above 1/e. Use method='decrement' or 'waveform'"
             )
         return Read(
             {"delay": delay},
@@ -142,8 +146,8 @@ def _rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     time, left = reading.since[rows], 1.0 - reading.travelled[rows]
     if time.size < FEWEST:
         raise NotIdentifiableError(
-            f"{time.size} samples of a tail, {FEWEST} are needed: sample faster, record longer or "
-            "let the tail begin earlier with a larger `tail`"
+            f"the tail has {time.size} samples, but {FEWEST} are needed: sample faster, "
+            "record longer, or begin the tail earlier with a larger `tail`"
         )
     time = time - time[0]
     clear = left > max(CLEARANCE * reading.noise, 0.2 * float(left[0]))
@@ -153,7 +157,7 @@ def _rate(reading: StepReading, begin: float) -> tuple[float, float, int]:
     height, rate, error = tail_rate(time, left, max(guess, 1e-3))
     if height <= 0.0 or rate <= 0.0 or rate < CLEARANCE * error:
         raise NotIdentifiableError(
-            f"the tail decays with {rate:.3g} ± {error:.2g} 1/s, not distinguishable from "
-            "zero: let it begin earlier with a larger `tail`, or use method='waveform'"
+            f"the tail decays at a rate of {rate:.3g} ± {error:.2g} 1/s, which may be zero. "
+            "Begin the tail earlier with a larger `tail`, or use method='waveform'"
         )
     return rate, error, int(time.size)

@@ -42,8 +42,9 @@ class Decrement(OfOne):
 
     name: ClassVar[str] = "decrement"
     limits: ClassVar[str] = (
-        "It takes the peaks as those of one decaying oscillation. Other modes in the first "
-        "peaks move the delay, and so does noise on which the controller acts."
+        "The method assumes that the peaks are those of one decaying oscillation. Other modes "
+        "in the first peaks bias the delay, and so does noise to which the controller "
+        "responds."
     )
 
     def names(self, free: Sequence[str], loop: ControlLoop) -> tuple[str, ...]:
@@ -51,8 +52,8 @@ class Decrement(OfOne):
         names = delay_and(free, loop, "decrement")
         if "lag" in names:
             raise ValueError(
-                "the decrement method has two numbers, damping and frequency, for delay and gain: "
-                "fix the lag, or use method='waveform'"
+                "the decrement method reads two numbers, damping and frequency, to find delay "
+                "and gain: fix the lag, or use method='waveform'"
             )
         return names
 
@@ -66,8 +67,8 @@ class Decrement(OfOne):
         pair, made = loop_of_extremes(extremes, lag, sample_time)
         if pair[0] <= 0.0:
             raise NotIdentifiableError(
-                "the peaks do not decay: the loop is at or beyond its stability limit, or in a "
-                "limit cycle; use method='relay' or 'waveform'"
+                "the peaks do not decay: the loop is at or beyond its stability limit, or in "
+                "a limit cycle. Use method='relay' or 'waveform'"
             )
         if made is None:
             raise NotIdentifiableError(
@@ -86,7 +87,7 @@ class Decrement(OfOne):
         if values["delay"] <= 0.0:
             raise NotIdentifiableError(
                 f"the peaks decay with a damping ratio of {pair[0] / math.hypot(*pair):.3g}, "
-                f"more than any delay gives with K = {stiffness:g} 1/s: check the gains"
+                f"more than possible for any delay with K = {stiffness:g} 1/s: check the gains"
             )
         return Read(
             values,
@@ -97,10 +98,10 @@ class Decrement(OfOne):
                 f"{pair[1]:.3f} rad/s{'' if 'gain' in names else ', with the given gain'}"
             ),
             uncalibrated=(
-                "the decrement method assumes one decaying oscillation: noise alone makes the "
-                f"delay uncertain by {math.sqrt(own[0, 0]):.2g} s. Other modes in the first "
-                "peaks move it too, and so does noise on which the controller acts; use "
-                "method='waveform' for an interval"
+                "the decrement method assumes one decaying oscillation. Noise alone gives the "
+                f"delay a standard error of {math.sqrt(own[0, 0]):.2g} s. Other modes in the "
+                "first peaks bias the delay too, and so does noise to which the controller "
+                "responds. Use method='waveform' for an interval"
             ),
             details={
                 "damping_ratio": float(pair[0] / math.hypot(*pair)),
@@ -121,16 +122,16 @@ def _linear(extremes: list[Extreme], reading: StepReading, loop: ControlLoop) ->
         return linear
     if not extremes:
         raise NotIdentifiableError(
-            "no overshoot above the noise: without an oscillation, peaks do not determine the "
-            "delay; raise Kp, or use method='decay' or 'waveform'"
+            "there is no overshoot above the noise, and without an oscillation no peaks "
+            "determine the delay. Raise Kp, or use method='decay' or 'waveform'"
         )
     if len(extremes) >= 2:
         raise NotIdentifiableError(
-            f"the command is at its limit of {loop.limit:g} at {len(extremes) - len(linear)} of "
-            f"{len(extremes)} extremes: the limit, not the roots, determines their decay; use a "
-            "smaller step, or method='waveform'"
+            f"the command is at its limit of {loop.limit:g} at {len(extremes) - len(linear)} "
+            f"of {len(extremes)} extremes, so the limit determines their decay, not the "
+            "roots. Use a smaller step, or method='waveform'"
         )
     raise NotIdentifiableError(
-        f"one extreme ({100 * extremes[0].height:.2g} % of the step) is above the noise, and "
-        "a decrement takes two: raise Kp, record longer, or use method='overshoot'"
+        f"only one extreme ({100 * extremes[0].height:.2g} % of the step) is above the noise, "
+        "but a decrement needs two. Raise Kp, record longer, or use method='overshoot'"
     )

@@ -52,8 +52,8 @@ def profile_for(
         return fit.profile(first, covariance, numbers)
     except NotIdentifiableError:
         raise NotIdentifiableError(
-            f"this recording does not distinguish {', '.join(names)}: give the plant "
-            "fewer lags, or let deadtime.estimation.choose_plant choose"
+            f"this recording cannot separate the effects of {', '.join(names)}: give the "
+            "plant fewer lags, or let deadtime.estimation.choose_plant choose the plant"
         ) from None
 
 
@@ -162,9 +162,12 @@ def _message(
     if left_out:
         text += f"; {left_out} rows left out as outliers"
     for what, size in scatter.items():
-        text += f"; the times of the {what.removeprefix('scatter_of_')} scatter by {size:.2g} s"
+        text += (
+            f"; the times of the {what.removeprefix('scatter_of_')} have a standard deviation "
+            f"of {size:.2g} s"
+        )
     if held:
-        text += f"; the {' and '.join(held)} came out at zero, its bound"
+        text += f"; the {' and '.join(held)} was estimated as zero, its bound"
     if adequacy.reasons:
         return f"{text}{REASONS}{'; '.join(adequacy.reasons)}{advice(names, run.loop)}"
     return f"{text}; {unseen_in_words(unseen)} have been seen"

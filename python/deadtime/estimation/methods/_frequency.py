@@ -148,8 +148,9 @@ class Frequency(OfOne):
             uncalibrated=""
             if loop.is_sampled
             else (
-                "the frequency method takes the command as constant between samples, and that of "
-                "a continuous loop is not; use method='waveform' for an interval"
+                "the frequency method assumes that the command is constant between samples. "
+                "The command of a continuous loop is not. Use method='waveform' for an "
+                "interval"
             ),
             details={"lines": lines.describe, "command": source, "p_value_of_model": p_value},
             profile=Profile(
@@ -204,8 +205,8 @@ class _Lines(ModelOfOne):
         costs, _, found = self.problem.scan(grid, guess, lag, 0.0)
         if int(np.argmin(costs)) == count:
             raise NotIdentifiableError(
-                f"the fit ends at a delay of {grid[-1]:.3g} s, the longest of the search: the "
-                "output is no response to this command; check columns and units"
+                f"the fit ends at a delay of {grid[-1]:.3g} s, the longest of its search, so "
+                "the output is not a response to this command. Check columns and units"
             )
         return found
 
@@ -220,8 +221,8 @@ def _record_lines(asked: _Asked, commands: tuple[Array, Array], highest: float) 
     real = 2 * int(kept.sum()) - int(nyquist)
     if real < 2 * (len(names) + 1):
         raise NotIdentifiableError(
-            f"{int(kept.sum())} lines up to {highest:g} Hz are too few for {len(names)} "
-            "parameters: widen the window or give a higher `highest`"
+            f"{int(kept.sum())} lines up to {highest:g} Hz are too few to fit {len(names)} "
+            "parameters: widen the window, or give a higher `highest`"
         )
     every = int(kept.sum()) == size // 2
     made = partial(
@@ -243,8 +244,8 @@ def _periodic_lines(asked: _Asked, command: Array, periods: Periods) -> _Lines:
     freedom = 2 * periods.lines.size - len(names)
     if freedom < 2:
         raise NotIdentifiableError(
-            f"{periods.lines.size} excited lines are too few for {len(names)} parameters: excite "
-            "more"
+            f"{periods.lines.size} excited lines are too few to fit {len(names)} parameters: "
+            "excite more frequencies"
         )
     # The inverse of a variance estimated with f degrees of freedom is too large by f/(f - 1) on
     # average.

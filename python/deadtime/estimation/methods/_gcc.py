@@ -60,8 +60,8 @@ class GCC(OfOne):
 
     name: ClassVar[str] = "gcc"
     limits: ClassVar[str] = (
-        "Under feedback the command contains the noise of the output, which moves the peak of "
-        "the correlation. The weaker the excitation, the larger is this error."
+        "Under feedback the command contains the noise of the output, which shifts the peak "
+        "of the correlation. This error grows as the excitation becomes weaker."
     )
 
     def __post_init__(self) -> None:
@@ -74,8 +74,9 @@ class GCC(OfOne):
         read = read_input_output(simulated, "gcc")
         if int(np.count_nonzero(np.diff(read.command))) < 2:
             raise NotIdentifiableError(
-                "the command changes at most once in the window, as when it is at its limit: its "
-                "correlation has no peak; use a smaller step, or method='output_error'"
+                "the command changes at most once in the window, for example because it is at "
+                "its limit, so its correlation has no peak. Use a smaller step, or "
+                "method='output_error'"
             )
         p_value = feedback_p_value(data)
         feedback = p_value < FEEDBACK
@@ -96,10 +97,10 @@ class GCC(OfOne):
             float(data.output[0]),
             message=_message(self.weighting, share, feedback, read),
             uncalibrated=(
-                "the gcc method reads the peak of a correlation: the error formulas for it hold "
-                "for stationary noise in open loop only"
-                + (", and here the command depends on the output" if feedback else "")
-                + "; use method='output_error' for an interval"
+                "the gcc method reads the peak of a correlation. Its error formulas are valid only "
+                "for stationary noise in open loop"
+                + (", but the command of this recording depends on the output" if feedback else "")
+                + ". Use method='output_error' for an interval"
             ),
             details={
                 "weighting": self.weighting,
@@ -119,9 +120,10 @@ def _explained(read: InputOutput, shift: int) -> float:
     needed = -float(special.ndtri(LEVEL)) * np.sqrt(max(spread, 0.25) / size)
     if abs(coefficient) < needed:
         raise NotIdentifiableError(
-            f"command and response are correlated by {abs(coefficient):.2g} at best, unrelated "
-            f"signals by up to {needed:.2g}: the output is no response to this command, or the "
-            "noise hides it; check columns and units, or excite more"
+            f"command and response are correlated by at most {abs(coefficient):.2g}, but "
+            f"unrelated signals reach up to {needed:.2g}. Either the output does not respond "
+            "to this command, or noise hides the response. Check columns and units, or excite "
+            "more"
         )
     return abs(coefficient)
 
@@ -133,7 +135,7 @@ def _message(weighting: Weighting, share: float, feedback: bool, read: InputOutp
     )
     if feedback:
         text += (
-            "; the command depends on the output, so noise is on both and biases the peak: use it "
-            "as an initial value only"
+            "; the command depends on the output, so both contain the same noise, which "
+            "biases the peak. Use this delay only as an initial value"
         )
     return text + read.remark

@@ -66,15 +66,15 @@ class Graphical(OfOne):
 
     name: ClassVar[str] = "graphical"
     limits: ClassVar[str] = (
-        "It reads the few samples on the first straight part of the step, and counts part of a lag "
-        "as delay."
+        "The method reads the few samples on the first straight part of the step, and counts "
+        "part of a lag as delay."
     )
 
     def __post_init__(self) -> None:
         check_choice("construction", self.construction, get_args(Construction))
         low, high = self.shares
         if not 0.0 < low < high < 1.0:
-            raise ValueError(f"shares={self.shares}: give two that increase, between 0 and 1")
+            raise ValueError(f"shares={self.shares}: give two increasing numbers between 0 and 1")
 
     def read(self, run: Run, names: tuple[str, ...]) -> Read:
         """Read the numbers from the window of one recording."""
@@ -90,8 +90,8 @@ class Graphical(OfOne):
             delay, stderr = _tangent(reading, moved, loop.sample_time)
         if not delay > LEAST * float(reading.since[-1]):
             raise NotIdentifiableError(
-                f"the line meets the initial output {-delay:.3g} s before the step: the samples on "
-                "it are too few or too noisy, or there is no delay; use method='waveform'"
+                f"the line meets the initial output {-delay:.3g} s before the step. Its "
+                "samples are too few or too noisy, or there is no delay. Use method='waveform'"
             )
         return Read(
             {"delay": delay},
@@ -101,8 +101,8 @@ class Graphical(OfOne):
                 f"{self.construction.replace('_', ' ')} of one step: part of a lag counts as delay"
             ),
             uncalibrated=(
-                "the graphical method uses the first samples that move, and its error "
-                "by a lag or by its thresholds is not known; use method='waveform' for an interval"
+                "the graphical method uses the first samples that move. Its error from a lag "
+                "or from its thresholds is not known. Use method='waveform' for an interval"
             ),
             details={
                 "construction": self.construction,
@@ -123,8 +123,8 @@ def _first_movement(reading: StepReading) -> int:
         moved = int(np.flatnonzero(reading.travelled[:half] <= least)[-1]) + 1 if half else 0
     if moved == 0 or moved >= reading.travelled.size:
         raise NotIdentifiableError(
-            f"the output moves within the first sample after the step at {reading.step.time:g} s, "
-            "or not at all, so no delay can be read"
+            "the output either moves within the first sample after the step at "
+            f"{reading.step.time:g} s, or does not move, so no delay can be read"
         )
     return moved
 
@@ -133,8 +133,8 @@ def _two_point(reading: StepReading, low: float, high: float) -> float:
     """Time after the step, s, at which the line through two shares meets the initial output."""
     if low < CLEARANCE * reading.noise:
         raise NotIdentifiableError(
-            f"a share of {low:g} is within the noise of {reading.noise:.2g} of the step: give "
-            "larger `shares`, or a larger step"
+            f"a share of {low:g} of the step is too near to the noise, {reading.noise:.2g} of "
+            "the step. Give larger `shares`, or a larger step"
         )
     times = []
     for share in (low, high):
@@ -152,12 +152,12 @@ def _tangent(reading: StepReading, moved: int, held: float | None) -> tuple[floa
     if few is not None:
         count, begin, until = few
         raise NotIdentifiableError(
-            f"{count} samples on the straight part, from {begin:.3g} to {until:.3g} s after the "
-            "step: sample faster than twice a delay, or use method='waveform'"
+            f"the straight part, from {begin:.3g} to {until:.3g} s after the step, has "
+            f"{count} samples: sample faster than twice a delay, or use method='waveform'"
         )
     if found is None:
         raise NotIdentifiableError(
-            "the output falls where it should rise along a straight line: the noise hides the "
-            "beginning of the response; use method='waveform'"
+            "the output falls during the part of the response that should be a rising line, "
+            "so noise hides this part. Use method='waveform'"
         )
     return found

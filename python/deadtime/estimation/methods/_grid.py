@@ -100,9 +100,9 @@ class Grid(OfOne):
         )
         if int(np.argmin(costs)) == grid.size - 1:
             raise NotIdentifiableError(
-                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid: the "
-                "output is no response of such a loop to this reference; check columns, signs, "
-                "units and gains, or give other `delays`"
+                f"the cost falls up to a delay of {grid[-1]:g} s, the longest of the grid. So "
+                "the output is not a response of this loop to this reference. Check columns, "
+                "signs, units and gains, or give other `delays`"
             )
         point, residuals = found.point, -found.misfit
         check_ends(labels, point, model.low, model.high)
@@ -123,9 +123,10 @@ class Grid(OfOne):
             start=model.start_of(point),
             message=_message(names, grid, white),
             uncalibrated=(
-                "the grid method leaves out that the controller acts on the noise: the curvature "
-                f"of the cost gives {low:.4g} to {high:.4g} s (95 %), which holds only where the "
-                "controller does not; use method='output_error' or 'waveform' for an interval"
+                "the grid method ignores that the controller responds to the noise. The "
+                f"curvature of the cost gives {low:.4g} to {high:.4g} s (95 %), which is "
+                "valid only without this response. Use method='output_error' or 'waveform' "
+                "for an interval"
             ),
             details={
                 "delays": grid.tolist(),
@@ -145,8 +146,8 @@ def _checked(delays: ArrayLike) -> Array:
     grid = increasing("delays", delays)
     if grid.size < 3 or grid[0] < 0.0:
         raise ValueError(
-            f"delays: {grid.size} from {grid[0] if grid.size else math.nan:g} s; give three at "
-            "least, none below zero"
+            f"delays: {grid.size} delays from {grid[0] if grid.size else math.nan:g} s are "
+            "given; give three or more, none below zero"
         )
     return grid
 

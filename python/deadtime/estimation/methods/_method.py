@@ -62,8 +62,8 @@ def paired_runs(recording: Recordings, loop: Loops, window: Windows = None) -> l
     plants = {type(run.loop.plant).__name__ for run in runs}
     if len(plants) > 1:
         raise ValueError(
-            f"the loops have different plants ({', '.join(sorted(plants))}): recordings that are "
-            "fitted together must be of one vehicle"
+            f"the loops have different plants ({', '.join(sorted(plants))}), but recordings "
+            "that are fitted together must be of one vehicle"
         )
     return runs
 

@@ -118,8 +118,8 @@ class OutputError(Method):
             plant_model(r.loop.plant, ()).integrates for r in runs
         ):
             raise ValueError(
-                "air='vehicle' is for a plant that integrates what its motors do, such as "
-                "Integrator: use air='command'"
+                "air='vehicle' needs a plant that integrates the effect of its motors, such "
+                "as Integrator: use air='command'"
             )
         assumed = Assumed(
             self.initial_output, output_filter=known, air=self.air, intervals=self.intervals
@@ -305,8 +305,8 @@ def _likeliest(begun: _Begun) -> _Likeliest:
         fit, numbers = fit.with_numbers(given, list(begun.numbers.items()))
         if numbers is None:
             raise NotIdentifiableError(
-                f"this recording does not distinguish the {' and '.join(begun.numbers)} from the "
-                "other fitted numbers: fix one of them, or record larger steps"
+                f"this recording cannot separate the {' and '.join(begun.numbers)} from the "
+                "other fitted parameters: fix one of them, or record larger steps"
             )
         values = dict(numbers.values)
         fitted = [run._replace(loop=run.loop.replace(**values)) for run in fitted]
@@ -326,9 +326,9 @@ def _check_delay(begun: _Begun, profile: FlightProfile) -> None:
     longest = min(LONGEST_DELAY * one.span for one in begun.models)
     if "delay" in begun.names.free and profile.fit.numbers.delay >= longest * (1.0 - 1e-3):
         raise NotIdentifiableError(
-            f"the fit ends at a delay of {longest:g} s, {LONGEST_DELAY:g} of the window: the "
-            "output is no response to this command; check columns and units, or choose a longer "
-            "window"
+            f"the fit ends at a delay of {longest:g} s, {LONGEST_DELAY:g} of the window, so "
+            "the output is not a response to this command. Check columns and units, or choose "
+            "a longer window"
         )
     if not gain_is_certain(profile):
         check_fit(*begun.plain, begun.fitted)
@@ -406,12 +406,14 @@ def _check_others(names: Sequence[str], known: Mapping[str, float]) -> None:
     """Refuse numbers that cannot be searched around the rest."""
     if len(names) > MOST_NUMBERS:
         raise ValueError(
-            f"{', '.join(names)} are {len(names)} numbers besides gain, delay, lags and zero: fit "
-            f"at most {MOST_NUMBERS} of them"
+            f"{', '.join(names)} are {len(names)} parameters besides gain, delay, lags and "
+            f"zero: fit at most {MOST_NUMBERS} of them"
         )
     for name in names:
         if known[name] == 0.0:
-            raise ValueError(f"{name}=0: give another value to start from, of the sign it has")
+            raise ValueError(
+                f"{name}=0: give an initial value other than zero, with the sign of this parameter"
+            )
 
 
 def _given(

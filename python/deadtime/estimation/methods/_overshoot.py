@@ -70,8 +70,9 @@ def damping_ratio(overshoot: float) -> float:
     """
     if not 0.0 < overshoot < 1.0:
         raise NotIdentifiableError(
-            f"an overshoot of {100 * overshoot:.4g} % has no damping ratio: equation (5) needs one "
-            "between 0 and 100 %; use map='exact' above, the waveform method below"
+            f"an overshoot of {100 * overshoot:.4g} % has no damping ratio: equation (5) "
+            "needs an overshoot between 0 and 100 %. Use map='exact' above 100 %, the "
+            "waveform method below 0 %"
         )
     log = math.log(overshoot)
     return -log / math.hypot(math.pi, log)
@@ -93,8 +94,8 @@ def exact_x(overshoot: float) -> float:
     x = x_of_overshoot(overshoot)
     if x is None:
         raise NotIdentifiableError(
-            f"an overshoot of {100 * overshoot:.3g} % is too small: K·Td is at its "
-            f"limit 1/e = {math.exp(-1.0):.4f}; use the waveform method"
+            f"an overshoot of {100 * overshoot:.3g} % is too small, because K·Td is at its "
+            f"limit 1/e = {math.exp(-1.0):.4f}: use the waveform method"
         )
     return x
 
@@ -119,8 +120,8 @@ class Overshoot(OfOne):
 
     name: ClassVar[str] = "overshoot"
     limits: ClassVar[str] = (
-        "It reads one peak and takes the gain as given: a vehicle of less gain overshoots less, "
-        "and its delay comes out too short."
+        "The method reads one peak and assumes that the gain is known. A vehicle with less "
+        "gain overshoots less, so its estimated delay is too short."
     )
 
     def __post_init__(self) -> None:
@@ -161,9 +162,10 @@ class Overshoot(OfOne):
                 f"{loop.parameters['gain']:g} and no lag"
             ),
             uncalibrated=(
-                "the overshoot method reads one peak: noise alone makes the delay uncertain by "
-                f"{stderr:.2g} s. The largest of noisy samples is too high on average, and a wrong "
-                "gain, a lag or the hold move the delay; use method='waveform' for an interval"
+                "the overshoot method reads one peak. Noise alone gives the delay a standard "
+                f"error of {stderr:.2g} s. The largest of noisy samples is too high on "
+                "average, and a wrong gain, a lag or the hold bias the delay. Use "
+                "method='waveform' for an interval"
             ),
             details=details,
         )
@@ -179,10 +181,10 @@ def _overshoot(reading: StepReading) -> tuple[float, float]:
     if value - settled <= max(CLEARANCE * reading.noise, 1e-9):
         beyond = max(0.0, value - settled)
         raise NotIdentifiableError(
-            f"no overshoot: the output exceeds its final value by {100 * beyond:.2g} % of the "
-            f"step, noise alone gives {100 * CLEARANCE * reading.noise:.2g} %. Kp·Td is below or "
-            "near 1/e, where the overshoot does not determine the delay: raise Kp, or use "
-            "method='waveform'"
+            f"there is no overshoot: the output exceeds its final value by {100 * beyond:.2g} "
+            f"% of the step, and noise alone by {100 * CLEARANCE * reading.noise:.2g} %. "
+            "Kp·Td is below or near 1/e, and then the overshoot does not determine the delay. "
+            "Raise Kp, or use method='waveform'"
         )
     return value, reading.noise * math.sqrt(1.0 + 1.0 / reading.start_samples)
 
@@ -205,8 +207,9 @@ def _saturated_delay(
         low *= 0.7
     else:
         raise NotIdentifiableError(
-            f"the loop overshoots by more than {100 * overshoot:.3g} % with no delay at all: the "
-            "hold alone explains it; check the gains and the sample time"
+            "even without a delay the loop would overshoot by more than "
+            f"{100 * overshoot:.3g} %, because of its hold: check the gains and the sample "
+            "time"
         )
     span = float(simulated.recording.time[-1] - reading.step.time)
     while excess(high) < 0.0:

@@ -319,9 +319,9 @@ def identifiability(
     {'delay': 7.2, 'delay+lag': 3.1}
     """
     if not isinstance(loop, ControlLoop):
-        raise TypeError(f"loop is a {type(loop).__name__}, not a ControlLoop")
+        raise TypeError(f"loop is a {type(loop).__name__}: give a ControlLoop")
     if not isinstance(experiment, Experiment):
-        raise TypeError(f"experiment is a {type(experiment).__name__}, not an Experiment")
+        raise TypeError(f"experiment is a {type(experiment).__name__}: give an Experiment")
     if free is None:
         free = ["delay", *(name for name, value in loop.plant.parameters.items() if value)]
     known = tuple(dict.fromkeys([*VEHICLE_PARAMETERS, *loop.plant.parameters]))
@@ -375,8 +375,8 @@ def _checked_start(initial_output: float | None) -> None:
     """Refuse a known output at the start that is not that of an experiment."""
     if initial_output is not None and finite("initial_output", initial_output) != 0.0:
         raise ValueError(
-            f"initial_output={initial_output}: an experiment starts at rest at zero; give 0.0 "
-            "where that is known, None where the start is fitted"
+            f"initial_output={initial_output}: an experiment starts at rest at zero. Give 0.0 "
+            "if the start is known, or None if the start is fitted"
         )
 
 
@@ -399,21 +399,23 @@ def _check_excitation(loop: ControlLoop, recording: Recording, names: tuple[str,
     assert command is not None
     if not command.any():
         raise NotIdentifiableError(
-            "the experiment does not excite the loop: the command is 0 throughout"
+            "the command is 0 throughout, so the experiment does not excite the loop"
         )
     if float(np.ptp(recording.output)) == 0.0:
         raise NotIdentifiableError(
-            f"the output does not move by the end of the experiment, {recording.time[-1]:g} s: "
-            f"make it longer than the delay of {loop.delay:g} s"
+            "the output does not move before the end of the experiment at "
+            f"{recording.time[-1]:g} s: make the experiment longer than the delay of "
+            f"{loop.delay:g} s"
         )
     if loop.is_sampled and float(np.ptp(command)) == 0.0:
         raise NotIdentifiableError(
-            f"the command is {command[0]:g} throughout, at its limit: use a smaller step, or a "
-            "longer experiment"
+            f"the command is at its limit throughout, {command[0]:g}: use a smaller step, or "
+            "a longer experiment"
         )
     slow = [name for name in SLOW if name in names]
     if slow and "delay" in names and loop.parameters[slow[0]] == 0.0:
         raise NotIdentifiableError(
-            f"at {slow[0]}=0 the {slow[0]} has the effect of a delay, so the data cannot "
-            f"distinguish the two: assume a {slow[0]}, such as loop.replace({slow[0]}=0.05)"
+            f"at {slow[0]}=0 the {slow[0]} has the effect of a delay, so the recording cannot "
+            f"separate the two. Assume a {slow[0]} above zero, such as "
+            f"loop.replace({slow[0]}=0.05)"
         )

@@ -106,7 +106,9 @@ class PlannedBound(CramerRaoBound):
         """
         for name in (one, other):
             if name not in self.free:
-                raise ValueError(f"{name!r} is not free; free are {', '.join(self.free)}")
+                raise ValueError(
+                    f"{name!r} is not a free parameter; the free ones are {', '.join(self.free)}"
+                )
         i, j = self.free.index(one), self.free.index(other)
         return float(self.cov[i, j] / np.sqrt(self.cov[i, i] * self.cov[j, j]))
 
@@ -142,8 +144,8 @@ def from_the_command(
     num, den = loop.plant.polynomials()
     if len(num) == len(den):
         raise NotIdentifiableError(
-            f"{loop.plant!r} passes its command straight to its output, which jumps with it: "
-            "there is no derivative with respect to the delay; give the plant a lag"
+            f"{loop.plant!r} has direct feedthrough: its output jumps with its command, so "
+            "there is no derivative with respect to the delay. Give the plant a lag"
         )
     values, command, time = loop.parameters, recording.command, recording.time
     assert command is not None
@@ -272,18 +274,18 @@ def _feedback(loop: ControlLoop, experiment: Experiment, command: Array) -> Arra
     time, controller = experiment.time, loop.controller
     if experiment.relay_amplitude is not None:
         raise NotIdentifiableError(
-            "wind (air) changes the switching times of the relay, which have no derivative: log "
-            "the command"
+            "wind (air) changes the switching times of the relay, and these have no "
+            "derivative with respect to the parameters: log the command"
         )
     if not isinstance(controller, P):
         raise NotIdentifiableError(
-            f"the answer of {controller!r} to the air is not computed: log the command, or "
-            "take a P controller"
+            f"the response of {controller!r} to wind (air) is not computed: log the command, "
+            "or use a P controller"
         )
     if time.size > MOST_ROWS:
         raise NotIdentifiableError(
-            f"{time.size} samples with air in the loop need a matrix of as many rows, beyond "
-            f"{MOST_ROWS}: log the command, or plan a shorter experiment"
+            f"{time.size} samples with wind (air) in the loop need a matrix with as many "
+            f"rows, more than {MOST_ROWS}: log the command, or plan a shorter experiment"
         )
     plant = TransferFunction(*loop.plant.polynomials()) * delay(loop.parameters["delay"])
     pulse = np.zeros(time.size)

@@ -101,8 +101,8 @@ def reasons_against(numbers: BankAnswer, white: float, range_: tuple[float, floa
     found = []
     if abs(numbers.colour) > COLOURED:
         found.append(
-            "the innovations are not white: the noise is not the given one, or the plant model "
-            "is incomplete"
+            "the innovations are not white: the noise differs from the given noise, or the "
+            "plant model is incomplete"
         )
     if numbers.unexplained > UNEXPLAINED:
         found.append("the innovations follow the command: the plant model is incomplete")
@@ -124,9 +124,9 @@ def estimate_of(
     message = "; ".join(f"not reliable: {reason}" for reason in against)
     if not known:
         waits = (
-            "the command has not yet changed enough"
+            "the command has not changed enough yet"
             if numbers.started
-            else "with the longest delay, the first command has not arrived yet"
+            else "at the longest delay, the first command would not have arrived yet"
         )
         message = f"no estimate yet: {waits}" + (f"; {message}" if message else "")
     return OnlineEstimate(

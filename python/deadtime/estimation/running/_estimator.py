@@ -236,9 +236,7 @@ class OnlineEstimator:
             found._settings = found._settings._replace(layers=layers)
         found._settings = found._settings._replace(freedom=_freedom_of(fit))
         if fit.verdict != "reliable":
-            found._doubts = (
-                f"the fit that the estimator began with was not reliable ({fit.message})",
-            )
+            found._doubts = (f"the initial fit of the estimator was not reliable ({fit.message})",)
         found._begin(fitted if noise is None else _flight_noise(noise))
         return found
 
@@ -348,7 +346,8 @@ class OnlineEstimator:
         """Keep a row until the noise is known; then go over all that were kept."""
         if self._rows and time <= self._rows[-1][0]:
             raise ValueError(
-                f"the time {time} s follows {self._rows[-1][0]} s: give increasing times"
+                f"the time {time} s comes after {self._rows[-1][0]} s, but times must "
+                "increase: give increasing times"
             )
         if not self._rows:
             self._next_fit = time + LEARN

@@ -64,7 +64,9 @@ class BankSettings(NamedTuple):
     def under(self, noise: FlightNoise) -> BankSettings:
         """The settings for this noise."""
         if noise.white <= 0.0:
-            raise ValueError(f"noise={noise!r} has no white noise: give its deviation, above zero")
+            raise ValueError(
+                f"noise={noise!r} has no white noise: give a standard deviation above zero"
+            )
         return self._replace(
             white=noise.white,
             trim=OF_TRIM * abs(noise.trim),
@@ -95,8 +97,8 @@ def linear_plant(loop: ControlLoop, names: tuple[str, ...]) -> FlightPlant:
     """The plant as the kernel takes it."""
     if not loop.plant.is_linear:
         raise ValueError(
-            f"the plant {loop.plant!r} is not linear: the filters are for linear plants; give the "
-            "plant behind its limits and the command after them"
+            f"the plant {loop.plant!r} is not linear, but the filters need a linear plant: "
+            "give the plant without its limits, and the command after these limits"
         )
     return plant_model(loop.plant, names)
 
@@ -107,7 +109,7 @@ def lag_sets(model: FlightPlant, lags: Array | None) -> list[list[float]]:
         return [list(model.lags)]
     if not model.lags:
         raise ValueError(
-            "lags= is for a plant with a lag: give Integrator(lag=…), FirstOrder or FactoredPlant"
+            "lags= needs a plant with a lag: give Integrator(lag=…), FirstOrder or FactoredPlant"
         )
     return [[float(lag), *model.lags[1:]] for lag in lags]
 

@@ -79,7 +79,7 @@ class DelayTrack(ReadOnlyArrays):
             If there is none.
         """
         if not estimates:
-            raise ValueError("no estimates: give at least one")
+            raise ValueError("there are no estimates: give one or more")
 
         ends = np.array([one.ci for one in estimates])
         columns: dict[str, Any] = {
@@ -220,8 +220,8 @@ def track_of(
         time, values = part.time, part.command
     else:
         raise RecordingError(
-            "the recording has no command: the delay while a loop runs is that from the command to "
-            "the output"
+            "the recording has no command, but the online estimate is the delay from the "
+            "command to the output: record the command too"
         )
     found, place = [], 0
     for row, output in zip(part.time.tolist(), part.output.tolist(), strict=True):

@@ -189,8 +189,9 @@ class ARDrone2(VehicleLink):
         heard = await link.until(lambda navdata: True, FIRST_NAVDATA)
         if not heard:
             raise LinkError(
-                f"no navdata from {host}, UDP port {link.navdata_port}, within {FIRST_NAVDATA:g} "
-                "s: is the drone on, this computer in its network, and no other client connected?"
+                f"no navdata from {host}, UDP port {link.navdata_port}, within "
+                f"{FIRST_NAVDATA:g} s. Check that the drone is on, this computer is in its "
+                "network, and no other client is connected"
             )
         await self._settings.set(link, self.control_port, self.limits, self.full)
         if not await link.until(lambda navdata: navdata.demo is not None, FIRST_NAVDATA):
@@ -215,7 +216,7 @@ class ARDrone2(VehicleLink):
         if self.limits.max_climb > speed:
             raise LinkError(
                 f"max_climb = {self.limits.max_climb:g} m/s exceeds the drone's largest "
-                f"vertical speed of {speed:g} m/s: give a smaller one"
+                f"vertical speed of {speed:g} m/s: give a smaller max_climb"
             )
         self._link.send(FlatTrim())
         asked = now()
@@ -292,7 +293,7 @@ class ARDrone2(VehicleLink):
         """
         if north or east or turn:
             raise ValueError(
-                "an AR.Drone 2.0 takes speed commands for the climb only: its horizontal "
+                "an AR.Drone 2.0 takes speed commands only for the climb: its horizontal "
                 "commands are angles"
             )
         return Motion(up=self.command(up))

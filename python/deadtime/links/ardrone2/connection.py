@@ -74,8 +74,8 @@ class Connection:
     def forgotten(self) -> str:
         """Message for a drone whose numbers have restarted."""
         return (
-            f"{self.host} restarted its count, so it has dropped this client: land, and connect "
-            "again"
+            f"{self.host} restarted its count of packets, so it has dropped this client: "
+            "land, and connect again"
         )
 
     @property

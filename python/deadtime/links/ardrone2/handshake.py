@@ -60,8 +60,8 @@ class Handshake:
                 await self._clear()
                 return
         raise LinkError(
-            f"{self._name} does not acknowledge {key} = {value}, sent {TRIES} times: is another "
-            "client connected?"
+            f"{self._name} does not acknowledge {key} = {value}, which was sent {TRIES} "
+            "times: check that no other client is connected"
         )
 
     async def _clear(self) -> None:
@@ -94,8 +94,8 @@ class Handshake:
             except (OSError, EOFError, ValueError) as error:  # among them TimeoutError
                 problem = str(error) or f"nothing received for {DUMP:g} s"
         raise LinkError(
-            f"{self._name} does not send its configuration on TCP port {port} ({problem}): without "
-            "reading it back its limits are unknown, so it cannot be flown"
+            f"{self._name} does not send its configuration on TCP port {port} ({problem}). So "
+            "its limits are not known, and it cannot be flown"
         )
 
     async def _dump(self, host: str, port: int) -> bytes:
@@ -120,8 +120,8 @@ def check_configuration(name: str, held: Mapping[str, str], requested: Mapping[s
         if found is None or not _same(found, value):
             shown = "nothing" if found is None else found
             raise LinkError(
-                f"{name} was set to {key} = {value} and reads back {shown}: it cannot be flown "
-                "with limits that it does not keep"
+                f"{name}: {key} was set to {value} but reads back as {shown}. The drone "
+                "cannot be flown, because it does not keep its limits"
             )
 
 

@@ -272,8 +272,8 @@ def unasked_end(navdata: Navdata, left_ground: bool) -> str | None:
     if fault is not None:
         return f"the vehicle lands by itself: {fault}"
     return (
-        "the vehicle lands without a command from here, and reports no fault: most likely "
-        "another client commands this drone"
+        "the vehicle lands without a command from this program, and reports no fault: most "
+        "likely another client commands this drone"
     )
 
 

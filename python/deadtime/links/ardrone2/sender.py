@@ -140,8 +140,8 @@ class CommandSender(ExpiringCommand):
         self._motion = Hover
         if pause > WATCHDOG:
             self.give_up(
-                f"this program was paused for {pause:.2f} s, in which the vehicle's own watchdog "
-                f"lands it ({WATCHDOG:g} s): the vehicle was commanded to land"
+                f"this program was paused for {pause:.2f} s. In such a pause the vehicle's "
+                f"own watchdog lands it ({WATCHDOG:g} s). The vehicle was commanded to land"
             )
         else:
             self._uncertain = self.in_air
@@ -180,6 +180,6 @@ class CommandSender(ExpiringCommand):
             self._echo = number
         elif self._echo:
             self.rival = (
-                f"another client commands this drone: it has executed REF number {number}, which"
-                " was not sent from here. End the other client, and connect again"
+                f"another client commands this drone: it has executed REF number {number}, "
+                "which this program did not send. End the other client, and connect again"
             )

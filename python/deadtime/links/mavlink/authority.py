@@ -67,8 +67,8 @@ class Authority:
         """Raise for a vehicle that is armed, but not by this link."""
         if reader.armed and not self.armed_here:
             raise LinkError(
-                f"{self._name}: the vehicle is armed already, and not by this link: somebody else "
-                "flies it"
+                f"{self._name}: the vehicle is armed already, but not by this link, so "
+                "somebody else is flying it"
             )
 
     def fly(self, *modes: int) -> None:
@@ -111,8 +111,8 @@ class Authority:
     def _was_disarmed(self, link: Connection, time: float) -> str:
         return (
             f"{self._name}: the vehicle was disarmed, but not by this "
-            f"link{link.said(time - REASON)}. This link does not arm it again. Connect again when "
-            "the person who disarmed it agrees"
+            f"link{link.said(time - REASON)}. This link does not arm it again. Connect again "
+            "when the person who disarmed the vehicle agrees"
         )
 
     def _was_taken(self, mode: int, pilot: Autopilot, link: Connection, time: float) -> str:

@@ -193,8 +193,9 @@ class ArduPilot(Autopilot):
             raise LinkError("the vehicle does not answer for its SYSID_MYGCS")
         if station != system:
             raise LinkError(
-                f"the vehicle watches the heartbeats of system {station:g} (SYSID_MYGCS), and "
-                f"this end is system {system}: connect as that, or change the parameter"
+                f"the vehicle expects heartbeats of system {station:g} (SYSID_MYGCS), but "
+                f"this program is system {system}: connect as that system, or change the "
+                "parameter"
             )
         kinds, fenced = await parameters.read("FENCE_TYPE"), await parameters.read("FENCE_ENABLE")
         if kinds is None or fenced is None:
@@ -321,14 +322,16 @@ def autopilot_of(heartbeat: Any) -> Autopilot:
     d = dialect()
     if heartbeat.type not in COPTERS:
         raise LinkError(
-            f"the vehicle is of type {heartbeat.type}: only multicopters are flown (MAV_TYPE)"
+            f"the vehicle is of type {heartbeat.type} (MAV_TYPE), but only multicopters can "
+            "be flown"
         )
     if heartbeat.autopilot == d.MAV_AUTOPILOT_ARDUPILOTMEGA:
         return ArduPilot()
     if heartbeat.autopilot == d.MAV_AUTOPILOT_PX4:
         return PX4()
     raise LinkError(
-        f"the autopilot is number {heartbeat.autopilot}: only ArduPilot (3) and PX4 (12) are flown"
+        f"the autopilot is number {heartbeat.autopilot}, but only ArduPilot (3) and PX4 (12) "
+        "can be flown"
     )
 
 

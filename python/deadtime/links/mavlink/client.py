@@ -109,8 +109,8 @@ commanding it
         self.take_off_height = positive("take_off_height", take_off_height)
         if not self.limits.min_height < take_off_height < self.limits.max_height:
             raise ValueError(
-                f"take_off_height={take_off_height:g} is outside {self.limits.min_height:g} to "
-                f"{self.limits.max_height:g} m"
+                f"take_off_height={take_off_height:g} is not between "
+                f"{self.limits.min_height:g} and {self.limits.max_height:g} m"
             )
         for name, number in {"system": system, "component": component, "vehicle": vehicle}.items():
             if number is not None and not 1 <= number <= 255:
@@ -234,8 +234,9 @@ commanding it
             )
         if strangers := link.carriers.other_vehicles:
             raise LinkError(
-                f"another vehicle answers over {strangers[0].address} than over "
-                f"{link.carriers.current.address}: their clocks differ; give links to one vehicle"
+                f"the vehicle that answers over {strangers[0].address} is not the one that "
+                f"answers over {link.carriers.current.address}, because their clocks differ: "
+                "give links to one vehicle"
             )
         self._authority.refuse_armed(self._reader)
         vehicle = VehicleId(pilot.name, link.target[0], await link.board())
@@ -243,9 +244,9 @@ commanding it
         self._parameters = Parameters(link, pilot.integers_as_bits, changed)
         if self._simulated and not await self._is_simulator(pilot):
             raise LinkError(
-                f"what answers at {self.address} does not identify itself as a simulator: a "
-                "router there may lead to a real vehicle. If nobody and nothing can be hurt by "
-                "its flight, take simulated=False, or --i-have-a-safe-area on the command line"
+                f"the vehicle at {self.address} does not identify itself as a simulator, and "
+                "a router may lead to a real vehicle. If its flight cannot hurt or damage "
+                "anything, give simulated=False, or --i-have-a-safe-area on the command line"
             )
         await ask_over_all(link, pilot)
         await link.until(lambda: self._reader.landed_state != UNKNOWN, SHOWN)

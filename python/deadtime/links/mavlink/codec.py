@@ -86,8 +86,8 @@ class Codec:
         messages = dialect()
         if messages.MAVLINK_IGNORE_CRC:
             raise LinkError(
-                f"MAV_IGNORE_CRC={os.environ.get('MAV_IGNORE_CRC')} lets pymavlink accept damaged "
-                "frames: unset it"
+                f"MAV_IGNORE_CRC={os.environ.get('MAV_IGNORE_CRC')} makes pymavlink accept "
+                "damaged frames: unset this variable"
             )
         if key is not None and len(key) != KEY:
             raise ValueError(f"a signing key of {len(key)} bytes: give {KEY}")

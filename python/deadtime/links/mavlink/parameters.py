@@ -145,7 +145,7 @@ class Parameters:
                 break
             if same(held, value):
                 return
-        raise LinkError(f"{link.address}: the vehicle does not keep {name} = {value:g}")
+        raise LinkError(f"{link.address}: the vehicle does not keep the value {name} = {value:g}")
 
     def contradicts(self, message: Any) -> bool:
         """Whether a message says another value of a parameter than was set."""

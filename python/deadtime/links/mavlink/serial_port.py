@@ -53,8 +53,8 @@ class SerialPort:
         except (AttributeError, NotImplementedError, OSError) as error:
             self._port.close()
             raise LinkError(
-                f"{device}: the event loop of this system cannot wait for a serial port: let a "
-                "router pass the port on to UDP"
+                f"{device}: the event loop of this system cannot wait for a serial port: let "
+                "a router forward the port to UDP"
             ) from error
 
     def _read(self) -> None:

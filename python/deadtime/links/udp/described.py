@@ -104,7 +104,7 @@ def policy_of(name: PolicyName = "newest", number: float | None = None) -> Polic
         raise ValueError(f"the policy {name!r} is none of {', '.join(POLICIES)}")
     if name == "newest":
         if number is not None:
-            raise ValueError(f"the policy 'newest' takes no number: leave {number:g} out")
+            raise ValueError(f"the policy 'newest' takes no parameter: leave {number:g} out")
         return NewestWins()
     if number is None:
         what = "a number of samples" if name == "hold" else "a time in s"

@@ -94,7 +94,9 @@ async def resolved(address: Address) -> Address:
     """
     host, port = address
     if port == 0:
-        raise LinkError(f"port 0 of {host} cannot receive: give the port it listens on")
+        raise LinkError(
+            f"port 0 of {host} cannot receive: give the port on which the other end listens"
+        )
     try:
         ipaddress.ip_address(host)
     except ValueError:

@@ -65,7 +65,8 @@ class Bursts:
         begin = end * loss / (1.0 - loss)
         if begin > 1.0:
             raise ValueError(
-                f"bursts of {length:g} packets cannot lose {loss:g} of all: make them longer"
+                f"bursts of {length:g} packets cannot lose {loss:g} of all packets: make the "
+                "bursts longer"
             )
         return Bursts(begin, end)
 
@@ -116,7 +117,7 @@ class Network:
         for start, stop in self.blackouts:
             if not finite("blackout", start) < finite("blackout", stop):
                 raise ValueError(
-                    f"the blackout ({start}, {stop}) s is empty: give the start before the end"
+                    f"the blackout ({start}, {stop}) s is empty: give a start before its end"
                 )
 
     def path(self, seed: int | str) -> Path:

@@ -77,11 +77,11 @@ class PlantOptions:
         non_negative("rest", self.rest)
         finite("amplitude", self.amplitude)
         if abs(finite("safe", self.safe)) > self.limit:
-            raise ValueError(f"safe={self.safe} is beyond limit={self.limit}: give a smaller one")
+            raise ValueError(f"safe={self.safe} is beyond limit={self.limit}: give a smaller safe")
         if self.doubles is not None and self.policy.needs_times:
             raise ValueError(
-                f"{self.policy} needs time stamps, which plain doubles do not have: use NewestWins "
-                "or HoldThenZero"
+                f"{self.policy} needs time stamps, but plain doubles have none: use "
+                "NewestWins or HoldThenZero"
             )
 
 

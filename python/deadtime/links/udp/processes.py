@@ -55,7 +55,7 @@ class Part:
         lines = out.splitlines()
         if self.process.returncode != 0 or not lines:
             raise LinkError(
-                f"the {self.name} ended before its time (exit code {self.process.returncode}): "
+                f"the {self.name} ended too early (exit code {self.process.returncode}): "
                 f"{_last_line(errors)}"
             )
         found: dict[str, Any] = json.loads(lines[-1])["report"]

@@ -227,7 +227,9 @@ def _stamps(
     """Which times are used, and why."""
     without = sorted({places[signal][0] for signal, one in rows.items() if not one.has_stamps})
     if without and asked == "header":
-        raise RecordingError(f"{', '.join(without)} has no time in its headers: use the received")
+        raise RecordingError(
+            f"the headers of {', '.join(without)} contain no time: use stamps='received'"
+        )
     if asked is not None:
         return asked, f"by the times {_of(asked)}, as asked for"
     if without:

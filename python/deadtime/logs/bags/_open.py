@@ -89,5 +89,7 @@ def open_bag(path: str | os.PathLike[str]) -> Bag:
         head = stream.read(HEAD)
     form = format_of(path, head, "open_bag")
     if form is None:
-        raise RecordingError(f"{path} is no bag: MCAP files and bags of ROS 1 and ROS 2 are read")
+        raise RecordingError(
+            f"{path} is not a bag: MCAP files and bags of ROS 1 and ROS 2 can be read"
+        )
     return read_mcap(path) if form == "MCAP" else read_ros(path, form)

@@ -59,7 +59,9 @@ def read_ros(path: str | os.PathLike[str], form: str) -> Bag:
     """The topics of a ROS bag: a file, or the folder of one of ROS 2."""
     file = _RosBag(Path(path))
     if not file.path.is_dir() and file.path.suffix != ENDINGS[form]:
-        raise RecordingError(f"{path} is a {form}: let its name end in {ENDINGS[form]}")
+        raise RecordingError(
+            f"{path} is a {form}: rename the file so that its name ends in {ENDINGS[form]}"
+        )
     index = Index()
     index.fill(file.messages(), lambda topic: file.types[topic])
     remarks = index.remarks()

@@ -106,7 +106,9 @@ def _flown(loop: LogLoop, facts: Facts) -> str:
     """How to fly the loop that is known worst."""
     promise = facts.promises[loop.name]
     if not math.isfinite(promise.stderr):
-        return f"{loop.name}: move its setpoint; in this log the response hardly follows any of it"
+        return (
+            f"{loop.name}: move its setpoint; in this log the response follows almost no part of it"
+        )
     more = max(promise.changes, 1.0) * (share_of(promise) / WANTED) ** 2
     count = int(min(max(math.ceil(more), FEWEST), MOST))
     held = shown(HELD * promise.time, promise.time, "s")

@@ -96,7 +96,9 @@ class Latency(ReadOnlyArrays, Pictured):
             if one.loop == name and one.command == command:
                 return one
         has = ", ".join(f"{one.loop!r} from {one.command}" for one in self.loops) or "none"
-        raise ValueError(f"no time of {name!r} from its {command}: there are {has}")
+        raise ValueError(
+            f"{name!r} has no time from its {command} to its response: there are times for {has}"
+        )
 
     @property
     def estimated(self) -> tuple[LoopLatency, ...]:
@@ -363,7 +365,9 @@ def loops_asked_for(
     """The loops whose times `latency` estimates, and from what, in its order."""
     if isinstance(log, Recording):
         if axes is not None or loops is not None:
-            raise ValueError(f"{log.source or 'the recording'} has one loop: name no axis or loop")
+            raise ValueError(
+                f"{log.source or 'the recording'} has only one loop: give no axis and no loop"
+            )
         return [(_name_of(log), "setpoint" if log.command is None else "actuator")]
     return [(loop.name, one) for loop in _chosen(log, axes, loops) for one in _commands(loop)]
 
@@ -375,7 +379,8 @@ def _reported(
     if not isinstance(progress, bool):
         if not callable(progress):
             raise TypeError(
-                f"progress={progress!r}: give True to print each time, or a function of it"
+                f"progress={progress!r}: give True to print each time, or a function that "
+                "takes the time"
             )
         return progress
     if not progress:

@@ -255,11 +255,11 @@ def _by_correlation(grid: Grid, longest: float) -> PlainTime:
         return none("setpoint or response does not move for long enough")
     if height < ABOVE / math.sqrt(rows):
         return none(
-            f"a coefficient of {height:.2f} may be chance: both move so slowly that the record "
-            f"equals {rows:.0f} independent rows"
+            f"a correlation of {height:.2f} may be chance: setpoint and response move so "
+            f"slowly that the rows equal only {rows:.0f} independent ones"
         )
     if math.isnan(value):
-        return none("the correlation is largest at the end of the times that are looked for")
+        return none("the correlation is largest at the end of the times that are searched")
     parts = np.array([peak_of(found.lags, one)[0] for one in found.without])
     return _with_interval(name, meaning, value, parts, height, blocks, longest)
 

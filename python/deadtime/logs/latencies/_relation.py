@@ -307,7 +307,7 @@ def _why_doubtful(found: LoopLatency) -> str:
     needed = MANY if _is_coloured(fit) else FEW
     if len(found.times) < needed:
         return (
-            f"too few windows determine the time by themselves, {len(found.times)} where {needed} "
+            f"too few windows determine the time by themselves: {len(found.times)}, but {needed} "
             "are needed"
         )
     return "" if fit.verdict == "reliable" or fit._code in (*OF_THE_GAIN, NOT_WHITE) else fit.reason

@@ -23,8 +23,8 @@ def check_numbers(path: object, size: int, count: int) -> None:
     """Refuse a file that says it holds more numbers than its size allows."""
     if 8 * count > largest(size):
         raise RecordingError(
-            f"{path} has {size} bytes and says it holds {count} numbers: it is damaged, or packed "
-            "more than a hundredfold"
+            f"{path} has {size} bytes but claims to hold {count} numbers: it is damaged, or "
+            "compressed more than a hundredfold"
         )
 
 

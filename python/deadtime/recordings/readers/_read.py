@@ -126,7 +126,9 @@ def read_recording(
     else:
         label, own = LABEL, ""
         if delimiter is not None:
-            raise ValueError(f"delimiter={delimiter!r}: a table in memory has none; leave it out")
+            raise ValueError(
+                f"delimiter={delimiter!r}: a table in memory has no delimiter; leave delimiter out"
+            )
         table = table_in_memory(source)
         columns = _in_seconds(read_table, table, choose(LABEL, table.names), ends)
     _refuse_other_units(label, columns["time"])
@@ -172,7 +174,7 @@ def _refuse_other_units(label: str, time: NDArray[np.float64]) -> None:
     first = float(np.ma.getdata(time)[0]) if time.size else 0.0
     if first > LATEST:
         raise RecordingError(
-            f"{label}: the time begins at {first:.6g}, which is no time in seconds since 1970. "
+            f"{label}: the time begins at {first:.6g}, which cannot be seconds since 1970. "
             "Divide milliseconds by 1000, microseconds by a million"
         )
 
@@ -189,7 +191,10 @@ def _from_file(
             text = as_text(path, whole(stream, head), named, delimiter)
             return _in_seconds(read_csv, text, choose(path, text.header), ends)
     if delimiter is not None:
-        raise ValueError(f"delimiter={delimiter!r}: {path} is a file of {kind}, which has none")
+        raise ValueError(
+            f"delimiter={delimiter!r}: {path} is a file of {kind}, which has no delimiter; "
+            "leave delimiter out"
+        )
     table = _table(path, kind, named)
     names = choose(path, table.names)
     if not named.issuperset(names.values()):

@@ -34,8 +34,8 @@ def table_in_memory(source: Any) -> Table:
         with errors_of(LABEL, "an Arrow stream"):
             return frame(LABEL, pyarrow.table(source))
     raise TypeError(
-        f"a {type(source).__name__} is no table: give a path, a DataFrame, a dict of arrays, a "
-        "structured array or an xarray.Dataset"
+        f"a {type(source).__name__} is not a table: give a path, a DataFrame, a dict of "
+        "arrays, a structured array or an xarray.Dataset"
     )
 
 

@@ -95,8 +95,8 @@ def as_text(path: object, raw: bytes, wanted: Collection[str], delimiter: str | 
 def not_text(path: object) -> RecordingError:
     """What is wrong with a file of no known format."""
     return RecordingError(
-        f"{path} is not a text file, and of no other format that is read: give a CSV, Parquet, "
-        "Arrow or MAT file"
+        f"{path} is neither a text file nor of another format that can be read: give a CSV, "
+        "Parquet, Arrow or MAT file"
     )
 
 
@@ -105,7 +105,9 @@ def _decodable(path: object, raw: bytes) -> tuple[bytes, str]:
     if raw.startswith(b"\x1f\x8b"):
         raw = _unpacked(path, raw)
         if format_of(path, raw[:HEAD], "read_recording") not in (None, "text"):
-            raise RecordingError(f"{path} is packed by gzip and holds no text: unpack it")
+            raise RecordingError(
+                f"{path} is compressed by gzip but contains no text: unpack the file"
+            )
     encoding = "utf-8"
     if raw.startswith(UTF_16):
         try:
@@ -131,11 +133,11 @@ def _unpacked(path: object, raw: bytes) -> bytes:
         with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
             text = stream.read(limit + 1)
     except (OSError, EOFError, zlib.error) as error:
-        raise RecordingError(f"{path} cannot be unpacked, it is damaged: {error}") from None
+        raise RecordingError(f"{path} is damaged and cannot be unpacked: {error}") from None
     if len(text) > limit:
         raise RecordingError(
-            f"{path} has {len(raw)} bytes and unpacks to more than {limit}: unpack it yourself if "
-            "that is right"
+            f"{path} has {len(raw)} bytes, but would have more than {limit} when unpacked: if "
+            "this is right, unpack the file yourself"
         )
     return text
 

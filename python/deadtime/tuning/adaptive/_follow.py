@@ -88,7 +88,9 @@ class GainFollower:
         1
         """
         if not (math.isfinite(time) and time >= self._time):
-            raise ValueError(f"time={time} s after {self._time} s: give times that do not run back")
+            raise ValueError(
+                f"time={time} s comes after {self._time} s: give times that do not decrease"
+            )
         self._time = time
         if not (informed and math.isfinite(low) and math.isfinite(high) and low <= high):
             return self._take(len(self.delays) - 1, covered=False)

@@ -36,7 +36,10 @@ def loop_and_gain(
 
 def sample_time_of(loop: ControlLoop) -> float:
     if loop.sample_time is None:
-        raise ValueError("sample_time=None: the proof is for a controller that runs on samples")
+        raise ValueError(
+            "sample_time=None: the proof needs a controller that runs on samples; give a "
+            "sample_time"
+        )
     if loop.delay_path != "command":
         raise ValueError(
             f"delay_path={loop.delay_path!r}: the proof is for a changing delay of the command; "
@@ -50,19 +53,19 @@ def claimed(loop: ControlLoop, gain: tuple[float, float], decay: float) -> Claim
     controller, plant = loop.controller, loop.plant
     if not isinstance(controller, (P, PV)):
         raise ValueError(
-            f"{type(controller).__name__}: gains that follow the delay are for P and PV, which keep"
-            " nothing from before a change of gains"
+            f"{type(controller).__name__}: only the gains of P and PV can follow the delay, "
+            "because these controllers keep no state from before a change of gains"
         )
     if not plant.is_linear or not plant.is_rational:
-        raise ValueError(f"{type(plant).__name__}: the proof is for a plant with rational G(s)")
+        raise ValueError(f"{type(plant).__name__}: the proof needs a plant with a rational G(s)")
     num, den = plant._polynomials({**plant.parameters, "gain": 1.0})
     while den[0] == 0.0:
         den = den[1:]
     num = list(np.trim_zeros(num, "f"))
     if len(den) not in (2, 3) or den[-1] != 0.0 or den[-2] == 0.0 or len(num) >= len(den):
         raise ValueError(
-            f"{plant!r}: the proof is for an integrator with at most one lag and a zero; put the "
-            "sum of several lags into one"
+            f"{plant!r}: the proof is for an integrator with at most one lag and a zero; "
+            "replace several lags by one lag that is their sum"
         )
     Kp, Kv = controller.gains["Kp"], controller.gains.get("Kv", 0.0)
     smooth = getattr(controller, "filter", None)

@@ -247,10 +247,12 @@ def adaptive_gains(
     """
     count = whole_number("sets", sets, least=1)
     if count > MOST_SETS:
-        raise ValueError(f"sets={count}: give at most {MOST_SETS}, a few reach nearly as much")
+        raise ValueError(
+            f"sets={count}: give at most {MOST_SETS}, since a few sets are nearly as good"
+        )
     low, high = interval("delays", delays)
     if low < 0.0:
-        raise ValueError(f"delays={delays!r}: a delay is zero or more")
+        raise ValueError(f"delays={delays!r}: a delay must be zero or more")
     report = stage_report(progress)
     held, plant_gain = loop_and_gain(loop, gain, level)
     period = sample_time_of(held)
@@ -259,9 +261,9 @@ def adaptive_gains(
     states = len(claims.den) - 1 + (2 if claims.filter else 0) + last
     if states > MOST_STATES:
         raise ValueError(
-            f"delays={delays!r} s are up to {last} samples of {period:g} s: a form of {states} "
-            f"states would take too long, {MOST_STATES} are possible; take a longer sample time or "
-            "a shorter range"
+            f"delays={delays!r} s are up to {last} samples of {period:g} s, so the form would "
+            f"have {states} states, but at most {MOST_STATES} are possible. Take a longer "
+            "sample time or a shorter range"
         )
     if not isinstance(loop, Design):
         report("designing the robust gains")

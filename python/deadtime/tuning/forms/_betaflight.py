@@ -146,7 +146,7 @@ def read(given: Mapping[str, float] | str, loop: str) -> Controller:
     else:
         told = _of_head({name: str(value) for name, value in given.items()}, axis)
     if f"p_{axis}" not in told:
-        raise ValueError(f"p_{axis} is missing: there are {', '.join(told) or 'none'}")
+        raise ValueError(f"p_{axis} is missing; the text has {', '.join(told) or 'none'}")
     proportional, integral, derivative = (
         _told(told, f"{letter}_{axis}") * scale
         for letter, scale in zip("pid", scales(loop), strict=True)

@@ -168,8 +168,8 @@ class SeriesForm(_Times):
             return cls(ideal.Kc, ideal.Ti, ideal.Td)
         if ideal.Ti * ideal.Td < 0.0 or ideal.Ti < 4.0 * ideal.Td * (1.0 - 1e-12):
             raise ValueError(
-                f"Ti = {ideal.Ti:.4g} s and Td = {ideal.Td:.4g} s: the series form has real zeros "
-                "only, which takes Ti >= 4 Td; take ideal or parallel"
+                f"Ti = {ideal.Ti:.4g} s and Td = {ideal.Td:.4g} s: the series form has only "
+                "real zeros, which need Ti >= 4 Td; use ideal or parallel"
             )
         root = math.sqrt(max(1.0 - 4.0 * ideal.Td / ideal.Ti, 0.0))
         # The smaller root by the product of both, which does not cancel.
@@ -284,8 +284,8 @@ def write(controller: Controller, form: str, spans: tuple[float, float] | None) 
         corner = pole_of(smooth)
         if corner is None:
             raise ValueError(
-                f"{smooth}: the filter of a process controller has one pole, this one has two: "
-                "take one_pole_filter(corner)"
+                f"{smooth}: the filter of a process controller has one pole, but this one has "
+                "two: use one_pole_filter(corner)"
             )
         values[FILTER] = _typed(0.5 / (math.pi * corner))
         lines.append(f"{FILTER} = {values[FILTER]:.{DIGITS}g} s")
@@ -315,7 +315,9 @@ def read(given: Mapping[str, float] | str, form: str, on_measurement: bool = Fal
     names = kind.__dataclass_fields__
     unknown = [name for name in values if name not in (*names, *WEIGHTS.values(), FILTER, "PB")]
     if unknown:
-        raise ValueError(f"{unknown[0]!r} is no number of the form {form!r}: {', '.join(names)}")
+        raise ValueError(
+            f"{unknown[0]!r} is not a parameter of the form {form!r}: {', '.join(names)}"
+        )
     own = {name: value for name, value in values.items() if name in names}
     if next(iter(names)) not in own:
         raise ValueError(f"{next(iter(names))} is missing from {own}")
@@ -350,7 +352,7 @@ def _numbers(text: str, form: str) -> dict[str, float]:
         if (unit == "%") != (name == "PB") and unit:
             raise ValueError(f"{name} = {told}: {name} is not in {unit}")
     if not found:
-        raise ValueError(f"no line of the text is one of the form {form!r}: {text[:60]!r}")
+        raise ValueError(f"no line of the text belongs to the form {form!r}: {text[:60]!r}")
     return found
 
 

@@ -69,7 +69,10 @@ def settings_of(
     if form in _classical.FORMS:
         return _classical.write(controller, form, spans)
     if spans is not None:
-        raise ValueError(f"spans={spans}: a proportional band is for ideal, series and parallel")
+        raise ValueError(
+            f"spans={spans}: only the forms ideal, series and parallel have a proportional "
+            "band; leave spans out"
+        )
     if form == "betaflight":
         return _betaflight.write(controller, loop, _numbers(version))
     where = _FIRMWARES[form]

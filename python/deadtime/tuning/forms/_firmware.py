@@ -166,8 +166,8 @@ def _corner(smooth: DerivativeFilter, form: str) -> float:
     corner = pole_of(smooth)
     if corner is None:
         raise ValueError(
-            f"{smooth}: the derivative's filter of {form} has one pole, this one has two: take "
-            "one_pole_filter(corner)"
+            f"{smooth}: the derivative's filter of {form} has one pole, but this one has two: "
+            "use one_pole_filter(corner)"
         )
     return corner
 
@@ -176,7 +176,7 @@ def controller_of(values: Mapping[str, float], found: FirmwareLoop) -> Controlle
     """The controller that the values of these parameters make."""
     if found.proportional not in values:
         names = ", ".join(values) or "none"
-        raise ValueError(f"{found.proportional} is missing: there are {names}")
+        raise ValueError(f"{found.proportional} is missing; the text has {names}")
     told = {part: values[name] for part, name in found.names.items() if name in values}
     for part, value in told.items():
         if not math.isfinite(value):

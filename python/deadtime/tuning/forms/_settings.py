@@ -125,7 +125,9 @@ def refuse_feed_forward(controller: Controller, form: str) -> None:
     """Refuse a gain of the set point past the controller, which is not written."""
     gain = controller.parameters.get("feed_forward", 0.0)
     if gain:
-        raise ValueError(f"feed_forward={gain:g}: {form} is written without one, so leave it out")
+        raise ValueError(
+            f"feed_forward={gain:g}: {form} is written without feed-forward, so leave it out"
+        )
 
 
 def one_pole_filter(corner: float) -> DerivativeFilter:

@@ -131,8 +131,8 @@ def _one_step(wanted: Controller, flown: Controller | None) -> tuple[Controller,
         if old := flown.gains.get(name, 0.0):
             if old * gain < 0.0:
                 raise ValueError(
-                    f"{name} = {old:g} was in use, and this plant needs {gain:.3g}, of the other "
-                    "sign: check the signs of command and measurement"
+                    f"{name} = {old:g} was in use, but this plant needs {gain:.3g}, of the "
+                    "other sign: check the signs of command and measurement"
                 )
             low, high = sorted((old / LARGEST_CHANGE, old * LARGEST_CHANGE))
             gains[name] = min(max(gain, low), high)

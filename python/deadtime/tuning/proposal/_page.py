@@ -13,8 +13,8 @@ from deadtime.tuning._rules import RuleFigures, RuleTable
 from deadtime.tuning.forms import Settings
 
 CAPTION = (
-    "Predicted under the gains above. The band holds all plants that the recording leaves "
-    "possible, and twice the noise that the plant leaves unexplained on either side."
+    "Predicted under the gains above. The band contains all plants that agree with the "
+    "recording, and on either side twice the standard deviation of the residuals."
 )
 
 #: Heads of the table of rules.

@@ -123,8 +123,8 @@ class EmulatorOptions:
                 raise ValueError(f"clients: {client!r} is not an IP address") from None
         if not self.only_here and not self.clients:
             raise ValueError(
-                f"host={self.host!r} can be reached by others: name the clients that it answers, "
-                "by their IP addresses"
+                f"host={self.host!r} can be reached by other computers: give the IP addresses "
+                "of the clients that the emulator answers"
             )
 
     @property
