@@ -59,7 +59,7 @@ def test_a_log_gives_the_parameters_of_its_firmware(folder):
 REFUSED = [
     (["bare.bin", "--loop", "roll rate"], "by controller=, on the command line --controller"),
     (["flown.bin", "--loop", "altitude"], "has no loop 'altitude'"),
-    (["flown.bin", "--kp", 1], "--kp is needed for a table only"),
+    (["flown.bin", "--kp", 1], "--kp is only for tables"),
     (
         ["bump.csv", "--form", "ardupilot"],
         "--loop is missing: the loops of ardupilot are roll rate",

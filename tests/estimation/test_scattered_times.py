@@ -104,7 +104,7 @@ def test_commands_that_arrive_at_scattered_times_are_reported():
         recorded(EVEN, late=0.06, noise=0.0005, seed=3), LOOP, free=("delay", "gain")
     )
     assert fit.details["scatter_of_commands"] == pytest.approx(0.06 / np.sqrt(12.0), rel=0.6)
-    assert "times of the commands have a standard deviation" in fit.message
+    assert "time stamps of the commands have random errors" in fit.message
     low, high = fit.ci(0.95)
     assert low <= DELAY + 0.03 <= high
 

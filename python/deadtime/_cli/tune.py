@@ -226,8 +226,7 @@ def _refuse(given: Given) -> None:
     for name, value in given.items():
         if value not in (None, "", False):
             raise ValueError(
-                f"--{name} is needed for a table only, because the log of a vehicle already "
-                f"contains this: leave --{name} out"
+                f"--{name} is only for tables, not for the log of a vehicle: leave --{name} out"
             )
 
 

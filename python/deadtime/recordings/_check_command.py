@@ -280,8 +280,8 @@ def _other_law(line: Line | None, loop: ControlLoop) -> Finding:
         return Finding(
             "command_offset",
             "warning",
-            f"the command is Kp (reference - output) {line.offset:+.3g}: something else is added "
-            "to it, or the controller had another reference",
+            f"the command is Kp (reference - output) {line.offset:+.3g}: a constant was added, "
+            "such as a trim, or the controller had another reference",
             loose,
             math.inf,
         )

@@ -163,8 +163,8 @@ def _message(
         text += f"; {left_out} rows left out as outliers"
     for what, size in scatter.items():
         text += (
-            f"; the times of the {what.removeprefix('scatter_of_')} have a standard deviation "
-            f"of {size:.2g} s"
+            f"; the time stamps of the {what.removeprefix('scatter_of_')} have random errors with "
+            f"a standard deviation of {size:.2g} s"
         )
     if held:
         text += f"; the {' and '.join(held)} was estimated as zero, its bound"

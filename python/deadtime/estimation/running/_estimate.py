@@ -126,7 +126,7 @@ def estimate_of(
         waits = (
             "the command has not changed enough yet"
             if numbers.started
-            else "at the longest delay, the first command would not have arrived yet"
+            else "with the longest possible delay the first command has not reached the plant yet"
         )
         message = f"no estimate yet: {waits}" + (f"; {message}" if message else "")
     return OnlineEstimate(

@@ -63,9 +63,15 @@ def _check_numbers(claims: Claims) -> None:
     """Refuse numbers that no proof has."""
     low, high = claims.gain
     if not (low <= high and low * high > 0.0):
-        _fail(f"the gain of the plant is from {low:g} to {high:g}")
+        _fail(
+            f"the gain of the plant is from {low:g} to {high:g}, but this range must ascend and "
+            "must not contain zero"
+        )
     if not (claims.sample_time > 0.0 and claims.Kp != 0.0):
-        _fail(f"the sample time is {claims.sample_time:g} s and Kp {claims.Kp:g}")
+        _fail(
+            f"the sample time is {claims.sample_time:g} s and Kp {claims.Kp:g}: the sample time "
+            "must be above zero, and Kp must not be zero"
+        )
     if not claims.factors or len(claims.factors) != len(claims.ages):
         _fail(f"{len(claims.factors)} factors have {len(claims.ages)} ranges of ages")
     if not 0.0 < claims.least_factor <= min(claims.factors):

@@ -53,8 +53,8 @@ def claimed(loop: ControlLoop, gain: tuple[float, float], decay: float) -> Claim
     controller, plant = loop.controller, loop.plant
     if not isinstance(controller, (P, PV)):
         raise ValueError(
-            f"{type(controller).__name__}: only the gains of P and PV can follow the delay, "
-            "because these controllers keep no state from before a change of gains"
+            f"{type(controller).__name__}: gains can follow the delay only in P and PV, "
+            "because these controllers have no internal state that depends on earlier gains"
         )
     if not plant.is_linear or not plant.is_rational:
         raise ValueError(f"{type(plant).__name__}: the proof needs a plant with a rational G(s)")
