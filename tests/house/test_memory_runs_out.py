@@ -104,7 +104,7 @@ def limited(call, room, starts):
     try:
         eval(call)
         said = "it had enough"
-    except (MemoryError, ImportError) as error:  # of a library that Python has no room for
+    except (MemoryError, ImportError, SystemError) as error:  # the last two: of an import
         said = str(error)
     if room < 48:
         # Python keeps what the call has used, and then there is too little for another one.
