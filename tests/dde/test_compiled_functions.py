@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
-EXPECTED = r"it must be void \(double, double \*, double \*, double \*, double \*, void \*\)"
+EXPECTED = r"must have void \(double, double \*, double \*, double \*, double \*, void \*\)"
 
 
 def solve(fun, **options):

@@ -372,7 +372,7 @@ def test_a_method_name_means_the_method_with_default_options():
         (Grid, {"delays": [0.2, 0.1, 0.3]}, "delays"),
         (CTA, {"intervals": 25}, "intervals=25"),
         (Decay, {"tail": 1.0}, "below 1"),
-        (Graphical, {"shares": (0.3, 0.1)}, "increase"),
+        (Graphical, {"shares": (0.3, 0.1)}, "increasing"),
         (Relay, {"amplitude": 0.0}, "amplitude=0.0"),
         (GCC, {"weighting": "roth"}, "'prewhitened'"),
         (ARXScan, {"na": -1}, "na=-1"),

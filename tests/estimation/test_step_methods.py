@@ -207,7 +207,7 @@ def test_graphical_options_are_checked():
     recording, known = record_step()
     with pytest.raises(ValueError, match="not one of"):
         dtm.estimate_delay(recording, known, method=Graphical(construction="ruler"))
-    with pytest.raises(ValueError, match="increase"):
+    with pytest.raises(ValueError, match="increasing"):
         dtm.estimate_delay(
             recording, known, method=Graphical(construction="two_point", shares=(0.3, 0.1))
         )

@@ -194,7 +194,7 @@ def test_a_missing_row_that_hides_a_step_is_refused(column, rows):
     # The step would appear a row later, and the delay a row shorter.
     columns = [ROWS, STEP, OUTPUT]
     columns[column] = masked(columns[column], *rows)
-    with pytest.raises(dtm.RecordingError, match="the reference changes there"):
+    with pytest.raises(dtm.RecordingError, match="the reference changes in this gap"):
         dtm.Recording(*columns).complete()
 
 

@@ -430,7 +430,7 @@ def test_connecting_fails_unless_the_limits_are_read_back(key, monkeypatch):
     async def fly():
         async with emulator() as emulated:
             drone = client_of(emulated, Limits(max_height=2.5))
-            with pytest.raises(LinkError, match=rf"{key} = .* reads back"):
+            with pytest.raises(LinkError, match=rf"{key} was set to .* reads back"):
                 await drone.connect()
             with pytest.raises(LinkError, match="not connected"):
                 await drone.take_off()

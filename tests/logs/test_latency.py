@@ -237,7 +237,7 @@ def test_only_what_is_asked_for(tmp_path):
     assert each == list(found.loops)
     with pytest.raises(ValueError, match="no loop with the axis 'yaw', it has roll"):
         dtm.latency(log, axes="yaw")
-    with pytest.raises(ValueError, match="no time of 'yaw rate' from its setpoint"):
+    with pytest.raises(ValueError, match="'yaw rate' has no time from its setpoint"):
         found.loop("yaw rate")
 
 

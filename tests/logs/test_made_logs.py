@@ -398,7 +398,7 @@ def test_other_senders_are_topics_of_their_own(opened):
 def test_of_a_vehicle_that_restarted_the_longest_part_is_read(opened):
     found = opened(tlog(600).data + tlog(300).data)
     assert found.duration == pytest.approx(11.98)
-    assert any("starts anew 1 times" in remark for remark in found.remarks)
+    assert any("restarts 1 times" in remark for remark in found.remarks)
 
 
 def test_modes_of_px4_in_a_tlog(opened):

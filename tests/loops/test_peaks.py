@@ -178,7 +178,7 @@ def test_norms_of_systems_agree():
     assert loop.hinf_norm("command") >= 0.5
     with pytest.raises(ValueError, match="of='gain'"):
         loop.hinf_norm("gain")
-    with pytest.raises(ValueError, match="between the samples"):
+    with pytest.raises(ValueError, match="between samples"):
         loop.replace(sample_time=0.1).hinf_norm("output")
     A = {0.0: [[0.0, 1.0], [-1.0, -0.2]], 0.3: [[0.0, 0.0], [0.1, 0.0]]}
     system = dtm.DelaySystem(A, [[0.0], [1.0]], [[1.0, 0.0]])

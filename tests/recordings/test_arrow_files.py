@@ -100,5 +100,5 @@ def test_a_file_that_is_cut_off_is_refused(writer, tmp_path):
 
 
 def test_a_separator_is_for_text(tmp_path):
-    with pytest.raises(ValueError, match="is a file of Parquet, which has none"):
+    with pytest.raises(ValueError, match="is a file of Parquet, which has no delimiter"):
         dtm.read_recording(written(tmp_path, "Parquet"), **NAMES, delimiter=";")

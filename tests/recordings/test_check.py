@@ -342,7 +342,7 @@ def test_single_commands_of_another_row_are_counted():
     command[[30, 34, 38]] = FLOWN.command[[29, 33, 37]]
     check, codes = found(changed(FLOWN, command=command))
     assert check.law == "exact"
-    assert "on 3 of 124 rows" in codes["command_strays"].message
+    assert "in 3 of 124 rows" in codes["command_strays"].message
 
 
 def test_the_law_of_other_controllers_is_unknown():

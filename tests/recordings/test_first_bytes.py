@@ -73,7 +73,7 @@ def test_logs_of_vehicles_are_told_from_tables(name, words):
 
 
 def test_a_separator_is_for_text():
-    with pytest.raises(ValueError, match="delimiter=';': a table in memory has none"):
+    with pytest.raises(ValueError, match="delimiter=';': a table in memory has no delimiter"):
         dtm.read_recording(COLUMNS, **NAMES, delimiter=";")
 
 
