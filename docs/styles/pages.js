@@ -6,3 +6,10 @@ const reach = () => document.querySelectorAll("article pre, article div.math, ar
   });
 addEventListener("load", reach);
 addEventListener("resize", reach);
+
+// The search of Sphinx appends the summary of each result, which is null for a page without text.
+document.addEventListener("DOMContentLoaded", () => {
+  if (typeof Search === "undefined") return;
+  const summary = Search.makeSearchSummary;
+  Search.makeSearchSummary = (...given) => summary(...given) ?? document.createDocumentFragment();
+});
