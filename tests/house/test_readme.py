@@ -6,10 +6,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from command_line import run
+from flights import process_path
 from made_processes import bump
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+ROOT = Path(__file__).resolve().parents[2]
+README = ROOT / "README.md"
 
 
 def test_the_python_of_the_readme_runs(tmp_path):
@@ -38,3 +41,14 @@ def test_the_first_command_of_the_readme_is_the_demo(tmp_path):
     assert first is not None
     assert first[1].rstrip().endswith("deadtime demo")
     assert run("demo", cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_gains_of_the_bump_test_are_those_that_the_command_prints(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    begin = text.index("reliable: PI with Kp")
+    shown = [line for line in text[begin : text.index("```", begin)].splitlines() if line.strip()]
+    printed = run("tune", str(process_path("bump.csv"))).stdout.splitlines()
+    for line in shown:
+        start = line.removesuffix("…").removesuffix("...").rstrip()
+        assert any(other.startswith(start) for other in printed), line
