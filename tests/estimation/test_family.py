@@ -37,6 +37,16 @@ def test_a_bump_test_is_a_process_that_comes_to_rest():
     assert all(held(found, record).values())
 
 
+@pytest.mark.parametrize(
+    ("make", "seed"), [(made.bump_test, 5013), (made.bump_test, 5027), (made.process_loop, 5026)]
+)
+def test_a_zero_that_the_record_leaves_open_does_not_make_every_delay_likely(make, seed):
+    record = make(seed)
+    low, high = fit(record).hull["delay"][:2]
+    assert low <= record.delay <= high
+    assert high - low < 1.5 * record.delay
+
+
 def test_a_lone_sine_tells_two_numbers_and_no_plant():
     record = made.lone_sine(0)
     assert (fit(record, plant="lag").verdict, fit(record, plant="lag").told) == ("none", 2)

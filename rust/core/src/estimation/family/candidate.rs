@@ -1,5 +1,6 @@
 //! A minimum with the errors of its numbers and how many of them the input tells.
 
+use super::along_zero::Along;
 use super::between::{Open, open};
 use super::class::{Class, Numbers};
 use super::dispersion::dispersion;
@@ -9,10 +10,11 @@ use super::loop_view::Seen;
 use super::minima::Minimum;
 use super::model::Point;
 use super::noise::{Coefficients, Noise};
-use super::tolerances::EVIDENCE;
+use super::tolerances::{ALONG, EVIDENCE};
 use crate::estimation::statistics::{chi_squared_beyond, student_reach};
 use crate::linear_algebra::eigenvalues::eigenvalues;
 use crate::linear_algebra::vectors::dot;
+use crate::{Error, Task};
 
 /// Share by which two sums of the same squares differ at most, as the records are added up.
 const ALIKE: f64 = 1e-9;
@@ -71,6 +73,8 @@ pub struct Candidate {
     pub(super) inner: Vec<f64>,
     /// The plant and the covariance without an error of its class.
     plain: Option<(Seen, Vec<f64>)>,
+    /// Where its numbers are no straight lines, the class with other zeros.
+    along: Option<Along>,
     row: f64,
 }
 
@@ -158,6 +162,7 @@ impl Candidate {
             deviations: Vec::new(),
             inner,
             plain,
+            along: None,
             row: rows.row,
         };
         for (part, place) in rows.parts.iter().zip(rows.places()) {
@@ -257,12 +262,67 @@ impl Candidate {
     /// A number of the class and its interval. Where the class is in error, its numbers are less well known than
     /// what a loop feels: they are those with the error and those without it.
     pub(super) fn interval_of_class(&self, of: impl Fn(&Seen) -> f64) -> (f64, f64, f64) {
+        if let Some(along) = &self.along {
+            return self.interval_along(along, &of);
+        }
         let with = self.interval(&of);
         let Some((seen, inner)) = &self.plain else {
             return with;
         };
         let without = self.interval_by(seen, inner, &of);
         (without.0, with.1.min(without.1), with.2.max(without.2))
+    }
+
+    /// The same over all zeros that the record leaves open.
+    fn interval_along(&self, along: &Along, of: &dyn Fn(&Seen) -> f64) -> (f64, f64, f64) {
+        let (seen, inner, factor) = self.without_error();
+        let beside = self.beside_zero(inner, seen.count());
+        let (value, low, high) = self.interval_by(&seen, &beside, of);
+        let half_width = |rise: f64| 0.5 * (high - low) * (rise / factor).sqrt() / self.quantile;
+        let ends = along.ends(factor * self.quantile * self.quantile, of, half_width);
+        let (mut low, mut high) = (low.min(ends.0), high.max(ends.1));
+        if self.plain.is_some() {
+            let beside = self.beside_zero(&self.inner, self.seen.count());
+            let with = self.interval_by(&self.seen, &beside, of);
+            (low, high) = (low.min(with.1), high.max(with.2));
+        }
+        (value, low, high)
+    }
+
+    /// The plant without an error of its class, the covariance of its numbers, and the dispersion in it.
+    fn without_error(&self) -> (Seen, &[f64], f64) {
+        match &self.plain {
+            Some((seen, inner)) => (*seen, inner, 1.0),
+            None => (self.seen, &self.inner, self.dispersion),
+        }
+    }
+
+    /// A covariance of so many numbers where the zero is given.
+    fn beside_zero(&self, inner: &[f64], count: usize) -> Vec<f64> {
+        let zero = self.class.searched();
+        let variance = inner[zero * (count + 1)];
+        let mut out = inner.to_vec();
+        for i in 0..count {
+            for j in 0..count {
+                out[i * count + j] -= inner[i * count + zero] * inner[zero * count + j] / variance;
+            }
+        }
+        out
+    }
+
+    /// Follow the class along its zero, where slopes at one point do not say what its numbers are.
+    pub(super) fn follow_zero(&mut self, found: &Minimum<'_>, task: &Task) -> Result<(), Error> {
+        if !self.class.has_zero {
+            return Ok(());
+        }
+        let (seen, inner, factor) = self.without_error();
+        let zero = self.class.searched();
+        let half = self.quantile * inner[zero * (seen.count() + 1)].sqrt();
+        let is_wide = half > ALONG.wide * seen.scale(zero, self.row);
+        if is_wide || self.told < self.values.len() {
+            self.along = Some(Along::new(found, seen, factor * ALONG.rise, task)?);
+        }
+        Ok(())
     }
 
     fn interval_by(

@@ -438,6 +438,15 @@ fn answer(
     let errs = minima.first().is_some_and(Candidate::errs);
     minima.retain(|one| one.bic <= reach || !errs && one.told == one.values.len());
     leave_out_what_adds_nothing(&mut minima);
+    for own in &mut minima {
+        let is_own = |one: &&Minimum<'_>| {
+            (one.model.class, one.model.noise) == (own.class, own.noise)
+                && one.deviance == own.deviance
+        };
+        if let Some(one) = found.iter().find(is_own) {
+            own.follow_zero(one, task)?;
+        }
+    }
     let mut candidates: Vec<Candidate> = Vec::new();
     for one in &all {
         if candidates.iter().all(|known| known.class != one.class) {

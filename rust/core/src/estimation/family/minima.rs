@@ -176,6 +176,7 @@ fn under_white<'a>(plan: &Plan<'a>, task: &Task) -> Result<Vec<Minimum<'a>>, Err
             class,
             noise: Noise::White,
             responds: true,
+            zero: None,
             level: true,
         };
         let mut starts = seeded(&model, plan);
@@ -265,6 +266,7 @@ fn under<'a>(
             class,
             noise: kind,
             responds: true,
+            zero: None,
             level: true,
         };
         let mut starts = if kind == Noise::Arma11 && plan.grids {
@@ -332,6 +334,7 @@ pub(super) fn without_plant<'a>(plan: &Plan<'a>, task: &Task) -> Result<f64, Err
             noise: *kind,
             responds: false,
             level: true,
+            zero: None,
         };
         let start = model.at(vec![0.0; model.searched()]);
         let x = noise(&model, &start, &known);

@@ -9,9 +9,10 @@
 //! count, `response` is exact, `model` the likelihood of one class under one `noise`, `search` its
 //! minimum from one of `starts`, `minima` those of all classes. `candidate` has errors and how many
 //! numbers the input tells, `refine` follows them to more rows, `between` says what rows of a command
-//! leave open, `causes` what a linear plant lacks,
+//! leave open, `along_zero` how far a zero may move, `causes` what a linear plant lacks,
 //! `sensors` which readings are none, `series` the error of a class and `flexible` its search, `hull` intervals over all classes within reach, `verdict` what is claimed.
 
+mod along_zero;
 mod answer;
 mod aside;
 mod between;

@@ -24,6 +24,8 @@ pub(super) struct Model<'a> {
     /// Is the output (of an integrator the slope) that goes with a command of zero free? It is zero
     /// otherwise.
     pub(super) level: bool,
+    /// The zero, where it is given.
+    pub(super) zero: Option<f64>,
 }
 
 /// The likelihood at one point.
@@ -150,7 +152,7 @@ impl Model<'_> {
         if self.class.has_zero {
             let at = 1 + self.class.order;
             let most = RANGES.slowest_zero * rows.span;
-            x[at] = x[at].clamp(-most, most);
+            x[at] = self.zero.unwrap_or(x[at].clamp(-most, most));
         }
     }
 

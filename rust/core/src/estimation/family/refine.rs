@@ -64,6 +64,7 @@ fn beside_one<'a>(
         class: *class,
         noise: kind,
         responds: true,
+        zero: None,
         level: true,
     };
     let plant = model.plant_numbers();

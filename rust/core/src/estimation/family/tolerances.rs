@@ -155,6 +155,26 @@ pub(super) const EVIDENCE: Evidence = Evidence {
     shifted: 10.0,
 };
 
+/// How a class is followed along its zero.
+pub(super) struct Along {
+    /// Half width of the zero, as a share of itself or of the lags, from which on slopes at one point no longer
+    /// say what it is: less takes more time.
+    pub(super) wide: f64,
+    /// First distance, as the same share.
+    pub(super) first: f64,
+    /// Factor of the next distance: more is faster, and takes the likelihood between them for a parabola.
+    pub(super) grow: f64,
+    /// Rise of −2 ln L up to which it is followed, times the dispersion: more serves higher levels.
+    pub(super) rise: f64,
+}
+
+pub(super) const ALONG: Along = Along {
+    wide: 0.3,
+    first: 0.1,
+    grow: 1.6,
+    rise: 11.0,
+};
+
 /// Rows at rest at the start of a record.
 pub(super) struct Rest {
     /// Fewest rows before the first command that can show rest.

@@ -94,6 +94,7 @@ fn beside<'a>(suspect: &Suspect, rows: &'a Rows) -> Model<'a> {
         class: suspect.class,
         noise: suspect.noise,
         responds: true,
+        zero: None,
         level: true,
     }
 }
