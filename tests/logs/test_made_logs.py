@@ -405,7 +405,9 @@ def test_modes_of_px4_in_a_tlog(opened):
     pytest.importorskip("pymavlink", reason="pymavlink reads tlogs")
     log = Tlog()
     m = log.dialect
-    for k, mode in enumerate((1 << 16, 3 << 16, 4 << 16 | 2 << 24, 4 << 16 | 5 << 24)):
+    # Main modes, then those of "auto" by sub mode.
+    modes = [1 << 16, 3 << 16, *(4 << 16 | sub << 24 for sub in (2, 3, 4, 5, 6, 9))]
+    for k, mode in enumerate(modes):
         for j in range(10):
             ground = 1.7e9 + k + 0.1 * j
             log.add(ground, m.MAVLink_heartbeat_message(2, 12, 128, mode, 4, 3))
@@ -413,7 +415,9 @@ def test_modes_of_px4_in_a_tlog(opened):
             log.add(ground, m.MAVLink_attitude_message(stamp, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     found = opened(log)
     assert found.autopilot == "PX4"
-    assert [name for _, name in found.modes] == ["Manual", "Position", "Takeoff", "Return"]
+    assert [name for _, name in found.modes] == [
+        "Manual", "Position", "Takeoff", "Hold", "Mission", "Return", "Land", "Precision land",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

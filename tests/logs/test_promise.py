@@ -65,6 +65,25 @@ def test_the_noise_part_is_the_scatter_of_least_squares(drift):
     assert 0.8 < np.median(promises) / np.std(times) < 1.5
 
 
+@pytest.mark.parametrize("factor", [0.05, 20.0])
+def test_a_promise_scales_with_the_time(factor):
+    random = np.random.default_rng(4)
+    time = 0.02 * np.arange(2000)
+    asked = np.repeat(random.standard_normal(40), 50)
+    # Behind a lag of 0.2 s and 0.1 s of delay.
+    came = np.zeros(2000)
+    for k in range(6, 2000):
+        came[k] = came[k - 1] + 0.1 * (asked[k - 6] - came[k - 1])
+    came += 0.05 * random.standard_normal(2000)
+
+    def promise(scale):
+        asked_then = Series(scale * time, asked, "rad", "asked")
+        came_then = Series(scale * time, came, "rad", "came")
+        return promised(asked_then, came_then, [(0.0, 39.0 * scale)], longest=0.5 * scale)
+
+    assert promise(factor).noise == pytest.approx(factor * promise(1.0).noise, rel=1e-3)
+
+
 def test_nothing_is_promised_where_nothing_moves_or_follows():
     time = 0.02 * np.arange(2000)
     noise = np.random.default_rng(2).standard_normal(2000)

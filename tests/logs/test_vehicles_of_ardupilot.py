@@ -109,6 +109,24 @@ def test_an_injected_signal_is_the_setpoint_of_its_axis_alone(opened):
     assert loop.response.source == "SIDD.Gx"
 
 
+@pytest.mark.parametrize(
+    ("axis", "loop"),
+    [
+        *((axis, name) for first in (1, 4) for axis, name in enumerate(("roll", "pitch"), first)),
+        *((axis, f"{name} rate") for axis, name in enumerate(("roll", "pitch", "yaw"), 7)),
+    ],
+)
+def test_an_injected_signal_belongs_to_the_loop_of_its_number(opened, axis, loop):
+    # SID_AXIS of ArduPilot: input angles are 1 to 3, recovered angles 4 to 6, rates 7 to 9.
+    messages = (
+        ("SIDD", "Targ,Gx,Ax,Gy,Ay,Gz", 10.0, 1),
+        ("ATT", "DesRoll,Roll,DesPitch,Pitch", 5.0, 1),
+    )
+    log = opened(COPTER, ((0, 5), (50, 25), (250, 5)), messages, events=((50, axis),), rows=300)
+    injected = [name for name in followed(log) if name.endswith("from the injected signal")]
+    assert injected == [f"{loop} from the injected signal"]
+
+
 def test_turn_rate_speed_and_heading_of_a_rover(opened):
     messages = (
         ("STER", "DesTurnRate,TurnRate,SteerOut", 20.0, 1),

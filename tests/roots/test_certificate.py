@@ -244,6 +244,15 @@ def test_no_right_edge_lies_left_of_a_chain(tau):
     assert _dominates_rightward(rows, delays, 1.01 * chain, 0.0)
 
 
+@pytest.mark.parametrize("tau", [0.5, 2.0])
+def test_a_delayed_term_of_a_higher_degree_has_to_fall_from_the_edge_on(tau):
+    # s^2 e^(-s tau) / s rises with s up to s = 1/tau.
+    rows = [[Fraction(0), Fraction(1)], [Fraction(0), Fraction(0), Fraction(1, 100)]]
+    delays = [Fraction(0), Fraction(tau)]
+    assert not _dominates_rightward(rows, delays, 0.99 / tau, 0.0)
+    assert _dominates_rightward(rows, delays, 1.01 / tau, 0.0)
+
+
 def test_false_statements_about_the_real_axis_fail():
     proof = certify("smith_2.12", symmetric=False)
     assert proof.verify() == 25
