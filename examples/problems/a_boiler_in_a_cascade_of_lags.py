@@ -14,8 +14,8 @@ estimated largest stable gain is 2.57 (95 %: 2.47 to 2.68), and that of the true
 The dead time of 13.2 s (95 %: 6.9 to 14.0 s) is a property of the estimated plant, because the
 boiler has only lags. With Kp = 0.372 and Ki = 0.01119, the true loop has a gain margin of 3.86.
 
-**Next.** Enter the gains in the controller and record a step of the set point. Check the gains with this
-record::
+**Next.** Enter the gains in the controller and record a step of the set point. Check the gains with
+this record::
 
     deadtime tune step.csv --kp 0.372 --ki 0.01119
 """
