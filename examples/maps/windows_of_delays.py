@@ -3,8 +3,8 @@ A longer delay can stabilise
 ============================
 
 A longer delay is not always worse. The oscillator of this example is stable for several separate
-ranges of the delay. ``crossings`` lists the exact ends of these ranges. The spectral abscissa
-between the ends confirms them.
+ranges of the delay. ``crossings`` lists the exact ends of the stable ranges. The spectral abscissa
+between the ends confirms the ranges.
 """
 
 import deadtime as dtm
