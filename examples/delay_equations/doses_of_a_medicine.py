@@ -4,7 +4,7 @@ Doses, and a stop at a threshold
 
 A substance decays at a rate that depends on its level one hour ago. Every 8 hours a dose raises
 the level at once, which the argument ``jumps`` describes. The run ends when the level has fallen
-to a fifth. This is an event that is ``terminal``. The times of the doses and of the event are
+to a fifth. This event is marked as ``terminal``. The times of the doses and of the event are
 exact.
 """
 

@@ -2,9 +2,9 @@
 The delay from a recorded step
 ==============================
 
-The script simulates a step of a height loop with noise of 5 mm. It estimates the delay by maximum
-likelihood, with an interval. The verdict states whether the model explains the recording. If the
-verdict is an indication, the interval may not contain the true value.
+The script simulates a step of a height loop with noise of 5 mm. The script then estimates the
+delay by maximum likelihood, with an interval. The verdict states whether the model explains the
+recording. If the verdict is an indication, the interval may not contain the true value.
 """
 
 import deadtime as dtm

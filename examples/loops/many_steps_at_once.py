@@ -3,8 +3,8 @@ Thousands of step responses
 ===========================
 
 ``sweep`` simulates a loop for every combination of two of its parameters, as exactly as a single
-step response. It returns the metrics of the responses. The picture shows the overshoot over gain
-and delay, with the line of 10 %.
+step response. ``sweep`` returns the metrics of the responses. The picture shows the overshoot
+over gain and delay, with the line of 10 %.
 """
 
 import deadtime as dtm

@@ -3,9 +3,9 @@ What the hold of a sampled loop costs
 =====================================
 
 A controller that runs every ``sample_time`` seconds and holds its command is not a continuous
-controller. Its largest stable gain becomes smaller with a longer sample time. As a rule of thumb,
-the hold has the effect of half a sample of further delay. A model without the hold gives a limit
-that is too high at every sample time, which is unsafe.
+controller. The largest stable gain of a sampled loop becomes smaller with a longer sample time.
+As a rule of thumb, the hold has the effect of half a sample of further delay. A model without the
+hold gives a limit that is too high at every sample time, which is unsafe.
 """
 
 import deadtime as dtm

@@ -5,8 +5,8 @@ A heater: which PI gains suit one step of it?
 **Question.** The heater of a Temperature Control Lab made a step from 0 to 50 %. What is its dead
 time, and which PI gains are safe?
 
-**Data.** :download:`tclab_step_test.csv` is from J. Kantor's course CBE30338 (MIT licence). It has
-801 rows, 1 s apart: time (s), temperature T1 (°C) and heater Q1 (%).
+**Data.** :download:`tclab_step_test.csv` is from J. Kantor's course CBE30338 (MIT licence). The
+file has 801 rows, 1 s apart: time (s), temperature T1 (°C) and heater Q1 (%).
 
 **Answer.** The verdict is an *indication*, so no interval is claimed. Two lags and a dead time of
 about 0.25 s explain the record best. But a single lag with a dead time of about 11.4 s is also

@@ -12,11 +12,11 @@ measured.
 **Answer.** Without a buffer, the step response does not show the mean delay. The steps give
 delays from 90 to 103 ms. All intervals (95 %) but one do not contain the mean of 94 to 97 ms. The
 verdict, *reliable* or *indication*, applies only to the few packets of the step. A buffer applies
-each command 160 ms after its measurement, so that the delay is constant. Then every verdict is
-*reliable*, and the intervals lie within 159.5 to 160.3 ms.
+each command 160 ms after its measurement, so that the delay is constant. With the buffer, every
+verdict is *reliable*, and the intervals lie within 159.5 to 160.3 ms.
 
-**Next.** Choose the age at which the buffer applies a command. It must be long enough for almost
-all packets of your network, but no longer. Compare the buffer with other policies::
+**Next.** Choose the age at which the buffer applies a command. The age must be long enough for
+almost all packets of your network, but no longer. Compare the buffer with other policies::
 
     deadtime internet-loop --virtual-time --gain 6 --delays normal --jitter 0.01 \
         --policy jitter-buffer --policy-number 0.16

@@ -3,9 +3,9 @@ Every root of a region
 ======================
 
 The characteristic function of a loop with a delay has infinitely many roots. ``roots`` finds all
-roots in a rectangle. It first proves their number, and the sum of the found multiplicities must
-equal this number. Far from the origin, the roots of this loop follow a law, which ``chains``
-gives.
+roots in a rectangle. First ``roots`` proves the number of roots, and the sum of the found
+multiplicities must equal this number. Far from the origin, the roots of this loop follow a law,
+which ``chains`` gives.
 """
 
 from deadtime import delay, s
