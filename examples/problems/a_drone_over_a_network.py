@@ -12,9 +12,9 @@ of delay and 2 cm of noise.
 
 **Answer.** From the overshoot alone, the formula of the paper gives a delay of 0.360 s. A
 simulation with the limit of the speed gives 0.369 s. Neither number has an interval. The whole
-record gives 0.358 s (95 %: 0.349 to 0.367 s), and the verdict is *reliable*. With a delay of 0.367 s, P
-control is stable up to a gain of 3.96. PV control (proportional plus velocity feedback) with Kp =
-1.84 and Kv = 0.227 settles in 1.5 s instead of 2.5 s.
+record gives 0.358 s (95 %: 0.349 to 0.367 s), and the verdict is *reliable*. With a delay of
+0.367 s, P control is stable up to a gain of 3.96. PV control (proportional plus velocity
+feedback) with Kp = 1.84 and Kv = 0.227 settles in 1.5 s instead of 2.5 s.
 
 **Next.** Fly the whole experiment on the emulated drone::
 
