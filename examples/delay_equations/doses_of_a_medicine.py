@@ -3,8 +3,9 @@ Doses, and a stop at a threshold
 ================================
 
 A substance decays at a rate that depends on its level one hour ago. Every 8 hours a dose raises
-the level at once: ``jumps``. The run ends when the level has fallen to a fifth: an event that is
-``terminal``. Both instants are hit exactly.
+the level at once, which the argument ``jumps`` describes. The run ends when the level has fallen
+to a fifth. This event is marked as ``terminal``. The times of the doses and of the event are
+exact.
 """
 
 import deadtime as dtm

@@ -2,8 +2,9 @@
 Chaos of Mackey and Glass
 =========================
 
-The number of blood cells depends on that of 17 days ago. ``solve_dde`` takes the right-hand side
-as SciPy takes that of an ordinary equation; ``dense_output`` gives the solution between its steps.
+The number of blood cells depends on their number 17 days ago. ``solve_dde`` takes the right-hand
+side as SciPy takes that of an equation without delays. ``dense_output`` gives the solution
+between the steps.
 """
 
 import deadtime as dtm

@@ -2,9 +2,9 @@
 Choose the filter of the derivative
 ===================================
 
-Velocity from differences of a measured height amplifies its noise, and a filter adds lag.
-``design_filter`` weighs both: the lowest corner frequency that loses at most a tenth of the decay
-rate.
+Differences of a measured height give a velocity, but they amplify the noise. A filter removes
+noise, but adds lag. ``design_filter`` finds the lowest corner frequency at which the decay rate
+is at most a tenth smaller than without a filter.
 """
 
 import deadtime as dtm

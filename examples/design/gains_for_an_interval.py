@@ -2,8 +2,9 @@
 Choose gains for an interval of the delay
 =========================================
 
-``design`` looks for the gains that settle fastest in the worst case over the interval. The gain
-margin is at least 2.5 everywhere in it. The summary says what each requirement costs.
+``design`` finds the gains with the shortest settling time in the worst case over an interval of
+the delay. The gain margin is at least 2.5 for every delay of the interval. The summary states how
+much each requirement worsens the settling time.
 """
 
 import deadtime as dtm

@@ -2,9 +2,10 @@
 Gains that follow the delay
 ===========================
 
-``adaptive_gains`` makes a list of gains, each for delays up to one, that is proved stable while the
-delay moves and the gains change. ``follow`` chooses from it by the interval of the delay: a slower
-set at once, a faster one after a time.
+``adaptive_gains`` makes a list of sets of gains. Each set is for all delays up to a longest
+delay. The list is proved stable while the delay changes and the gains change. ``follow`` chooses
+a set from the interval of the delay. ``follow`` changes to a slower set at once, and to a faster
+set after a waiting time.
 """
 
 import deadtime as dtm

@@ -2,9 +2,9 @@
 The delay from a recorded step
 ==============================
 
-A step of a height loop, simulated with noise of 5 mm, and its delay by maximum likelihood with an
-interval. The verdict says whether the model explains the recording: of an indication the interval
-means little.
+The script simulates a step of a height loop with noise of 5 mm. The script then estimates the
+delay by maximum likelihood, with an interval. The verdict states whether the model explains the
+recording. If the verdict is an indication, the interval may not contain the true value.
 """
 
 import deadtime as dtm

@@ -2,9 +2,9 @@
 The delay while flying
 ======================
 
-The delay of a height loop in gusts jumps from 0.20 to 0.32 s. ``online`` shows what each row and
-those before it say of the delay. `OnlineEstimator` does the same while the loop runs. The dotted
-line is where the jump was found.
+The delay of a height loop in gusts jumps from 0.20 to 0.32 s. ``online`` shows the estimate after
+each row, from this row and the rows before it. `OnlineEstimator` does the same while the loop
+runs. The dotted line shows when the jump was found.
 """
 
 import deadtime as dtm

@@ -2,8 +2,9 @@
 A lag that is taken for delay
 =============================
 
-The vehicle lags by 0.1 s. A model without a lag puts it into the delay and is an indication: its
-residuals are not white. With the lag free both come out, and their sum is known best.
+The vehicle has a lag of 0.1 s. If the model has no lag, the estimated delay includes the lag, and
+the estimate is an indication, because the residuals are not white. If the lag is fitted, too,
+delay and lag are both right, and their sum is the most accurate.
 """
 
 import deadtime as dtm

@@ -2,9 +2,9 @@
 What an experiment will show
 ============================
 
-The Cramér-Rao bound before anything is recorded: the smallest standard error that any unbiased
-method can reach. In wind a longer wait after one step adds nothing. A pseudo-random square wave
-adds information with every second.
+The Cramér-Rao bound can be computed before an experiment. The bound is the smallest standard
+error that any unbiased method can reach. In wind, a longer recording after one step adds no
+information. With a pseudo-random square wave, every second adds information.
 """
 
 import deadtime as dtm

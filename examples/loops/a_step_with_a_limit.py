@@ -2,9 +2,9 @@
 A step with a limit on the command
 ==================================
 
-A height loop with 0.36 s of delay whose command holds for 65 ms and is limited to 1 m/s. Velocity
-feedback removes the overshoot. The simulation is exact to rounding: the command is cut at the
-moment it reaches its limit.
+A height loop has 0.36 s of delay. The command of the loop is held for 65 ms and limited to 1 m/s.
+Velocity feedback removes the overshoot. The simulation is exact to rounding, because the command
+is limited at the exact time when it reaches its limit.
 """
 
 import deadtime as dtm

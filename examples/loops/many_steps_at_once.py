@@ -2,9 +2,9 @@
 Thousands of step responses
 ===========================
 
-``sweep`` simulates a loop for every combination of two of its numbers, as exactly as one step
-response, and returns their metrics. Here: the overshoot over gain and delay, with the line of 10
-%.
+``sweep`` simulates a loop for every combination of two of its parameters, as exactly as a single
+step response. ``sweep`` returns the metrics of the responses. The picture shows the overshoot
+over gain and delay, with the line of 10 %.
 """
 
 import deadtime as dtm

@@ -2,8 +2,9 @@
 Gain, phase and delay margin
 ============================
 
-The margins come from the exact frequency response. The delay margin says how many more seconds of
-delay the loop tolerates. Compare it with the network or the camera that is to be added.
+The margins follow from the exact frequency response. The delay margin is the largest delay, in
+seconds, that can be added before the loop becomes unstable. Compare the delay margin with the
+delay of the network or camera that you want to add.
 """
 
 import matplotlib.pyplot as plt

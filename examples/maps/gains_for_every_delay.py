@@ -2,9 +2,9 @@
 Gains for every delay of an interval
 ====================================
 
-The delay of a real loop is known up to an interval. ``robust_map`` proves for each cell that the
-loop is stable for all delays of the interval, or that it is unstable for some.
-``largest_stable_box`` finds a rectangle of gains that is safe as a whole.
+The delay of a real loop is only known to lie in an interval. For each cell, ``robust_map`` proves
+that the loop is stable for all delays of the interval, or that it is unstable for some of them.
+``largest_stable_box`` finds a rectangle in which all gains are stable.
 """
 
 import deadtime as dtm

@@ -2,9 +2,9 @@
 Which gains are stable
 ======================
 
-A proportional gain and a velocity gain, and a delay of 0.36 s. Every cell of the map is proved:
-along each row all crossings of the imaginary axis are found. The boundaries carry the frequency at
-which the loop oscillates there, and the best cell has the fastest decay.
+The loop has a proportional gain, a velocity gain and a delay of 0.36 s. Every cell of the map is
+proved, because all crossings of the imaginary axis are found along each row. Each boundary states
+the frequency at which the loop oscillates on it. The best cell has the fastest decay.
 """
 
 import deadtime as dtm

@@ -2,9 +2,10 @@
 What the hold of a sampled loop costs
 =====================================
 
-A controller that runs every ``sample_time`` seconds and holds its command is not a continuous one.
-The largest stable gain falls with the sample time. Half a sample of further delay is a rule of
-thumb for it. Leaving the hold out is on the unsafe side at every sample time.
+A controller that runs every ``sample_time`` seconds and holds its command is not a continuous
+controller. The largest stable gain of a sampled loop becomes smaller with a longer sample time.
+As a rule of thumb, the hold has the effect of half a sample of further delay. A model without the
+hold gives a limit that is too high at every sample time, which is unsafe.
 """
 
 import deadtime as dtm

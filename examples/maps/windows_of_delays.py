@@ -2,8 +2,9 @@
 A longer delay can stabilise
 ============================
 
-More delay is not always worse. This oscillator is stable for several separate ranges of the delay;
-``crossings`` lists their ends exactly, and the spectral abscissa in between confirms them.
+A longer delay is not always worse. The oscillator of this example is stable for several separate
+ranges of the delay. ``crossings`` lists the exact ends of the stable ranges. The spectral abscissa
+between the ends confirms the ranges.
 """
 
 import deadtime as dtm

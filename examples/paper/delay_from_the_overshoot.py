@@ -2,9 +2,10 @@
 The delay from the overshoot
 ============================
 
-The method of the paper: an overshoot gives a damping ratio, and that of the dominant root of ``s +
-Kp exp(-s T)`` by Lambert W gives the delay T. The formula between the first two holds for a system
-of second order, which a loop with a delay is not. The exact overshoot shows how far it is off.
+The method of the paper has two steps. An overshoot gives a damping ratio. The damping ratio of
+the dominant root of ``s + Kp exp(-s T)`` then gives the delay T, by Lambert W. The formula of the
+first step is valid for a system of second order, but a loop with a delay is not such a system.
+The exact overshoot shows the error of the formula.
 """
 
 import deadtime as dtm

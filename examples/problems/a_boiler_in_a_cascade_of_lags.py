@@ -2,18 +2,20 @@
 A boiler: are gains for a dead time safe for many lags?
 =======================================================
 
-**Question.** The steam of a boiler follows its burner through four equal lags, without a dead time.
-An estimate describes it by a dead time and two poles. Are PI gains for that estimate safe?
+**Question.** The steam pressure of a boiler follows its burner through four equal lags, without a
+dead time. An estimate describes the boiler by a dead time and two poles. Are PI gains for the
+estimated plant safe?
 
-**Data.** A bump test, made by the first lines of the script: time (s), burner (%) and pressure
-(bar). The boiler has a gain of 1.5 and four lags of 15 s; the noise is 0.1 bar.
+**Data.** The first lines of the script simulate a bump test: time (s), burner (%) and pressure
+(bar). The boiler has a gain of 1.5 and four lags of 15 s. The noise is 0.1 bar.
 
-**Answer.** Yes. The verdict is *reliable*, and what a controller needs is right: the largest stable
-gain is 2.57 (95 %: 2.47 to 2.68), that of the true boiler 2.667. The dead time of 13.2 s (95 %: 6.9
-to 14.0 s) belongs to the estimated plant; the boiler has lags instead. With Kp = 0.372 and
-Ki = 0.01119 the true loop has a gain margin of 3.86.
+**Answer.** Yes. The verdict is *reliable*, and the numbers that a controller needs are right. The
+estimated largest stable gain is 2.57 (95 %: 2.47 to 2.68), and that of the true boiler is 2.667.
+The dead time of 13.2 s (95 %: 6.9 to 14.0 s) is a property of the estimated plant, because the
+boiler has only lags. With Kp = 0.372 and Ki = 0.01119, the true loop has a gain margin of 3.86.
 
-**Next.** Enter the gains, record a step of the set point, and check them with that record::
+**Next.** Enter the gains in the controller and record a step of the set point. Check the gains with
+this record::
 
     deadtime tune step.csv --kp 0.372 --ki 0.01119
 """

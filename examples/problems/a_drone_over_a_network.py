@@ -3,16 +3,18 @@ A drone: how long is the delay of its height loop?
 ==================================================
 
 **Question.** A computer controls the height of a drone over Wi-Fi. How long is the delay of the
-loop, up to which gain is it stable, and which gains settle faster?
+loop? Up to which gain is the loop stable? Which gains settle faster?
 
-**Data.** S. Armah and S. Yi (2017) print the loop: Kp = 1.31, a command every 65 ms, at most 1 m/s,
-and an overshoot of 2.30 %. They print no record. The first lines of the script make one like it:
-time (s), reference (m) and height (m), with 0.36 s of delay and 2 cm of noise.
+**Data.** The paper of S. Armah and S. Yi (2017) states the loop: Kp = 1.31, a command every 65
+ms, at most 1 m/s, and an overshoot of 2.30 %. The paper has no record of the flight. The first
+lines of the script simulate a similar record: time (s), reference (m) and height (m), with 0.36 s
+of delay and 2 cm of noise.
 
-**Answer.** The overshoot alone gives 0.360 s by the paper's formula, and 0.369 s if the limit of
-the speed is simulated. Neither number has an interval. The whole record gives 0.358 s (95 %: 0.349
-to 0.367 s), and the verdict is *reliable*. P control is stable up to a gain of 3.96 at the longest
-of these delays. PV control with Kp = 1.84 and Kv = 0.227 settles in 1.5 s instead of 2.5 s.
+**Answer.** From the overshoot alone, the formula of the paper gives a delay of 0.360 s. A
+simulation with the limit of the speed gives 0.369 s. Neither number has an interval. The whole
+record gives 0.358 s (95 %: 0.349 to 0.367 s), and the verdict is *reliable*. With a delay of
+0.367 s, P control is stable up to a gain of 3.96. PV control (proportional plus velocity
+feedback) with Kp = 1.84 and Kv = 0.227 settles in 1.5 s instead of 2.5 s.
 
 **Next.** Fly the whole experiment on the emulated drone::
 

@@ -2,19 +2,19 @@
 A heater: which PI gains suit one step of it?
 =============================================
 
-**Question.** The heater of a Temperature Control Lab stepped from 0 to 50 %. What is its dead time,
-and which PI gains are safe?
+**Question.** The heater of a Temperature Control Lab made a step from 0 to 50 %. What is its dead
+time, and which PI gains are safe?
 
-**Data.** :download:`tclab_step_test.csv` is from J. Kantor's course CBE30338 (MIT licence). It has
-801 rows, 1 s apart: time (s), temperature T1 (°C) and heater Q1 (%).
+**Data.** :download:`tclab_step_test.csv` is from J. Kantor's course CBE30338 (MIT licence). The
+file has 801 rows, 1 s apart: time (s), temperature T1 (°C) and heater Q1 (%).
 
 **Answer.** The verdict is an *indication*, so no interval is claimed. Two lags and a dead time of
-about 0.25 s explain the record best. But one step does not exclude a single lag with a dead time of
-about 11.4 s. The gains Kp = 9.51 %/°C and Ki = 0.119 %/(°C s) suit both plants: the gain margin is
-at least 3.2.
+about 0.25 s explain the record best. But a single lag with a dead time of about 11.4 s is also
+possible, because the record has only one step. The gains Kp = 9.51 %/°C and Ki = 0.119 %/(°C s)
+are suitable for both plants, with a gain margin of at least 3.2.
 
-**Next.** A second record decides between the two plants. Let the heater step up and down at uneven
-times, and give the file to::
+**Next.** A second record decides between the two plants. Make steps of the heater up and down at
+irregular times, and give the file to this command::
 
     deadtime tune next.csv --output T1 --command Q1
 """

@@ -2,20 +2,21 @@ r"""
 An Internet loop: can one step measure a delay that varies?
 ===========================================================
 
-**Question.** Packets between plant and controller take 50 ± 10 ms each way. Does the step response
-show the mean delay of the loop?
+**Question.** Packets between plant and controller take 50 ± 10 ms in each direction. Does the
+step response show the mean delay of the loop?
 
-**Data.** Each step is simulated packet by packet by the script: time (s), reference and output, 601
-rows, 10 ms apart, with noise of 0.01. The packets carry their times, so the true delay is measured.
+**Data.** The script simulates each step packet by packet: time (s), reference and output, 601
+rows, 10 ms apart, with noise of 0.01. The packets contain their times, so the true delay is
+measured.
 
-**Answer.** Not as the packets come. The steps give delays from 90 to 103 ms, and all intervals
-(95 %) but one miss the mean of 94 to 97 ms. The verdict, *reliable* or *indication*, is about the
-few packets of that one step. A buffer applies each command 160 ms after its measurement, so that
-the delay is constant. Then every verdict is *reliable*, and the intervals lie within 159.5 to
-160.3 ms.
+**Answer.** Without a buffer, the step response does not show the mean delay. The steps give
+delays from 90 to 103 ms. All intervals (95 %) but one do not contain the mean of 94 to 97 ms. The
+verdict, *reliable* or *indication*, applies only to the few packets of the step. A buffer applies
+each command 160 ms after its measurement, so that the delay is constant. With the buffer, every
+verdict is *reliable*, and the intervals lie within 159.5 to 160.3 ms.
 
-**Next.** Choose the age of the buffer for your network: long enough for almost all packets, and no
-longer. Compare it with other policies::
+**Next.** Choose the age at which the buffer applies a command. The age must be long enough for
+almost all packets of your network, but no longer. Compare the buffer with other policies::
 
     deadtime internet-loop --virtual-time --gain 6 --delays normal --jitter 0.01 \
         --policy jitter-buffer --policy-number 0.16

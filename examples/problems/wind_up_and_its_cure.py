@@ -2,17 +2,17 @@
 A valve at its limit: what cures wind-up?
 =========================================
 
-**Question.** A controller asks for more than its valve can give, and the level overshoots by more
-than half. Which cure removes the overshoot?
+**Question.** A controller requests more than its valve can give, and the level overshoots by more
+than half. Which remedy removes the overshoot?
 
-**Data.** None: the loop is known. The valve moves the level by 0.02 %/s for each per cent and ends
-at ± 20 % from rest. The dead time is 7 to 9 s.
+**Data.** The script needs no data, because the loop is known. The valve moves the level by 0.02
+%/s for each per cent, and is limited to ± 20 % from rest. The dead time is 7 to 9 s.
 
-**Answer.** The numbers are exact for each dead time, so their range replaces an interval. The
-integral of a plain PI controller grows while the valve is at its limit: the level overshoots by 58
-to 60 %. With back-calculation in 100 s it is 11 to 12 %, in 30 s it is 0 %. Conditional integration
-gives 2 % and settles first, in 217 to 224 s. Away from the limit all four loops are the same, and
-proved stable.
+**Answer.** The results are exact for each dead time, so their range replaces an interval. With a
+plain PI controller, the integral grows while the valve is at its limit, and the level overshoots
+by 58 to 60 %. With back-calculation the overshoot is 11 to 12 % for a tracking time of 100 s, and
+0 % for 30 s. With conditional integration, the overshoot is 2 %, and the level settles first, in
+217 to 224 s. While the valve is not at its limit, all four loops are the same and proved stable.
 
 **Next.** Move the gains and the dead time of this loop by hand::
 

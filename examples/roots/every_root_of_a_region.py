@@ -3,8 +3,9 @@ Every root of a region
 ======================
 
 The characteristic function of a loop with a delay has infinitely many roots. ``roots`` finds all
-of them in a rectangle: their number is proved first, and what is found must add up to it. Far from
-the origin the roots of this loop follow a law, which ``chains`` gives.
+roots in a rectangle. First ``roots`` proves the number of roots, and the sum of the found
+multiplicities must equal this number. Far from the origin, the roots of this loop follow a law,
+which ``chains`` gives.
 """
 
 from deadtime import delay, s

@@ -2,9 +2,9 @@
 What a Padé approximation gets wrong
 ====================================
 
-A Padé approximation of order n replaces the delay by a rational function, and infinitely many
-poles by n + 1. The poles next to the origin come out right. The others do not, and none is missing
-in the exact loop.
+A Padé approximation of order n replaces the delay by a rational function. The loop then has n + 1
+poles instead of infinitely many. The poles close to the origin are right, but the others are
+wrong. With the exact loop, no pole is missing.
 """
 
 import deadtime as dtm

@@ -2,8 +2,9 @@
 How roots move as the delay grows
 =================================
 
-A root locus over the delay. Roots come in from the left, and pairs cross the imaginary axis one
-after the other. ``crossings`` gives every delay at which that happens, without a grid.
+The picture is a root locus over the delay. Roots come from the far left, and one pair after the
+other crosses the imaginary axis. ``crossings`` gives every delay at which a pair crosses, without
+a grid.
 """
 
 import deadtime as dtm

@@ -2,10 +2,11 @@
 The latency of an attitude loop
 ===============================
 
-``latency`` takes the log of an autopilot, or a recording. For each loop it gives the time from
-command to response, with an interval. Here the roll angle follows its setpoint after a dead time of
-47 ms and a lag of 80 ms. The time lies between the dead time and both together: it is the
-equivalent delay in the mean over the frequencies at which the roll angle moves.
+``latency`` takes the log of an autopilot, or a recording. For each loop ``latency`` gives the
+time from command to response, with an interval. In this example, the roll angle follows its
+setpoint after a dead time of 47 ms and a lag of 80 ms. The time is the mean equivalent delay over
+the frequencies at which the roll angle moves. This time is longer than the dead time, and shorter
+than the sum of dead time and lag.
 """
 
 import deadtime as dtm
