@@ -193,7 +193,7 @@ def test_a_known_controller_gives_the_command_and_its_crossover():
     assert fit.delay + fit.best.lags[0] == pytest.approx(0.6, abs=0.06)
     true = vehicle.continuous().margin().gain_crossovers[-1]
     assert fit.crossover_in_loop == pytest.approx(true, rel=0.05)
-    assert "with its controller the loop crosses over at" in fit.summary()
+    assert "with its controller, the loop has its crossover at" in fit.summary()
 
 
 @pytest.mark.parametrize("name", ["2_4_0_25", "0_5_1_0"])
@@ -240,7 +240,7 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
     with pytest.raises(ValueError, match="no recording was given"):
         dtm.estimate_delay([])
-    with pytest.raises(ValueError, match="omega=-1 rad/s: give a frequency above zero"):
+    with pytest.raises(ValueError, match="omega=-1 rad/s: give frequencies above zero"):
         fit.at([-1.0])
     with pytest.raises(ValueError, match="'zeros' has no interval"):
         fit.ci(0.95, "zeros")
@@ -276,7 +276,7 @@ def test_a_command_that_moves_at_the_beginning_alone_takes_the_plant_at_rest():
     assert said.delay == fit.delay
     unknown = dtm.estimate_delay(record, at_rest=False)
     assert unknown.verdict == "none"
-    assert "before the rows that the fit uses" in unknown.reason
+    assert "before the rows that are fitted" in unknown.reason
     assert "at_rest=True" in unknown.advice().statement
 
 
