@@ -131,7 +131,7 @@ def test_a_drone_that_lands_by_itself_is_not_asked_to_take_off_again():
             await client.take_off()
             drone._enter("landing", drone.time)
             drone.came_down = landed = drone.time
-            with pytest.raises(FlightAbortedError, match="most likely another client"):
+            with pytest.raises(FlightAbortedError, match="Most likely another client"):
                 await hover_until_error(client)
             await asyncio.sleep(2.0)
             assert drone.phase == "landed"

@@ -135,7 +135,7 @@ def test_a_network_survives_conversion_to_text(network):
         (lambda: Bursts(0.1, 0.0), "never end"),
         (lambda: Bursts.of(0.9, 1.5), "longer"),
         (lambda: Bursts.of(0.05, math.inf), "finite"),
-        (lambda: network_of("gamma", 0.0, 0.01), "cannot vary"),
+        (lambda: network_of("gamma", 0.0, 0.01), "cannot have"),
         (lambda: ShiftedGamma(0.05, 0.05, 0.01), "not above"),
         (lambda: network_of("pareto"), "none of"),
         (lambda: network_from("{}"), "describe"),
