@@ -61,8 +61,12 @@ def test_a_limit_on_one_side_passes_in_the_direction_that_it_leaves():
 @pytest.mark.parametrize(
     ("gains", "options", "reason"),
     [
-        ({"Kp": 1.1, "delay": 0.01}, {}, "delay=0.01 is no gain of the controller: Kp"),
-        ({"Kp": 1.1}, {"flown": {"kp": 0.1}}, "flown has 'kp', which is no gain: Kp, Ki"),
+        ({"Kp": 1.1, "delay": 0.01}, {}, "delay=0.01 is not a gain of this controller"),
+        (
+            {"Kp": 1.1},
+            {"flown": {"kp": 0.1}},
+            "flown contains 'kp', which is not a gain: give gains from Kp, Ki",
+        ),
         ({"Kp": 1.1}, {"noise": float("nan")}, "noise=nan"),
         ({"Kp": 1.1}, {"noise": 0.1, "bandwidth": -3.0}, "bandwidth=-3"),
         ({"Kp": 1.1}, {"noise_share": -1.0}, "noise_share=-1"),

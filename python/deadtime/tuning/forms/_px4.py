@@ -24,7 +24,7 @@ LINE = re.compile(
 
 WRITTEN = "param set {name} {value}"
 
-BOTH = "The parameters hold for north and east together."
+BOTH = "The parameters apply to north and east together."
 ALL_AXES = "IMU_DGYRO_CUTOFF holds for all axes."
 
 
