@@ -408,8 +408,8 @@ def test_the_command_prints_the_same_for_the_same_seed(tmp_path):
         (["--loss", "1.5"], "probability"),
         (["--duration", "1.5"], "leaves less"),
         (["--gain", "0"], "above zero"),
-        (["--plot", "loop.txt", "--gain", "8"], "not the name of a picture"),
-        (["--plot", "there/loop.png", "--gain", "8"], "no folder there"),
+        (["--plot", "loop.txt", "--gain", "8"], "the name of a picture must end"),
+        (["--plot", "there/loop.png", "--gain", "8"], "the folder there does not exist"),
         (["--folder", "a-file", "--gain", "8"], "a-file: File exists"),
     ],
 )
