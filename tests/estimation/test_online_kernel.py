@@ -194,7 +194,7 @@ def test_what_is_wrong_is_said_with_its_value():
     for changed, words in (
         ({"delays": [0.1, 0.2]}, "2 delays"),
         ({"delays": [0.3, 0.2, 0.1]}, "follows 0.3"),
-        ({"white": 0.0}, "white noise is 0"),
+        ({"white": 0.0}, "white noise of 0"),
         ({"level": 1.0}, "the level is 1"),
         ({"layers": [([-0.1], 0.0, [0.0] * 5)]}, "a lag is -0.1 s"),
         ({"layers": [([0.1], 0.0, [-math.inf] * 5)]}, "all prior weights are zero"),

@@ -115,7 +115,7 @@ def test_the_summary_begins_with_the_verdict_and_says_what_came_second(fit):
     assert first == fit.headline()
     assert first.startswith("reliable: dead time 1")
     assert "a process that comes to rest, time constant" in first
-    assert any(line.strip().startswith("second: ") for line in rest)
+    assert any(line.strip().startswith("second best: ") for line in rest)
     assert rest[-1].strip() == fit.advice().statement
     statement = fit.advice().statement
     found = eval(statement, {"dtm": dtm, "fit": fit})
@@ -213,7 +213,7 @@ def test_the_height_servo_is_found_without_being_named(name):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"limit": 1.0}, "limit=1.0 is the limit of a controller"),
+        ({"limit": 1.0}, "limit=1.0 is a limit of the controller"),
         ({"controller": dtm.PI(1.0, 0.1)}, "only for a P controller"),
         ({"plant": "two poles"}, "plant='two poles' is not one of 'delay', 'lag'"),
         ({"largest_delay": 0.0}, "largest_delay"),
@@ -236,7 +236,7 @@ def test_a_recording_without_a_command_and_options_of_the_other_way_are_refused(
     with pytest.raises(dtm.RecordingError, match="no command, so nothing shows"):
         dtm.estimate_delay(dtm.Recording(time, command, output))
     loop = dtm.ControlLoop(dtm.FirstOrder(), dtm.P(1.0))
-    with pytest.raises(ValueError, match="at_rest is for an estimate without a loop"):
+    with pytest.raises(ValueError, match="at_rest is only for an estimate without a loop"):
         dtm.estimate_delay(dtm.Recording(time, command, output, command), loop, at_rest=True)
     with pytest.raises(ValueError, match="no recording was given"):
         dtm.estimate_delay([])

@@ -52,7 +52,7 @@ NAMES = {"upper limit": "unequal limits", "lower limit": "unequal limits"}
 
 SENSOR_WORDS = {
     "frozen": "the sensor is frozen for {rows} rows from {start:.4g} to {stop:.4g} s",
-    "repeated": "the sensor repeats its reading in {rows} rows, {size:.3g} s old on average",
+    "repeated": "{rows} rows repeat a reading that is {size:.3g} s old on average",
     "glitch": "the sensor has glitches in {rows} rows",
     "smoothed": "each reading is a centred moving mean of {size:.3g} rows",
 }
