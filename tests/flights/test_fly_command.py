@@ -93,7 +93,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--gains", "1.2,3"), "Kp = 3 is above 2.47"),
         (("--gains", "fast"), "numbers with commas"),
         (("--gains", ""), "gains is empty"),
-        (("--max-height", "1.2"), "outside 0.2 to 1.2 m"),
+        (("--max-height", "1.2"), "outside of 0.2 to 1.2 m"),
         (("--host", "127.0.0.1", "--virtual-time"), "leave out --virtual-time"),
         (("--max-climb", "nan"), "max_climb"),
         (("--axes", "z,w"), "give some of z, x, y, yaw"),
@@ -101,7 +101,7 @@ def test_a_real_host_needs_consent_and_shows_the_limits():
         (("--axes", "x", "--virtual-time"), "accepts no speed commands on the axis x, only on z"),
         (("--step", "-0.2"), "step"),
         (("--step", "1e-5"), "as small as the noise"),
-        (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "steps of 0.9 m or less"),
+        (("--step", "0.95", "--base", "1.5", "--max-height", "4"), "a step of 0.9 m or less"),
     ],
 )
 def test_unsafe_or_invalid_options_are_refused(options, message, tmp_path):

@@ -57,7 +57,7 @@ def test_an_old_firmware_has_no_system_identification(flown):
     found = lines(log)
     assert not any("SID_AXIS" in line for line in found)
     assert "fly" in found[-1]
-    assert "each held for" in found[-1]
+    assert "hold each for" in found[-1]
 
 
 def test_a_plane_logs_attitude_in_each_loop_by_another_bit(flown):
@@ -83,7 +83,7 @@ def test_betaflight_names_fields_rate_and_chirp(flown):
                  looptime=125.0, pid_process_denom=2.0)  # fmt: skip
     found = lines(log)
     assert found[0].startswith("set blackbox_disable_setpoint = OFF")
-    assert found[1].startswith("set blackbox_sample_rate = 1/4: 1000 rows a second")
+    assert found[1].startswith("set blackbox_sample_rate = 1/4, to log 1000 rows per second")
     assert found[2].startswith("set debug_mode = CHIRP, chirp_amplitude_roll = 230")
     old = as_log(flown, "Betaflight", "Betaflight 3.4.0 (a)", None, columns)
     assert lines(old) == [

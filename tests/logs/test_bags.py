@@ -173,7 +173,7 @@ def test_what_is_no_bag_is_refused(tmp_path):
         path.write_bytes(data)
         with pytest.raises(dtm.RecordingError, match=message):
             open_bag(path)
-    with pytest.raises(dtm.RecordingError, match=r"without the metadata\.yaml"):
+    with pytest.raises(dtm.RecordingError, match=r"without the file metadata\.yaml"):
         open_bag(tmp_path)
     named = tmp_path / "bag.dat"
     bags.ros1(tmp_path / "a.bag")

@@ -240,7 +240,7 @@ def test_a_log_is_opened_at_one_of_its_flights(tmp_path):
     durations = [dtm.open_log(path, flight=number).duration for number in (1, 2, 3)]
     assert dtm.open_log(path).duration == max(durations) == durations[1]
     assert durations[2] < durations[0] < durations[1]
-    with pytest.raises(RecordingError, match="flight 4 of 3: give a number from 1 to 3"):
+    with pytest.raises(RecordingError, match="flight=4 is given: give a number from 1 to 3"):
         dtm.open_log(path, flight=4)
     other = tmp_path / "other.log"
     other.write_text("FMT, 1, 23, ATT, Qcc, TimeUS,DesRoll,Roll\nATT, 1, 2, 3\n")
@@ -258,7 +258,7 @@ def test_a_flight_that_cannot_be_read_is_named():
     )
     with pytest.raises(RecordingError, match=r'^made\.bbl: flight 1: version "1" of the data'):
         read_blackbox(broken + flight(rows, log), "made.bbl", flight=1)
-    with pytest.raises(RecordingError, match="flight 3 of 2: give a number from 1 to 2"):
+    with pytest.raises(RecordingError, match="flight=3 is given: give a number from 1 to 2"):
         read_blackbox(broken + flight(rows, log), "made.bbl", flight=3)
 
 

@@ -144,10 +144,10 @@ def test_a_log_that_is_cut_off_is_read_as_far_as_it_goes(name, share, tmp_path):
         (b"ARROW1\0\0" + bytes(20), rf"is an Arrow table: {TABLE}"),
         (b"MATLAB 5.0 MAT-file" + bytes(200), rf"is a MAT file: {TABLE}"),
         (b"MATLAB 7.3 MAT-file" + bytes(200), rf"is a MAT file: {TABLE}"),
-        (b"PK\x03\x04" + bytes(200), "is a zip archive, .*: unpack it"),
-        (b"\xa3\x95\x80" + bytes(200), "has no message of a known format"),
-        (b"\xa3\x95\x07", "has no message of a known format"),
-        (b"FMT, 1, 2, ATT, Qc, TimeUS\nATT, 1, 2\n", "has no message of a known format"),
+        (b"PK\x03\x04" + bytes(200), "is a zip archive, .*: unpack the archive"),
+        (b"\xa3\x95\x80" + bytes(200), "contains no message of a known format"),
+        (b"\xa3\x95\x07", "contains no message of a known format"),
+        (b"FMT, 1, 2, ATT, Qc, TimeUS\nATT, 1, 2\n", "contains no message of a known format"),
     ],
 )
 def test_other_files_are_refused_with_what_is_wrong(data, words, tmp_path):

@@ -288,7 +288,7 @@ def test_a_response_against_its_command_is_no_answer():
     parts = [replace(one, output=-one.output) for one in flown([0.03] * 2)]
     found = answer_of(parts)
     assert found.verdict == "none"
-    assert found.reason.startswith("in the opposite direction of its command")
+    assert found.reason.startswith("the response moves in the opposite direction")
     assert found.estimate is None
 
 

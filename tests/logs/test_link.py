@@ -106,7 +106,7 @@ def test_the_report_has_the_link(opened, tmp_path):
     assert found.to_dict()["link"]["lost"] == log.link.lost
     page = found.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "<h2>The link</h2>" in page
-    assert "half the least round trip" in page
+    assert "half of the shortest round trip" in page
 
 
 def test_inspect_tells_it(opened, tmp_path):
@@ -114,7 +114,7 @@ def test_inspect_tells_it(opened, tmp_path):
     path = tmp_path / "a.tlog"
     path.write_bytes(data)
     assert found("inspect", path)["link"]["lost"] == lost
-    assert "half the least round trip" in " ".join(run("inspect", path).stdout.split())
+    assert "half of the shortest round trip" in " ".join(run("inspect", path).stdout.split())
 
 
 def test_a_short_log_and_other_formats_have_none(opened):

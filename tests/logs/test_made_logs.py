@@ -284,7 +284,7 @@ def test_modes_gaps_and_missing_numbers_bound_the_segments(opened):
     for words in (
         "the vehicle is disarmed",
         "in this flight mode the loop is open",
-        "no number",
+        "not a number",
         "a gap",
     ):
         assert any(words in reason for reason in loop.why_left_out), words

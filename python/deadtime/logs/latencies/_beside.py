@@ -79,7 +79,7 @@ def _why_ahead(one: PlainTime) -> str:
     low, high = one.interval
     error = 0.25 * (high - low)
     return (
-        f"by the method {one.name} the response comes {shown(-one.value, error, 's')} before "
+        f"by {one.name} the response comes {shown(-one.value, error, 's')} before "
         f"its setpoint (95 %: {ends_of(-high, -low, error, 's')})"
     )
 

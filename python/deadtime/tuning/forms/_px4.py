@@ -25,7 +25,7 @@ LINE = re.compile(
 WRITTEN = "param set {name} {value}"
 
 BOTH = "The parameters apply to north and east together."
-ALL_AXES = "IMU_DGYRO_CUTOFF holds for all axes."
+ALL_AXES = "IMU_DGYRO_CUTOFF applies to all axes."
 
 
 def _rate(axis: str, span: tuple[float, float]) -> FirmwareLoop:
