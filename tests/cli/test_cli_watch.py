@@ -80,7 +80,9 @@ def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
     with pytest.raises(dtm.RecordingError, match=r"line 2 of .*log\.csv is '0.0,height,0.5'"):
         list(growing_rows(path, COLUMNS, 0.1))
     path.write_text("time,output\n")
-    with pytest.raises(dtm.RecordingError, match="no column 'command', only time, output"):
+    with pytest.raises(
+        dtm.RecordingError, match="no column 'command'. Its columns are time, output"
+    ):
         list(growing_rows(path, COLUMNS, 0.1))
 
 

@@ -129,7 +129,7 @@ def test_every_cycle_sends_the_flight_request_and_an_old_setpoint_is_not_repeate
             sent = record_datagrams(drone)
             given = now()
             drone.command(0.5)
-            with pytest.raises(FlightAbortedError, match=r"no command for 1\.0"):
+            with pytest.raises(FlightAbortedError, match=r"no command was given for 1\.0"):
                 await read_states(drone, 0.01, hovering=False)
             assert now() - given == pytest.approx(LIMITS.landing_after, abs=0.05)
             times = [time for time, _ in sent]
@@ -178,7 +178,7 @@ def test_missing_navdata_during_take_off_lands_the_drone(begun):
             await asyncio.sleep(begun)
             drone._link.reader.accept = lambda packet, now: None  # Commands still arrive.
             lost = now()
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await taking_off
             assert now() - lost < 1.2
             with pytest.raises(LinkError, match="during the landing"):
@@ -292,7 +292,7 @@ def test_missing_navdata_in_flight_raise_and_landing_ends_in_bounded_time():
                 None
             )  # Navdata no longer arrive, but commands do.
             lost = now()
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await read_states(drone)
             assert now() - lost == pytest.approx(1.0, abs=0.05)
             with pytest.raises(LinkError, match="during the landing"):
@@ -334,7 +334,7 @@ def test_a_drone_that_stops_answering_ends_the_context_in_bounded_time():
                     await read_states(drone)
 
             closed_at = []
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await fly_until_silence()
             assert now() - closed_at[0] < 5.0
 
@@ -455,7 +455,10 @@ def test_a_setting_that_is_never_acknowledged_ends_the_handshake(monkeypatch):
 
 @pytest.mark.parametrize(
     ("piece", "message"),
-    [(b"x" * 100_000, "its end is missing after 65536 bytes"), (b"x", "nothing received for 2 s")],
+    [
+        (b"x" * 100_000, "its end is missing after 65536 bytes"),
+        (b"x", "nothing has been received for 2 s"),
+    ],
 )
 def test_a_configuration_without_end_is_not_waited_for(piece, message):
     async def send_without_end(reader, writer):

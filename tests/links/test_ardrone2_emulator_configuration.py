@@ -219,7 +219,7 @@ def test_many_motion_commands_do_not_accumulate():
 def test_listening_beyond_this_machine_requires_named_clients():
     with pytest.raises(ValueError, match="IP addresses that the emulator answers"):
         EmulatorOptions(host="0.0.0.0")
-    with pytest.raises(ValueError, match="'anybody' is not an IP address"):
+    with pytest.raises(ValueError, match="'anybody', which is not an IP address"):
         EmulatorOptions(host="0.0.0.0", clients=("anybody",))
     assert EmulatorOptions(host="0.0.0.0", clients=("192.168.1.2",)).answers("192.168.1.2")
     assert EmulatorOptions(host="::", clients=("fd00:0::2",)).answers("fd00::2")

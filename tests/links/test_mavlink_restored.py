@@ -141,7 +141,7 @@ def test_an_error_that_leaves_old_values_names_them_and_their_file(tmp_path):
             await link.connect()
             await link.take_off()
             vehicle.drop = lambda message: True
-            with pytest.raises(LinkError, match="nothing received"):
+            with pytest.raises(LinkError, match="nothing has been received"):
                 await told(link, 0.1, 5.0)
             with pytest.raises(LinkError, match="during the landing") as ended:
                 await link.close()

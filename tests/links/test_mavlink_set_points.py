@@ -311,7 +311,10 @@ def test_a_flight_by_attitudes_and_by_rates(firmware):
 def test_kinds_of_set_points_have_names():
     async def flight():
         async with StandIn(), MAVLinkVehicle(ADDRESS, LIMITS) as link:
-            with pytest.raises(ValueError, match="'speed': position, attitude, rates"):
+            with pytest.raises(
+                ValueError,
+                match="'speed' is not a kind of set point: give one of position, attitude, rates",
+            ):
                 await link.allow("speed")
 
     run(flight())

@@ -132,7 +132,7 @@ def test_commands_are_bounded_and_expire():
             assert late
             assert set(late) == {0.0}
             await asyncio.sleep(0.3)
-            with pytest.raises(FlightAbortedError, match="no command for"):
+            with pytest.raises(FlightAbortedError, match="no command was given for"):
                 link.command(0.1)
             await asyncio.sleep(0.3)
             assert vehicle.mode == vehicle.landing
@@ -233,7 +233,7 @@ def test_a_parameter_that_is_not_kept_is_refused_and_the_others_put_back():
         async with StandIn() as vehicle:
             before = dict(vehicle.parameters)
             vehicle.drop = lambda m: m.get_type() == "PARAM_SET" and m.param_id == "FENCE_ACTION"
-            with pytest.raises(LinkError, match="does not keep the value FENCE_ACTION = 2"):
+            with pytest.raises(LinkError, match="does not accept the value FENCE_ACTION = 2"):
                 await MAVLinkVehicle(ADDRESS, LIMITS).connect()
             assert vehicle.parameters == before
 
@@ -379,7 +379,7 @@ def test_a_listener_gets_every_state_and_its_error_is_raised():
 
 def test_addresses_and_options_are_checked():
     for address in ("udp:", "udp:127.0.0.1", "ftp:127.0.0.1:80", "tcp:host:70000"):
-        with pytest.raises(ValueError, match="give udp:HOST:PORT"):
+        with pytest.raises(ValueError, match="Give udp:HOST:PORT"):
             MAVLinkVehicle(address)
     with pytest.raises(ValueError, match="take_off_height"):
         MAVLinkVehicle(ADDRESS, take_off_height=4.0)
@@ -506,6 +506,6 @@ def test_the_failsafe_of_the_position_estimate_is_named_however_a_flight_ends():
     with pytest.raises(FlightAbortedError, match=r"0\.31 s old") as ended:
         run(flight())
     assert (
-        'position estimate (EKF_STATUS_REPORT); the vehicle says "EKF Failsafe'
+        'position estimate (EKF_STATUS_REPORT). The vehicle says "EKF Failsafe'
         in (ended.value.__notes__[0])
     )

@@ -162,7 +162,7 @@ def test_commands_that_cannot_be_encoded_are_refused(command, says):
 def test_sequence_numbers_have_31_bits():
     assert decode(encode([Watchdog()], 2**31 - 1)) == [(2**31 - 1, Watchdog())]
     for first in (-1, 2**31, 2**32):
-        with pytest.raises(ValueError, match=r"sequence|numbers? of the commands"):
+        with pytest.raises(ValueError, match=r"sequence|a command from"):
             encode([Watchdog()], first)
 
 

@@ -45,7 +45,7 @@ class Classifier:
     >>> classifier.of(answer, now=1.1)
     <Verdict.ANSWER: 'the packet answers a packet of this end'>
     >>> classifier.of(answer, now=1.001)  # held for longer than the round trip
-    <Verdict.PLAUSIBLE: 'it is plausible, and answers no packet of this end'>
+    <Verdict.PLAUSIBLE: 'the packet is plausible, but does not answer a packet of this end'>
     """
 
     def __init__(self, remembered: int = REMEMBERED) -> None:
