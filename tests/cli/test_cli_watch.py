@@ -81,7 +81,7 @@ def test_lost_cells_and_wrong_ones_of_a_growing_table(tmp_path):
         list(growing_rows(path, COLUMNS, 0.1))
     path.write_text("time,output\n")
     with pytest.raises(
-        dtm.RecordingError, match="no column 'command'. Its columns are time, output"
+        dtm.RecordingError, match=r"no column 'command'\. Its columns are time, output"
     ):
         list(growing_rows(path, COLUMNS, 0.1))
 

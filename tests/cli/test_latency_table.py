@@ -108,7 +108,7 @@ def test_a_time_that_depends_on_the_size_of_the_movement_is_said_in_numbers():
     told = lines_of(loop("roll", spread=slow), loop("pitch", spread=spread()))
     assert told == ["roll takes 13.9 ± 2.1 ms longer if the setpoint moves half as much"]
     fast = spread(slope=0.02, interval=(0.014, 0.026))
-    assert "ms less where" in lines_of(loop("roll", spread=fast))[0]
+    assert "ms less if" in lines_of(loop("roll", spread=fast))[0]
 
 
 def test_zero_has_no_sign():
