@@ -385,7 +385,7 @@ def test_addresses_and_options_are_checked():
         MAVLinkVehicle(ADDRESS, take_off_height=4.0)
     with pytest.raises(ValueError, match="system=0"):
         MAVLinkVehicle(ADDRESS, system=0)
-    with pytest.raises(ValueError, match="key of 3 bytes"):
+    with pytest.raises(ValueError, match="key has 3 bytes"):
         MAVLinkVehicle(ADDRESS, key=b"key")
 
 

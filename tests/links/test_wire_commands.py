@@ -148,7 +148,7 @@ def test_a_motion_outside_its_range_cannot_be_built(axis, bad):
         (Config('a"b', "c"), "key contains the byte 0x22"),
         (Config("a:b", "é"), "value contains the byte 0xc3"),
         (Config("a:b", "c" * 1024), "1045 bytes are too many, because at most 1024 are allowed"),
-        (Other("PCMD", ("1", "0", "0", "2139095040", "0")), '"PCMD" is no name'),
+        (Other("PCMD", ("1", "0", "0", "2139095040", "0")), '"PCMD" is not the name'),
         (Other("LED", ("1,2",)), "argument contains the byte 0x2c"),
         (Move(flag=2**31), "a command from 1 on"),
         (Control(2**40), "a command from 1 on"),

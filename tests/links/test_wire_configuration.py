@@ -34,7 +34,7 @@ def test_settings_are_read_with_their_sections():
             b"a:b = c\n\0a:d = e\n\0",
             "bytes after the NUL byte that ends the configuration, at byte 9",
         ),
-        (b"a:b = c\nnonsense\n\0", 'not of the form "section:key = value", at byte 8'),
+        (b"a:b = c\nnonsense\n\0", 'does not have the form "section:key = value", at byte 8'),
         (b"b = c\n\0", "at byte 0"),
         (b"a:b = \xff\n\0", "not UTF-8 text, at byte 6"),
         (b"a:b = \x1b[2J\n\0", "at byte 0"),
@@ -115,7 +115,7 @@ def test_invalid_loop_packets_are_refused():
         (packet[:-1], "55 bytes instead of 56"),
         (packet + b"\0", "57 bytes instead of 56"),
         (b"DTL2" + packet[4:], "the header 0x44544c32 does not belong to a known format"),
-        (packet[:32] + struct.pack("<d", -1e-9) + packet[40:], "held=.* is out of its range"),
+        (packet[:32] + struct.pack("<d", -1e-9) + packet[40:], "held=.* is outside of its range"),
     ]:
         with pytest.raises(PacketError, match=says):
             LoopPacket.decode(wrong)

@@ -207,10 +207,10 @@ ONE_DELAY = s + delay(1.0)
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
-        (lambda: QuasiPolynomial([[0.0, math.nan]], [0.0]), "coefficient NaN.*finite"),
-        (lambda: QuasiPolynomial([[-math.inf, 1.0]], [0.0]), "coefficient -inf.*finite"),
-        (lambda: QuasiPolynomial([[1.0]], [math.inf]), "delay inf.*finite"),
-        (lambda: QuasiPolynomial([[1.0]], [-1e-300]), "delay -.*not negative"),
+        (lambda: QuasiPolynomial([[0.0, math.nan]], [0.0]), "coefficient is NaN.*finite"),
+        (lambda: QuasiPolynomial([[-math.inf, 1.0]], [0.0]), "coefficient is -inf.*finite"),
+        (lambda: QuasiPolynomial([[1.0]], [math.inf]), "delay is inf.*finite"),
+        (lambda: QuasiPolynomial([[1.0]], [-1e-300]), "delay is -.*not negative"),
         (lambda: QuasiPolynomial([], []), "shape.*not empty"),
         (lambda: QuasiPolynomial([[]], [0.0]), "shape.*not empty"),
         (lambda: QuasiPolynomial([[1.0], [1.0, 2.0]], [0.0, 1.0]), "different lengths.*zeros"),
@@ -263,7 +263,7 @@ def test_a_refusal_names_the_root_on_the_edge(root, edge):
 
 def ask_where(h, box, side, index):
     """The place of a refused count; counts with the edge moved to either side differ by one."""
-    with pytest.raises(ContourError, match="move the edge") as error:
+    with pytest.raises(ContourError, match="Move the edge") as error:
         h.count(**box)
     counts = []
     for sign in (2, -2):

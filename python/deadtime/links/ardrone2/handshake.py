@@ -92,7 +92,7 @@ class Handshake:
             except asyncio.LimitOverrunError:
                 problem = f"its end is missing after {LONGEST_DUMP} bytes"
             except (OSError, EOFError, ValueError) as error:  # among them TimeoutError
-                problem = str(error) or f"nothing received for {DUMP:g} s"
+                problem = str(error) or f"nothing has been received for {DUMP:g} s"
         raise LinkError(
             f"{self._name} does not send its configuration on TCP port {port} ({problem}). So "
             "the limits of the drone are not known, and it cannot be flown"
