@@ -204,7 +204,7 @@ def test_a_controller_says_what_it_takes_in_place_of_another_name():
     [
         (lambda loop: loop.simulate([0.0, 1.0, 1.0]), "increasing"),
         (lambda loop: loop.simulate([]), "empty"),
-        (lambda loop: loop.simulate([0.0, math.nan]), "time holds NaN"),
+        (lambda loop: loop.simulate([0.0, math.nan]), "time contains NaN"),
         (lambda loop: loop.simulate([[0.0]]), "one-dimensional"),
         (lambda loop: loop.simulate([0.0], [1.0, 2.0]), "one value for"),
         (lambda loop: loop.simulate([0.0], 1.0, reference_time=[0.0]), "reference_time"),
